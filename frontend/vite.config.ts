@@ -1,0 +1,33 @@
+import react from "@vitejs/plugin-react";
+import { defineConfig } from "vitest/config";
+
+// `npm run dev` forwards what the page asks of its server to an editor on this machine.
+const editor = process.env.ACTION_ASSISTANT_EDITOR ?? "http://127.0.0.1:8000";
+
+/** Vendor code in few files that change seldom, so that an upgrade of ours leaves them cached. */
+const vendors: { name: string; test: RegExp }[] = [
+  { name: "react", test: /node_modules\/(react|react-dom|scheduler)\// },
+  { name: "canvas", test: /node_modules\/(@xyflow|@dagrejs|d3-|classcat|zustand)/ },
+  { name: "sync", test: /node_modules\/(yjs|y-protocols|lib0)\// },
+  { name: "interface", test: /node_modules\/(@mantine|@floating-ui|@tabler|react-|@tanstack)/ },
+];
+
+export default defineConfig({
+  plugins: [react()],
+  build: {
+    outDir: "dist",
+    target: "es2022",
+    rolldownOptions: { output: { codeSplitting: { groups: vendors } } },
+  },
+  server: {
+    port: 5173,
+    proxy: {
+      "/api": { target: editor, ws: true },
+      "/healthz": editor,
+    },
+  },
+  test: {
+    include: ["src/**/*.test.{ts,tsx}"],
+    environment: "node",
+  },
+});
