@@ -1,0 +1,1 @@
+"""TeMoto Action Assistant: design, run and review robot tasks together."""

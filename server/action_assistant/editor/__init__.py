@@ -1,0 +1,1 @@
+"""The editor process: documents, rooms, versions, the page."""

@@ -1,0 +1,33 @@
+"""Where this program finds what it carries and keeps what it is given."""
+
+import os
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent
+_CHECKOUT = _PACKAGE.parent.parent
+
+
+def _carried(name: str, in_checkout: Path) -> Path:
+    """A folder that the wheel carries inside the package and a checkout keeps at its top."""
+    return in_checkout if (_CHECKOUT / "pyproject.toml").is_file() else _PACKAGE / name
+
+
+def migrations() -> Path:
+    """The Alembic scripts."""
+    return _carried("migrations", _CHECKOUT / "migrations")
+
+
+def page() -> Path:
+    """The built page; the folder is missing when nobody has built it."""
+    return _carried("static", _CHECKOUT / "frontend" / "dist")
+
+
+def examples() -> Path:
+    """The example graphs that greet a new user."""
+    return _PACKAGE / "examples"
+
+
+def data() -> Path:
+    """Where journals and the token are kept when nobody says otherwise (XDG base directories)."""
+    base = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
+    return Path(base) / "temoto-action-assistant"

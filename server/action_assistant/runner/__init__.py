@@ -1,0 +1,1 @@
+"""The runner process: robots, runs, Stop. Knows no CRDT."""

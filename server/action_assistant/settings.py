@@ -1,0 +1,84 @@
+"""What a process is told when it starts: command line first, then the environment."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.errors import CannotStart
+
+#: Every variable that this program reads, and what it is for.
+VARIABLES: Final[Mapping[str, str]] = {
+    "ACTION_ASSISTANT_TOKEN": "the token programs present; instead of the file in the data folder",
+    "ACTION_ASSISTANT_URL": "where the command line finds the editor (http://127.0.0.1:8000)",
+    "ACTION_ASSISTANT_HOSTS": "more host names that may stand in the address bar, comma separated",
+    "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
+}
+LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
+
+
+class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """How the editor runs. `database` is a URL such as `sqlite:////data/editor.db`."""
+
+    data: Path
+    database: str
+    host: str = "127.0.0.1"
+    port: int = 8000
+    runner_port: int = 8001
+    hosts: tuple[str, ...] = ()
+    limits: bool = True
+
+
+class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """How the runner runs. `page_port` is the port of the page that may talk to it."""
+
+    data: Path
+    host: str = "127.0.0.1"
+    port: int = 8001
+    page_port: int = 8000
+    hosts: tuple[str, ...] = ()
+    limits: bool = True
+
+
+def check_environment(environ: Mapping[str, str] = os.environ) -> None:
+    """Refuse names that nobody reads: a misspelt setting must not be ignored in silence."""
+    unknown = sorted(
+        name for name in environ if name.startswith("ACTION_ASSISTANT_") and name not in VARIABLES
+    )
+    if unknown:
+        known = ", ".join(VARIABLES)
+        raise CannotStart(f"Unknown setting {', '.join(unknown)}. Known are: {known}.")
+
+
+def limits(environ: Mapping[str, str] = os.environ) -> bool:
+    """Whether rate and socket limits hold."""
+    return environ.get("ACTION_ASSISTANT_LIMITS", "").lower() != "off"
+
+
+def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
+    """Host names, beside the loopback ones, under which people reach the page."""
+    names = environ.get("ACTION_ASSISTANT_HOSTS", "")
+    return tuple(name.strip().lower() for name in names.split(",") if name.strip())
+
+
+def check_host(host: str, hosts: tuple[str, ...]) -> None:
+    """Refuse to listen where strangers are unless somebody said by which names."""
+    if host not in LOOPBACK and not hosts:
+        raise CannotStart(
+            f"Listening on {host} would show this computer's graphs and robots to the network. "
+            "Name the addresses people may use in ACTION_ASSISTANT_HOSTS to do that on purpose."
+        )
+
+
+def writable_folder(path: Path) -> Path:
+    """The folder, made if need be and proven writable."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / f".probe-{os.getpid()}"
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise CannotStart(f"Cannot write to the data folder {path}: {error.strerror}.") from error
+    return path

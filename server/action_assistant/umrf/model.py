@@ -1,0 +1,147 @@
+"""What a UMRF graph is: frozen values for graphs, actions, relations and problems.
+
+Shapes follow the file format (umrf SPEC 1), with two differences that make values easy to edit and
+to merge: relations stand beside the actions instead of being written twice, and both refer to
+actions by `key`, never by name. `ENTRY` and `EXIT` are the keys of the graph's two ends.
+
+Raw JSON text is kept wherever spelling matters (`5` against `5.0`, order of members, unknown fields).
+"""
+
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+
+Key: TypeAlias = str
+JsonText: TypeAlias = str
+Position: TypeAlias = tuple[float, float]
+Precondition: TypeAlias = Literal["on_true", "on_false", "on_error", "on_stopped"]
+Response: TypeAlias = Literal["run", "pause", "restart", "stop", "bypass", "ignore"]
+Result: TypeAlias = Literal["on_true", "on_false", "on_error", "on_stopped", "on_halted"]
+Severity: TypeAlias = Literal["error", "warning"]
+
+ENTRY: Final = "entry"
+EXIT: Final = "exit"
+PRECONDITIONS: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error", "on_stopped")
+RESPONSES: Final[tuple[Response, ...]] = ("run", "pause", "restart", "stop", "bypass", "ignore")
+
+
+class Conditions(msgspec.Struct, frozen=True):
+    """What a child does for each outcome of its parent. A missing answer is `ignore`."""
+
+    on_true: Response = "ignore"
+    on_false: Response = "ignore"
+    on_error: Response = "ignore"
+    on_stopped: Response = "ignore"
+
+    def answer(self, outcome: Precondition) -> Response:
+        """The response to one outcome."""
+        answer: Response = getattr(self, outcome)
+        return answer
+
+
+#: What the engine assumes for a condition that a file leaves out (SPEC 1.4).
+ENGINE_DEFAULTS: Final = Conditions("run", "run", "bypass", "ignore")
+#: The only thing an entry relation can say.
+ENTRY_CONDITIONS: Final = Conditions("run")
+
+
+class Parameter(msgspec.Struct, frozen=True):
+    """One leaf of `input_parameters` or `output_parameters`.
+
+    `path` joins the keys that lead to it with `/`; inside a key `~` is `~0` and `/` is `~1`.
+    `text` is the value as written, usually an object with `pvf_type`.
+    """
+
+    path: str
+    text: JsonText
+
+
+class Action(msgspec.Struct, frozen=True, kw_only=True):
+    """A node of the graph. Its full name on the wire is `name_instance_id`.
+
+    `missing`: only named by relations, no action of the file (drawn as a ghost, never written).
+    `twin`: has the full name of an earlier action of its file, and keeps it.
+    `extra`: fields that this model does not know, or known ones whose value does not fit; the
+    latter win over the field when written.
+    """
+
+    key: Key
+    name: str
+    instance_id: int = 0
+    type: str = "sync"
+    actor: str = ""
+    description: str = ""
+    inputs: tuple[Parameter, ...] = ()
+    outputs: tuple[Parameter, ...] = ()
+    position: Position | None = None
+    missing: bool = False
+    twin: bool = False
+    extra: tuple[tuple[str, JsonText], ...] = ()
+
+    @property
+    def full_name(self) -> str:
+        """The name by which the engine knows the action."""
+        return f"{self.name}_{self.instance_id}"
+
+
+class Remap(msgspec.Struct, frozen=True):
+    """An output of the parent that reaches the child under another name (flat names, `::`)."""
+
+    source: str
+    target: str
+
+
+class Relation(msgspec.Struct, frozen=True, kw_only=True):
+    """An arrow: what `child` does when `parent` ends.
+
+    `parent` may be `ENTRY`, `child` may be `EXIT`. `listing` counts the pairs that a file lists more
+    than once, from 0. `only` names the one array that has it when a file lists one side only.
+    `parent_order` is the place in the parent's `children`, `child_order` in the child's `parents`
+    (for the ends: in `graph_entry` and `graph_exit`); ties go by key.
+    """
+
+    parent: Key
+    child: Key
+    listing: int = 0
+    conditions: Conditions = Conditions()
+    required: bool = True
+    remap: tuple[Remap, ...] = ()
+    only: Literal["parents", "children"] | None = None
+    parent_order: float = 0.0
+    child_order: float = 0.0
+    parents_extra: tuple[tuple[str, JsonText], ...] = ()
+    children_extra: tuple[tuple[str, JsonText], ...] = ()
+
+
+class Graph(msgspec.Struct, frozen=True, kw_only=True):
+    """A whole task. `actions` are in file order; `relations` in no order that means anything.
+
+    `notes`: (id, JSON text) of notes and frames on the canvas.
+    """
+
+    name: str
+    description: str = ""
+    actions: tuple[Action, ...] = ()
+    relations: tuple[Relation, ...] = ()
+    entry_position: Position | None = None
+    exit_position: Position | None = None
+    notes: tuple[tuple[str, JsonText], ...] = ()
+    extra: tuple[tuple[str, JsonText], ...] = ()
+
+
+class Where(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """The place of a problem. `path` is a JSON pointer into the canonical file."""
+
+    path: str = ""
+    aid: Key | None = None
+    relation: str | None = None
+
+
+class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Something about a graph that a person should know. Checks return these, never raise."""
+
+    code: str
+    severity: Severity
+    where: Where
+    message: str
+    fix: str | None = None

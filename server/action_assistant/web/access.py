@@ -1,0 +1,214 @@
+"""The door of both processes: Host, Origin and credentials, before any route and any upgrade."""
+
+import getpass
+import logging
+import re
+from collections.abc import Callable
+from http.cookies import CookieError, SimpleCookie
+from typing import Any, Final
+
+from litestar.connection import ASGIConnection
+from litestar.enums import ScopeType
+from litestar.types import ASGIApp, HTTPScope, Message, Receive, Scope, Send, WebSocketScope
+
+from action_assistant.errors import Refused, Unauthenticated, WrongHost, WrongOrigin
+from action_assistant.web.addresses import Addresses
+from action_assistant.web.keys import Keys, Person, Session
+from action_assistant.web.problems import problem_of
+
+log: Final = logging.getLogger(__name__)
+
+_CALLS: Final = frozenset({"http", "websocket"})
+_SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+_STOPS: Final = re.compile(r"/api/stop|/api/runs/[^/]+/stop")
+_HEADERS: Final = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"x-frame-options", b"DENY"),
+)
+
+
+def cookie_name(page_port: int) -> str:
+    """Cookies ignore ports, so the name carries the page's."""
+    return f"aa_{page_port}"
+
+
+def person_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Person:
+    """Who is asking. Every route behind the door may call this."""
+    person: Person = connection.scope["state"]["person"]
+    return person
+
+
+def session_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None:
+    """The browser's session; None for programs with a token."""
+    session: Session | None = connection.scope["state"].get("session")
+    return session
+
+
+class Access:
+    """An ASGI middleware that lets in who may come in.
+
+    `is_open(path, accepts_html)` says what answers without credentials; `policy(host)` is the
+    Content-Security-Policy for a page asked for under that Host header.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        keys: Keys,
+        addresses: Addresses,
+        page_port: int,
+        is_open: Callable[[str, bool], bool],
+        policy: Callable[[str], str],
+    ) -> None:
+        self._app = app
+        self._keys = keys
+        self._addresses = addresses
+        self._cookie = cookie_name(page_port)
+        self._is_open = is_open
+        self._policy = policy
+        self._local = Person("local", _user_name())
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Refuse, or pass on with `state.person` set."""
+        if scope["type"] not in _CALLS:  # lifespan
+            await self._app(scope, receive, send)
+            return
+        headers = _headers(scope)
+        send = self._dressed(headers, send)
+        try:
+            preflight = self._admit(scope, headers)
+        except Refused as refused:
+            await _refuse(scope, receive, send, refused)
+            return
+        if preflight:
+            await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
+            return
+        await self._app(scope, receive, send)
+
+    def _admit(self, scope: HTTPScope | WebSocketScope, headers: dict[str, str]) -> bool:
+        """Raise a refusal, or return whether this is a preflight that needs no route."""
+        if not self._addresses.allows_host(headers.get("host")):
+            raise WrongHost(f"This server is not called {headers.get('host', '')!r}.")
+        origin = headers.get("origin")
+        if origin is not None and not self._addresses.allows_origin(origin):
+            raise WrongOrigin(f"Pages of {origin!r} may not talk to this server.")
+        method = scope.get("method", "GET") if scope["type"] == ScopeType.HTTP else "WEBSOCKET"
+        if method == "OPTIONS" and "access-control-request-method" in headers:
+            return True
+        self._identify(scope, headers, method=str(method), origin=origin)
+        return False
+
+    def _identify(
+        self,
+        scope: HTTPScope | WebSocketScope,
+        headers: dict[str, str],
+        *,
+        method: str,
+        origin: str | None,
+    ) -> None:
+        state = scope.setdefault("state", {})
+        path = scope["path"]
+        scheme, _, token = headers.get("authorization", "").partition(" ")
+        if scheme.lower() == "bearer" and self._keys.opens(token.strip()):
+            state["person"] = self._local
+            return
+        session = self._session(headers)
+        if session is not None and (not session.expired or _is_stop(method, path)):
+            if origin is None and method not in _SAFE:
+                raise WrongOrigin("A browser says which page is asking; this request does not.")
+            if headers.get("sec-fetch-site") == "cross-site" and path.startswith("/api/"):
+                raise WrongOrigin("Other sites may not use this session.")
+            state["person"] = session.person
+            state["session"] = session
+            return
+        if not self._is_open(path, "text/html" in headers.get("accept", "")):
+            raise Unauthenticated(
+                "Your session has ended: open the link that the server printed."
+                if session is not None
+                else "Open the link that the server printed, or send its token as a Bearer token."
+            )
+
+    def _session(self, headers: dict[str, str]) -> Session | None:
+        try:
+            morsel = SimpleCookie(headers.get("cookie", "")).get(self._cookie)
+        except CookieError:
+            return None
+        return self._keys.session(morsel.value) if morsel else None
+
+    def _dressed(self, headers: dict[str, str], send: Send) -> Send:
+        """Add the headers that every answer carries, also refusals."""
+        extra = list(_HEADERS)
+        origin = headers.get("origin")
+        if origin is not None and self._addresses.allows_origin(origin):
+            extra += [
+                (b"access-control-allow-origin", origin.encode()),
+                (b"access-control-allow-credentials", b"true"),
+                (b"access-control-allow-methods", b"GET, POST, PATCH, PUT, DELETE"),
+                (b"access-control-allow-headers", b"content-type, last-event-id"),
+                (b"access-control-expose-headers", b"location"),
+                (b"access-control-max-age", b"600"),
+                (b"vary", b"origin"),
+            ]
+        policy = self._policy(headers.get("host", "")).encode("latin-1", "replace")
+        extra.append((b"content-security-policy", policy))
+
+        async def dressed(message: Message) -> None:
+            if message["type"] in {"http.response.start", "websocket.http.response.start"}:
+                message["headers"] = [*message.get("headers", []), *extra]
+            await send(message)
+
+        return dressed
+
+
+def _is_stop(method: str, path: str) -> bool:
+    return method == "POST" and _STOPS.fullmatch(path) is not None
+
+
+def _headers(scope: HTTPScope | WebSocketScope) -> dict[str, str]:
+    """Header fields by lower-case name. A repeated Host or Origin is a trick: it matches nothing."""
+    found: dict[str, str] = {}
+    for raw, value in scope["headers"]:
+        name = raw.decode("latin-1").lower()
+        text = value.decode("latin-1")
+        joiner = "; " if name == "cookie" else ", "
+        found[name] = f"{found[name]}{joiner}{text}" if name in found else text
+    return found
+
+
+async def _refuse(
+    scope: HTTPScope | WebSocketScope, receive: Receive, send: Send, refused: Refused
+) -> None:
+    log.info("refused %s: %s", scope["path"], refused.detail)
+    body = problem_of(refused)
+    fields = [(b"content-type", b"application/problem+json")]
+    if refused.status == 401:
+        fields.append((b"www-authenticate", b"Bearer"))
+    if scope["type"] == ScopeType.WEBSOCKET:
+        await receive()  # websocket.connect
+        await _answer(send, refused.status, fields, body, prefix="websocket.")
+    else:
+        await _answer(send, refused.status, fields, body)
+
+
+async def _answer(
+    send: Send, status: int, fields: list[tuple[bytes, bytes]], body: bytes, prefix: str = ""
+) -> None:
+    length = (b"content-length", str(len(body)).encode())
+    start: Any = {
+        "type": f"{prefix}http.response.start",
+        "status": status,
+        "headers": [*fields, length] if status != 204 else fields,
+    }
+    end: Any = {"type": f"{prefix}http.response.body", "body": body, "more_body": False}
+    await send(start)
+    await send(end)
+
+
+def _user_name() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # no such user in this container
+        return "operator"

@@ -1,0 +1,133 @@
+"""How either process becomes an HTTP application: Litestar inside, the door around it."""
+
+import logging
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import AbstractAsyncContextManager
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+from litestar import Litestar, MediaType, Response, get
+from litestar.openapi import OpenAPIConfig
+from litestar.openapi.plugins import JsonRenderPlugin
+from litestar.openapi.spec import Components, SecurityScheme
+from litestar.types import ASGIApp, ControllerRouterHandler, Receive, Scope, Send
+
+from action_assistant.version import VERSION
+from action_assistant.web.access import Access
+from action_assistant.web.addresses import Addresses, host_name
+from action_assistant.web.keys import Keys
+from action_assistant.web.page import Page
+from action_assistant.web.problems import problem_handlers
+
+log: Final = logging.getLogger(__name__)
+
+BODY_LIMIT: Final = 10_000_000  # bytes; a graph file of 10 MB is refused with 413
+_OPEN: Final = frozenset({"/healthz", "/readyz", "/api/session"})
+
+
+class Readiness(msgspec.Struct, frozen=True):
+    """Whether the process can do its work, and what stands in the way."""
+
+    ready: bool
+    problems: tuple[str, ...] = ()
+
+
+Check = Callable[[], Awaitable[Readiness]]
+Measures = Callable[[], dict[str, float]]
+Lifespan = Callable[[Litestar], AbstractAsyncContextManager[None]]
+
+
+def application(
+    route_handlers: Sequence[ControllerRouterHandler],
+    *,
+    title: str,
+    keys: Keys,
+    addresses: Addresses,
+    page_port: int,
+    lifespan: Sequence[Lifespan] = (),
+    ready: Check | None = None,
+    measures: Measures | None = None,
+    page: Path | None = None,
+    runner_port: int | None = None,
+) -> ASGIApp:
+    """The whole application. `page` and `runner_port` are the editor's: it serves the page, whose
+    Content-Security-Policy names the runner."""
+    inner = Litestar(
+        [*route_handlers, *_health(ready, measures)],
+        exception_handlers=problem_handlers(),
+        lifespan=list(lifespan),
+        openapi_config=_openapi(title),
+        request_max_body_size=BODY_LIMIT,
+        logging_config=None,
+    )
+    shown = Page(inner, page) if page is not None else None
+    outer: ASGIApp = Access(
+        shown or inner,
+        keys=keys,
+        addresses=addresses,
+        page_port=page_port,
+        is_open=lambda path, html: (
+            path in _OPEN
+            or path.startswith("/api/invitations/")
+            or (shown is not None and shown.knows(path, html))
+        ),
+        policy=lambda host: _policy(host, page_port, runner_port),
+    )
+    return _Named(outer, inner)
+
+
+class _Named:
+    """The application, with Litestar's own one in reach for those who make its OpenAPI text."""
+
+    def __init__(self, outer: ASGIApp, inner: Litestar) -> None:
+        self._outer = outer
+        self.litestar = inner
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await self._outer(scope, receive, send)
+
+
+def _policy(host: str, page_port: int, runner_port: int | None) -> str:
+    connect = "'self'"
+    name = host_name(host)
+    if runner_port is not None and name:
+        shown = f"[{name}]" if ":" in name else name
+        connect += (
+            f" ws://{shown}:{page_port} http://{shown}:{runner_port} ws://{shown}:{runner_port}"
+        )
+    return (
+        "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+        f"img-src 'self' data: blob:; font-src 'self'; connect-src {connect}; object-src 'none'; "
+        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    )
+
+
+def _openapi(title: str) -> OpenAPIConfig:
+    schemes: dict[str, Any] = {"token": SecurityScheme(type="http", scheme="bearer")}
+    return OpenAPIConfig(
+        title=title,
+        version=VERSION,
+        path="/schema",
+        render_plugins=[JsonRenderPlugin(path="/openapi.json")],
+        components=Components(security_schemes=schemes),
+        security=[{"token": []}],
+    )
+
+
+def _health(ready: Check | None, measures: Measures | None) -> list[ControllerRouterHandler]:
+    @get("/healthz", security=[], summary="Whether the process answers")
+    async def healthz() -> dict[str, str]:
+        return {"status": "ok", "version": VERSION}
+
+    @get("/readyz", security=[], summary="Whether the process can do its work")
+    async def readyz() -> Response[Readiness]:
+        found = await ready() if ready is not None else Readiness(ready=True)
+        return Response(found, status_code=200 if found.ready else 503)
+
+    @get("/metrics", media_type=MediaType.TEXT, summary="Measures, as Prometheus reads them")
+    async def metrics() -> str:
+        values = measures() if measures is not None else {}
+        return "".join(f"{name} {value:g}\n" for name, value in sorted(values.items()))
+
+    return [healthz, readyz, metrics]

@@ -1,0 +1,112 @@
+"""The secret of local mode: a token for programs, and sessions sealed with it for browsers.
+
+A session cookie is `payload.signature`, both base64url; the payload is JSON `[id, person id, name,
+expires]`. Either process can verify it by itself, because both read the same token.
+"""
+
+import base64
+import hashlib
+import hmac
+import os
+import secrets
+import time
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.errors import CannotStart
+
+TOKEN_FILE: Final = "token"
+SESSION_SECONDS: Final = 30 * 24 * 3600
+_MIN_TOKEN: Final = 32  # characters; the tokens made here have 43 (256 bit)
+
+
+class Person(msgspec.Struct, frozen=True):
+    """Somebody who acts. `id` is opaque and stable for a browser; `name` is theirs to choose."""
+
+    id: str
+    name: str
+
+
+class Session(msgspec.Struct, frozen=True):
+    """A browser that once presented the token. `expires` is in seconds since 1970."""
+
+    id: str
+    person: Person
+    expires: float
+
+    @property
+    def expired(self) -> bool:
+        """Whether it opens nothing but Stop any more."""
+        return time.time() >= self.expires
+
+
+class Keys:
+    """Checks tokens and seals sessions."""
+
+    def __init__(self, token: str) -> None:
+        if len(token) < _MIN_TOKEN:
+            raise CannotStart(f"The token must have at least {_MIN_TOKEN} characters.")
+        self.token: Final = token
+        self._seal: Final = hashlib.sha256(b"action-assistant session\0" + token.encode()).digest()
+
+    @classmethod
+    def of(cls, data: Path) -> "Keys":
+        """The keys of a data folder; made when it has none. The environment's token wins."""
+        given = os.environ.get("ACTION_ASSISTANT_TOKEN")
+        return cls(given or _token_in(data))
+
+    def opens(self, token: str) -> bool:
+        """Whether this is the token."""
+        return hmac.compare_digest(token.encode(errors="replace"), self.token.encode())
+
+    def new_session(self, name: str, *, person_id: str | None = None) -> Session:
+        """A fresh session; with `person_id` for somebody who is known already."""
+        person = Person(person_id or secrets.token_urlsafe(9), name)
+        return Session(secrets.token_urlsafe(12), person, time.time() + SESSION_SECONDS)
+
+    def sealed(self, session: Session) -> str:
+        """The cookie's value."""
+        fields = [session.id, session.person.id, session.person.name, session.expires]
+        payload = _text(msgspec.json.encode(fields))
+        return f"{payload}.{_text(self._sign(payload))}"
+
+    def session(self, cookie: str) -> Session | None:
+        """The session behind a cookie, expired or not; None when we did not seal it."""
+        payload, _, signature = cookie.partition(".")
+        if not hmac.compare_digest(_text(self._sign(payload)).encode(), signature.encode()):
+            return None
+        try:
+            raw = base64.urlsafe_b64decode(payload + "=" * (-len(payload) % 4))
+            id_, person, name, expires = msgspec.json.decode(raw, type=tuple[str, str, str, float])
+        except (ValueError, msgspec.DecodeError):
+            return None
+        return Session(id_, Person(person, name), expires)
+
+    def _sign(self, payload: str) -> bytes:
+        return hmac.digest(self._seal, payload.encode(errors="replace"), "sha256")
+
+
+def _text(raw: bytes) -> str:
+    return base64.urlsafe_b64encode(raw).rstrip(b"=").decode()
+
+
+def _token_in(data: Path) -> str:
+    """The token kept in a folder. Two processes may ask at once: the first file to appear wins."""
+    file = data / TOKEN_FILE
+    try:
+        if not file.exists():
+            fresh = data / f".{TOKEN_FILE}-{os.getpid()}"
+            descriptor = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+            with os.fdopen(descriptor, "w") as out:
+                out.write(secrets.token_urlsafe(32) + "\n")
+            try:
+                os.link(fresh, file)
+            except FileExistsError:
+                pass  # the other process was first; its token is read below
+            finally:
+                fresh.unlink()
+        return file.read_text().strip()
+    except OSError as error:
+        raise CannotStart(f"Cannot keep the token in {data}: {error.strerror}.") from error

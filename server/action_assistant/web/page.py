@@ -1,0 +1,97 @@
+"""The built page, served from memory: a few megabytes of files that never change while we run."""
+
+import gzip
+import hashlib
+import mimetypes
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+from litestar.enums import ScopeType
+from litestar.types import ASGIApp, HTTPScope, Receive, Scope, Send
+
+_NOT_PAGES: Final = ("/api/", "/schema", "/healthz", "/readyz", "/metrics")
+_COMPRESSED: Final = frozenset({".html", ".js", ".css", ".svg", ".json", ".webmanifest"})
+_UNBUILT: Final = b"""<!doctype html><meta charset="utf-8"><title>Page not built</title>
+<p>The page has not been built. Run <code>make setup</code> in the folder of the source code.</p>
+"""
+
+
+class File(msgspec.Struct, frozen=True):
+    """One file as it is sent. `zipped` is empty where compression does not pay."""
+
+    body: bytes
+    zipped: bytes
+    media: str
+    etag: str
+    lasting: bool
+
+
+class Page:
+    """An ASGI middleware that answers for the page's own paths and passes on the rest."""
+
+    def __init__(self, app: ASGIApp, folder: Path) -> None:
+        self._app = app
+        self._files = _load(folder)
+        self._index = self._files.get("/index.html") or _file(_UNBUILT, ".html", lasting=False)
+
+    def knows(self, path: str, accepts_html: bool) -> bool:
+        """Whether this path is public: a file of the page, or one of its addresses."""
+        if path in self._files or path == "/":
+            return True
+        return accepts_html and not path.startswith(_NOT_PAGES)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send the file, or the page itself for an address that the page's router knows."""
+        if scope["type"] != ScopeType.HTTP or scope["method"] not in {"GET", "HEAD"}:
+            await self._app(scope, receive, send)
+            return
+        accepts = dict(scope["headers"]).get(b"accept", b"")
+        if not self.knows(scope["path"], b"text/html" in accepts):
+            await self._app(scope, receive, send)
+            return
+        await _send_file(scope, send, self._files.get(scope["path"], self._index))
+
+
+def _load(folder: Path) -> dict[str, File]:
+    if not folder.is_dir():
+        return {}
+    return {
+        f"/{path.relative_to(folder).as_posix()}": _file(
+            path.read_bytes(), path.suffix, lasting="assets" in path.parts
+        )
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def _file(body: bytes, suffix: str, *, lasting: bool) -> File:
+    media = mimetypes.types_map.get(suffix, "application/octet-stream")
+    if suffix in {".html", ".js", ".css"}:
+        media += "; charset=utf-8"
+    zipped = gzip.compress(body, mtime=0) if suffix in _COMPRESSED and len(body) > 1000 else b""
+    etag = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
+    return File(body, zipped, media, etag, lasting)
+
+
+async def _send_file(scope: HTTPScope, send: Send, file: File) -> None:
+    asked = dict(scope["headers"])
+    fields = [
+        (b"etag", file.etag.encode()),
+        (b"cache-control", b"max-age=31536000, immutable" if file.lasting else b"no-cache"),
+        (b"vary", b"accept-encoding"),
+    ]
+    body, status = file.body, 200
+    if asked.get(b"if-none-match") == file.etag.encode():
+        body, status = b"", 304
+    else:
+        fields.append((b"content-type", file.media.encode()))
+        if file.zipped and b"gzip" in asked.get(b"accept-encoding", b""):
+            body = file.zipped
+            fields.append((b"content-encoding", b"gzip"))
+        fields.append((b"content-length", str(len(body)).encode()))
+    start: Any = {"type": "http.response.start", "status": status, "headers": fields}
+    sent = b"" if scope["method"] == "HEAD" else body
+    end: Any = {"type": "http.response.body", "body": sent, "more_body": False}
+    await send(start)
+    await send(end)

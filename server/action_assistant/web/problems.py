@@ -1,0 +1,94 @@
+"""How refusals look on the wire: RFC 9457 problem details, one shape for every route."""
+
+import logging
+from typing import Any, Final
+
+import msgspec
+from litestar import Request, Response
+from litestar.exceptions import HTTPException, ValidationException
+from litestar.types import ExceptionHandlersMap
+
+from action_assistant.errors import Refused
+
+log: Final = logging.getLogger(__name__)
+
+PROBLEM_JSON: Final = "application/problem+json"
+
+
+class ProblemDetails(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What a client is told about a refusal. `type` is stable; `detail` is for people."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    where: dict[str, Any] | None = None
+
+
+def problem_of(refused: Refused) -> bytes:
+    """The body for a refusal."""
+    return msgspec.json.encode(
+        ProblemDetails(refused.type, refused.title, refused.status, refused.detail, refused.where)
+    )
+
+
+def problem_handlers() -> ExceptionHandlersMap:
+    """For `Litestar(exception_handlers=…)`."""
+    return {
+        Refused: _refused,
+        HTTPException: _framework,
+        RecursionError: _too_deep,
+        Exception: _unexpected,
+    }
+
+
+def _response(details: ProblemDetails, headers: dict[str, str] | None = None) -> Response[bytes]:
+    return Response(
+        content=msgspec.json.encode(details),
+        status_code=details.status,
+        media_type=PROBLEM_JSON,
+        headers=headers,
+    )
+
+
+def _refused(_: Request[Any, Any, Any], error: Refused) -> Response[bytes]:
+    return _response(
+        ProblemDetails(error.type, error.title, error.status, error.detail, error.where)
+    )
+
+
+def _framework(_: Request[Any, Any, Any], error: HTTPException) -> Response[bytes]:
+    """What Litestar itself refuses: unknown routes, methods, malformed bodies, over-long ones."""
+    status = error.status_code
+    title = type(error).__doc__ or "Request refused"
+    detail = error.detail if status < 500 else "The server failed; its log says why."
+    where: dict[str, Any] | None = None
+    if isinstance(error, ValidationException) and isinstance(error.extra, list):
+        wrong = [item for item in error.extra if isinstance(item, dict)]
+        detail = "; ".join(
+            f"{item.get('key') or 'body'}: {item.get('message', 'not valid')}" for item in wrong
+        )
+        where = (
+            {"path": "".join(f"/{part}" for part in str(wrong[0].get("key", "")).split("."))}
+            if wrong
+            else None
+        )
+    if status >= 500:
+        log.error("request failed", exc_info=error)
+    name = type(error).__name__.removesuffix("Exception")
+    slug = "".join(f"-{c.lower()}" if c.isupper() else c for c in name).lstrip("-") or "refused"
+    details = ProblemDetails(slug, title.strip().splitlines()[0].rstrip("."), status, detail, where)
+    return _response(details, dict(error.headers or {}))
+
+
+def _too_deep(_: Request[Any, Any, Any], __: RecursionError) -> Response[bytes]:
+    return _response(
+        ProblemDetails("bad-input", "What was sent cannot be read", 400, "Nested too deeply.")
+    )
+
+
+def _unexpected(_: Request[Any, Any, Any], error: Exception) -> Response[bytes]:
+    log.error("request failed", exc_info=error)
+    return _response(
+        ProblemDetails("internal", "The server failed", 500, "The server failed; its log says why.")
+    )
