@@ -1,4 +1,4 @@
-"""The built page, served from memory: a few megabytes of files that never change while we run."""
+"""The built page, served from memory: a few megabytes, read again when somebody builds it anew."""
 
 import gzip
 import hashlib
@@ -32,8 +32,21 @@ class Page:
 
     def __init__(self, app: ASGIApp, folder: Path) -> None:
         self._app = app
-        self._files = _load(folder)
-        self._index = self._files.get("/index.html") or _file(_UNBUILT, ".html", lasting=False)
+        self._folder = folder
+        self._built: float | None = None
+        self._files: dict[str, File] = {}
+        self._index = _file(_UNBUILT, ".html", lasting=False)
+        self._renew()
+
+    def _renew(self) -> None:
+        """Read the files if the page was built since; a build writes its index last."""
+        try:
+            built = (self._folder / "index.html").stat().st_mtime
+        except OSError:
+            return
+        if built != self._built:
+            files = _load(self._folder)
+            self._files, self._index, self._built = files, files["/index.html"], built
 
     def knows(self, path: str, accepts_html: bool) -> bool:
         """Whether this path is public: a file of the page, or one of its addresses."""
@@ -50,12 +63,14 @@ class Page:
         if not self.knows(scope["path"], b"text/html" in accepts):
             await self._app(scope, receive, send)
             return
-        await _send_file(scope, send, self._files.get(scope["path"], self._index))
+        found = self._files.get(scope["path"])
+        if found is None or found is self._index:
+            self._renew()
+            found = self._index
+        await _send_file(scope, send, found)
 
 
 def _load(folder: Path) -> dict[str, File]:
-    if not folder.is_dir():
-        return {}
     return {
         f"/{path.relative_to(folder).as_posix()}": _file(
             path.read_bytes(), path.suffix, lasting="assets" in path.parts

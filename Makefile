@@ -1,0 +1,103 @@
+# What can be done here. `make help` lists it.
+
+.DEFAULT_GOAL := help
+SHELL := /bin/sh
+.SUFFIXES:
+.DELETE_ON_ERROR:
+
+# A sourced ROS 2 environment puts its own packages before ours.
+unexport PYTHONPATH PYTHONHOME
+export PYTHONNOUSERSITE := 1
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+BIN := .venv/bin
+NODE := scripts/with-node
+NPM := $(NODE) npm --prefix frontend
+PAGE_SOURCES := $(shell find frontend/src frontend/public frontend/index.html frontend/vite.config.ts frontend/tsconfig.json -type f 2>/dev/null)
+
+.PHONY: help
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+.PHONY: setup
+setup: .venv/.done frontend/dist/index.html ## everything that running and testing needs
+
+.PHONY: run
+run: setup ## start the editor and the runner, and open the page (ARGS="--port 9000 --no-open")
+	@$(BIN)/action-assistant serve $(ARGS)
+
+.PHONY: dev
+dev: setup ## like run, and rebuild the page on every change
+	@(cd frontend && exec ../$(NODE) node_modules/.bin/vite build --watch --logLevel warn) & page=$$!; \
+		trap "kill $$page" EXIT; $(BIN)/action-assistant serve $(ARGS)
+
+.PHONY: check
+check: .venv/.done frontend/node_modules/.done ## formatting, lint, types and layers, both languages
+	@echo "» ruff, mypy, layers"
+	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+	@echo "» Biome, tsc"
+	@$(NPM) run --silent check
+
+.PHONY: fix
+fix: .venv/.done frontend/node_modules/.done ## mend what the formatters and linters can
+	@$(BIN)/ruff check --fix --quiet . ; $(BIN)/ruff format --quiet .
+	@$(NPM) run --silent fix
+
+.PHONY: test
+test: check unit e2e ## every check and every test, also in a real browser
+
+.PHONY: unit
+unit: setup ## the tests of the server and of the page's pure parts
+	@echo "» pytest"
+	@$(BIN)/pytest -q $(PYTEST)
+	@echo "» vitest"
+	@$(NPM) run --silent test
+
+.PHONY: e2e
+e2e: setup ## tests in Chromium against the real processes
+	@scripts/need chromium=chromium
+	@echo "» Playwright"
+	@$(NPM) run --silent e2e
+
+.PHONY: bench
+bench: setup ## measure speed; prints tables
+	@$(BIN)/python bench/run.py $(ARGS)
+
+.PHONY: migrate
+migrate: .venv/.done ## bring the databases to this version (ARGS="--data DIR")
+	@$(BIN)/action-assistant migrate $(ARGS)
+
+.PHONY: build
+build: setup ## the wheel, with migrations and the built page, in dist/
+	@echo "» wheel"
+	@$(BIN)/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+	@ls dist/*.whl
+
+.PHONY: lock
+lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
+	@$(BIN)/pip install --quiet uv
+	@$(BIN)/uv pip compile --quiet --generate-hashes --universal --python-version 3.11 --no-header \
+		--no-annotate --upgrade pyproject.toml requirements/dev.in --output-file requirements/dev.txt
+
+.venv/.done: requirements/dev.txt pyproject.toml scripts/need
+	@scripts/need python3=python3 || exit 1
+	@python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "Python 3.11 or newer is needed; this is $$(python3 --version)." >&2; exit 1; }
+	@python3 -c 'import ensurepip, venv' 2>/dev/null || scripts/need no-such-command=python3-venv
+	@echo "» Python packages into .venv"
+	@test -x $(BIN)/python || python3 -m venv .venv
+	@$(BIN)/pip install --quiet --require-hashes --requirement requirements/dev.txt
+	@$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+frontend/node_modules/.done: frontend/package-lock.json scripts/with-node
+	@echo "» Node packages into frontend/node_modules"
+	@$(NPM) ci --no-audit --no-fund --loglevel=error
+	@touch $@
+
+frontend/dist/index.html: frontend/node_modules/.done $(PAGE_SOURCES)
+	@echo "» building the page"
+	@$(NPM) run --silent build
+	@touch $@

@@ -1,0 +1,221 @@
+"""Commands on files, which need no server: check, convert, simulate."""
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.errors import CannotStart
+from action_assistant.umrf import check as checks
+from action_assistant.umrf import codec, semantics
+from action_assistant.umrf.facts import PINNED, SIMULATED, facts_for
+from action_assistant.umrf.model import Graph, Problem, Where
+
+_DAY: Final = 24 * 3600.0  # seconds
+_EVENTS: Final = 100_000
+_COMMANDS: Final = frozenset({"stop", "pause", "resume"})
+
+
+class Verdict(msgspec.Struct, frozen=True):
+    """What `check` found in one file."""
+
+    file: str
+    dialect: str | None
+    problems: tuple[Problem, ...]
+
+
+def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the commands of this module."""
+    check = commands.add_parser(
+        "check",
+        help="say what is wrong with UMRF files; exit 1 if any has an error",
+        epilog="example: action-assistant check patrol.umrf.graph.json",
+    )
+    check.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    check.add_argument("--json", action="store_true", help="as JSON, for programs")
+    check.add_argument("--facts", metavar="COMMIT", help="of the engine the graph is meant for")
+    check.set_defaults(deed=_check)
+
+    convert = commands.add_parser(
+        "convert",
+        help="print a file of any dialect as canonical UMRF",
+        epilog="example: action-assistant convert old.umrfg.json > new.umrf.graph.json",
+    )
+    convert.add_argument("file", type=Path, metavar="FILE")
+    convert.add_argument(
+        "--through-document",
+        action="store_true",
+        help="by way of the shared document, as if it had been imported and exported",
+    )
+    convert.set_defaults(deed=_convert)
+
+    simulate = commands.add_parser(
+        "simulate",
+        help="run a file in the simulator, without a server or a robot",
+        epilog="example: action-assistant simulate patrol.umrf.graph.json --at 1500:stop --trace",
+    )
+    simulate.add_argument("file", type=Path, metavar="FILE")
+    simulate.add_argument("--script", type=Path, metavar="S.json", help="what the actions do")
+    simulate.add_argument("--graphs", type=Path, metavar="DIR", help="of sub-graphs")
+    simulate.add_argument(
+        "--at",
+        action="append",
+        default=[],
+        type=_command,
+        metavar="MS:stop|pause|resume[:GRAPH]",
+        help="a command at a time; may be given several times",
+    )
+    simulate.add_argument(
+        "--for", type=float, default=_DAY, dest="seconds", metavar="SECONDS", help="default: a day"
+    )
+    simulate.add_argument("--trace", action="store_true", help="as JSON lines, for programs")
+    simulate.set_defaults(deed=_simulate)
+
+
+def _command(text: str) -> tuple[float, str, str | None]:
+    moment, _, rest = text.partition(":")
+    deed, _, graph = rest.partition(":")
+    if deed not in _COMMANDS:
+        raise ValueError
+    return float(moment), deed, graph or None
+
+
+def _text(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise CannotStart(f"Cannot read {path}: {error.strerror}.") from error
+
+
+def _refusal(path: Path, error: codec.Unreadable) -> str:
+    place = f":{error.line}:{error.column}" if error.line is not None else ""
+    within = f" at {error.path}" if error.path else ""
+    return f"{path}{place}: {error.message}{within}"
+
+
+def _check(options: argparse.Namespace) -> int:
+    facts = facts_for(options.facts) if options.facts else PINNED
+    verdicts = [_verdict(path, facts) for path in options.files]
+    if options.json:
+        sys.stdout.buffer.write(msgspec.json.format(msgspec.json.encode(verdicts)) + b"\n")
+    else:
+        for verdict in verdicts:
+            _print(verdict)
+    bad = any(problem.severity == "error" for v in verdicts for problem in v.problems)
+    return 1 if bad else 0
+
+
+def _verdict(path: Path, facts: "checks.EngineFacts") -> Verdict:
+    try:
+        reading = codec.read(_text(path))
+    except codec.Unreadable as error:
+        problem = Problem(
+            code=error.code, severity="error", where=Where(path=error.path), message=error.message
+        )
+        return Verdict(str(path), None, (problem,))
+    found = [*reading.problems, *checks.check(reading.graph, None, facts)]
+    return Verdict(str(path), reading.dialect, tuple(dict.fromkeys(found)))
+
+
+def _print(verdict: Verdict) -> None:
+    errors = sum(problem.severity == "error" for problem in verdict.problems)
+    warnings = len(verdict.problems) - errors
+    print(
+        f"{verdict.file}: {verdict.dialect or 'unreadable'}, {errors} errors, {warnings} warnings"
+    )
+    for problem in verdict.problems:
+        place = f" ({problem.where.path})" if problem.where.path else ""
+        print(f"  {problem.severity} {problem.code}: {problem.message}{place}")
+
+
+def _convert(options: argparse.Namespace) -> int:
+    try:
+        reading = codec.read(_text(options.file))
+    except codec.Unreadable as error:
+        print(_refusal(options.file, error), file=sys.stderr)
+        return 1
+    graph = _through_document(reading.graph) if options.through_document else reading.graph
+    for note in reading.notes:
+        print(f"{options.file}: {note}", file=sys.stderr)
+    sys.stdout.write(codec.write(graph))
+    return 0
+
+
+def _through_document(graph: Graph) -> Graph:
+    from pycrdt import Doc
+
+    from action_assistant.editor import document
+
+    first: Doc[object] = Doc()
+    document.fill(first, graph)
+    second: Doc[object] = Doc()
+    second.apply_update(first.get_update())
+    return document.read(second)
+
+
+def _simulate(options: argparse.Namespace) -> int:
+    try:
+        reading = codec.read(_text(options.file))
+        script = _script(options.script) if options.script else semantics.Script({})
+        trace = semantics.simulate(
+            reading.graph,
+            script=script,
+            library=_library(options.graphs),
+            facts=SIMULATED,
+            commands=options.at,
+            until_ms=options.seconds * 1000,
+            max_events=_EVENTS,
+            states=reading.states,
+        )
+        for event in trace:
+            _report(event, as_json=options.trace)
+    except codec.Unreadable as error:
+        print(_refusal(options.file, error), file=sys.stderr)
+        return 1
+    except semantics.EngineRefused as error:
+        print(f"{options.file}: the engine refuses it: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _script(path: Path) -> semantics.Script:
+    try:
+        return semantics.script_from(json.loads(_text(path)))
+    except ValueError as error:
+        raise CannotStart(f"{path} is no script: {error}.") from error
+
+
+def _library(folder: Path | None) -> Mapping[str, Graph]:
+    """The graphs of a folder by name; the engine indexes `*graph.json`."""
+    found: dict[str, Graph] = {}
+    for path in sorted(folder.rglob("*graph.json")) if folder else ():
+        try:
+            graph = codec.read(_text(path)).graph
+        except codec.Unreadable as error:
+            print(f"left out {_refusal(path, error)}", file=sys.stderr)
+            continue
+        found.setdefault(graph.name, graph)
+    return found
+
+
+def _report(event: semantics.Trace, *, as_json: bool) -> None:
+    if isinstance(event, semantics.NodeResult):
+        return  # what an action answered is ours to know; the engine sends no such thing
+    if as_json:
+        print(msgspec.json.encode(event).decode())
+        return
+    match event:
+        case semantics.NodeState(t_ms=at, graph=graph, node=node, state=state):
+            print(f"{at / 1000:10.3f} s  {graph}  {node}: {state}")
+        case semantics.GraphState(t_ms=at, graph=graph, state=state):
+            print(f"{at / 1000:10.3f} s  {graph}: {state}")
+        case semantics.GraphResult(t_ms=at, graph=graph, value=value):
+            print(f"{at / 1000:10.3f} s  {graph} ends with {value}")
+        case semantics.Hazard(t_ms=at, graph=graph, code=code):
+            print(f"{at / 1000:10.3f} s  {graph}: hazard {code}")
+        case _:
+            pass

@@ -1,0 +1,185 @@
+"""Both processes under one command: started together, restarted when they die, ended together."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+import webbrowser
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.web.keys import Keys
+from action_assistant.web.listen import bound
+
+_PATIENCE: Final = 30.0  # seconds until a start that does not answer is called failed
+_STEADY: Final = 30.0  # seconds after which a process counts as healthy again
+_BACK_OFF: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # seconds before the n-th restart in a row
+_TICK: Final = 0.1
+_ENDING: Final = 8.0  # seconds that a process gets to end by itself
+
+
+class Plan(msgspec.Struct, frozen=True, kw_only=True):
+    """What to serve, and where. The runner listens on the port after the editor's."""
+
+    data: Path
+    database: str | None
+    host: str
+    port: int
+    opens: bool
+
+
+class Child:
+    """One of the two processes, as often as it takes."""
+
+    def __init__(self, name: str, arguments: list[str], port: int) -> None:
+        self.name = name
+        self.port = port
+        self._arguments = arguments
+        self._process: subprocess.Popen[bytes] | None = None
+        self._deaths = 0
+        self._born = 0.0
+        self._again = 0.0  # when to start, by the monotonic clock
+
+    def start(self, parent: int) -> None:
+        """Start it. `parent` is the reading end of a pipe that closes when we die."""
+        environment = {**os.environ, "_ACTION_ASSISTANT_PARENT": str(parent)}
+        self._born = time.monotonic()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "action_assistant", *self._arguments],
+            env=environment,
+            pass_fds=[parent],
+            stdin=subprocess.DEVNULL,
+        )
+
+    def tend(self, parent: int) -> int | None:
+        """Notice a death and start again after a while; the exit code if starting is hopeless."""
+        now = time.monotonic()
+        if self._process is None:
+            if now >= self._again:
+                self.start(parent)
+            return None
+        code = self._process.poll()
+        if code is None:
+            return None
+        self._process = None
+        if code == 2:  # it said itself that it cannot start
+            return code
+        self._deaths = 1 if now - self._born > _STEADY else self._deaths + 1
+        wait = _BACK_OFF[min(self._deaths, len(_BACK_OFF)) - 1]
+        self._again = now + wait
+        _say(f"{self.name} died ({_cause(code)}); starting it again in {wait:g} s")
+        return None
+
+    def end(self) -> None:
+        """Ask it to end, and see that it does."""
+        if self._process is None:
+            return
+        self._process.terminate()
+        try:
+            self._process.wait(_ENDING)
+        except subprocess.TimeoutExpired:
+            _say(f"{self.name} does not end; killing it")
+            self._process.kill()
+            self._process.wait()
+        self._process = None
+
+
+def serve(plan: Plan) -> int:
+    """Run until told to end; the exit code. Raises CannotStart when a port is taken."""
+    for port in (plan.port, plan.port + 1):
+        for probe in bound(plan.host, port):
+            probe.close()
+    keys = Keys.of(plan.data)
+    enough = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: enough.set())
+    # The writing end is never written to: it closes when this process dies, however it dies.
+    reading, _writing = os.pipe()
+    children = _children(plan)
+    _say("starting …")
+    for child in children:
+        child.start(reading)
+    threading.Thread(
+        target=_greet, args=(plan, keys, children, enough), name="greet", daemon=True
+    ).start()
+    try:
+        while not enough.wait(_TICK):
+            for child in children:
+                code = child.tend(reading)
+                if code is not None:
+                    return code
+        return 0
+    finally:
+        _say("ending …")
+        for child in children:
+            child.end()
+
+
+def _children(plan: Plan) -> list[Child]:
+    """The runner last: it is the last to end."""
+    address = ["--data", str(plan.data), "--host", plan.host]
+    database = ["--database", plan.database] if plan.database else []
+    ports = str(plan.port), str(plan.port + 1)
+    return [
+        Child(
+            "editor",
+            ["editor", *address, "--port", ports[0], "--runner-port", ports[1], *database],
+            plan.port,
+        ),
+        Child(
+            "runner",
+            ["runner", *address, "--port", ports[1], "--page-port", ports[0]],
+            plan.port + 1,
+        ),
+    ]
+
+
+def _greet(plan: Plan, keys: Keys, children: list[Child], enough: threading.Event) -> None:
+    """Say where the page is once both processes answer, and open it."""
+    host = "127.0.0.1" if plan.host in {"0.0.0.0", "localhost"} else plan.host
+    shown = f"[{host}]" if ":" in host else host
+    deadline = time.monotonic() + _PATIENCE
+    for child in children:
+        while not _answers(f"http://{shown}:{child.port}/healthz"):
+            if enough.wait(_TICK):
+                return
+            if time.monotonic() > deadline:
+                _say(f"{child.name} does not answer yet; the messages above may say why")
+                deadline = float("inf")
+    url = f"http://{shown}:{plan.port}/#t={keys.token}"
+    _say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {url}\n")
+    if plan.opens and _has_screen():
+        # Through a file that only this user can read: arguments of a browser are visible to all.
+        redirect = plan.data / "open.html"
+        redirect.touch(mode=0o600)
+        redirect.write_text(f'<!doctype html><meta http-equiv="refresh" content="0;url={url}">')
+        webbrowser.open(redirect.as_uri())
+
+
+def _answers(url: str) -> bool:
+    try:
+        with urllib.request.urlopen(url, timeout=1) as answer:
+            return bool(answer.status == 200)
+    except (urllib.error.URLError, OSError):
+        return False
+
+
+def _has_screen() -> bool:
+    if sys.platform in {"darwin", "win32"}:
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _cause(code: int) -> str:
+    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"action-assistant: {text}\n")
+    sys.stderr.flush()
