@@ -45,7 +45,7 @@ class Addresses:
         except ValueError:
             return False
         name = (parts.hostname or "").lower()
-        if parts.username is not None or parts.path or parts.query or parts.fragment:
+        if origin != f"{parts.scheme}://{parts.netloc}" or "@" in parts.netloc:
             return False
         if name in self._named:
             return parts.scheme in {"http", "https"}

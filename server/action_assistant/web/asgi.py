@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
-from litestar import Litestar, MediaType, Response, get
+from litestar import Litestar, MediaType, Request, Response, get
 from litestar.openapi import OpenAPIConfig
 from litestar.openapi.plugins import JsonRenderPlugin
 from litestar.openapi.spec import Components, SecurityScheme
@@ -103,24 +103,36 @@ def _policy(host: str, page_port: int, runner_port: int | None) -> str:
     )
 
 
+class _OpenApiText(JsonRenderPlugin):
+    """OpenAPI as JSON. Litestar leaves out an empty `security`, which is how a route says that it
+    is open to strangers."""
+
+    def render(self, request: Request[Any, Any, Any], openapi_schema: dict[str, Any]) -> bytes:
+        """The text of the schema."""
+        for path, item in openapi_schema["paths"].items():
+            for operation in item.values() if path in _OPEN else ():
+                operation["security"] = []
+        return msgspec.json.encode(openapi_schema)
+
+
 def _openapi(title: str) -> OpenAPIConfig:
     schemes: dict[str, Any] = {"token": SecurityScheme(type="http", scheme="bearer")}
     return OpenAPIConfig(
         title=title,
         version=VERSION,
         path="/schema",
-        render_plugins=[JsonRenderPlugin(path="/openapi.json")],
+        render_plugins=[_OpenApiText(path="/openapi.json")],
         components=Components(security_schemes=schemes),
         security=[{"token": []}],
     )
 
 
 def _health(ready: Check | None, measures: Measures | None) -> list[ControllerRouterHandler]:
-    @get("/healthz", security=[], summary="Whether the process answers")
+    @get("/healthz", summary="Whether the process answers")
     async def healthz() -> dict[str, str]:
         return {"status": "ok", "version": VERSION}
 
-    @get("/readyz", security=[], summary="Whether the process can do its work")
+    @get("/readyz", summary="Whether the process can do its work")
     async def readyz() -> Response[Readiness]:
         found = await ready() if ready is not None else Readiness(ready=True)
         return Response(found, status_code=200 if found.ready else 503)

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Final
 import msgspec
 from litestar import Request, Response, delete, get, post
 from litestar.datastructures import Cookie
+from litestar.params import JSONBody
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import Unauthenticated
@@ -48,8 +49,10 @@ def session_routes(keys: Keys, page_port: int) -> list[ControllerRouterHandler]:
         session = _live(request)
         return SignedIn(session.person, bool(session.person.name))
 
-    @post("/api/session", security=[], status_code=200, summary="Sign in, or change one's name")
-    async def sign_in(data: SignIn, request: Request[Any, Any, Any]) -> Response[SignedIn]:
+    @post("/api/session", status_code=200, summary="Sign in, or change one's name")
+    async def sign_in(
+        data: JSONBody[SignIn], request: Request[Any, Any, Any]
+    ) -> Response[SignedIn]:
         name = " ".join((data.name or "").split())
         if data.token is not None:
             if not keys.opens(data.token):

@@ -1,0 +1,33 @@
+"""What every test may ask for."""
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+# Machines are slow at times; a test that is too slow is found by its time limit, not by chance.
+settings.register_profile("default", deadline=None)
+settings.load_profile("default")
+
+
+@pytest.fixture(scope="session")
+def anyio_backend() -> str:
+    """The servers run on asyncio; so do the tests."""
+    return "asyncio"
+
+
+@pytest.fixture(autouse=True)
+def no_settings_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Settings of whoever runs the tests must not change what they test."""
+    for name in [name for name in os.environ if name.startswith("ACTION_ASSISTANT_")]:
+        monkeypatch.delenv(name)
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """Recordings and real files that are too large for the repository."""
+    folder = Path(os.environ.get("UMRF_SHARED", Path(__file__).parents[2] / "shared"))
+    if not (folder / "umrf").is_dir():
+        pytest.skip(f"no recordings in {folder}; name their folder in UMRF_SHARED")
+    return folder
