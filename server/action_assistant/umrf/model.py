@@ -145,3 +145,14 @@ class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     where: Where
     message: str
     fix: str | None = None
+
+
+class Signature(msgspec.Struct, frozen=True, kw_only=True):
+    """What a library says of one action. Keys are flat parameter names (`pose::x`), values types.
+
+    `optional`: inputs that the action can do without.
+    """
+
+    inputs: dict[str, str] = {}
+    outputs: dict[str, str] = {}
+    optional: frozenset[str] = frozenset()

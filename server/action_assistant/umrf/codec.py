@@ -1,0 +1,56 @@
+"""UMRF files: every dialect read into one graph, canonical D3 written (DESIGN 5)."""
+
+import msgspec
+
+from action_assistant.umrf.dialects import dialect_of, translated
+from action_assistant.umrf.jsontext import Unreadable, parse
+from action_assistant.umrf.model import Graph, Key, Problem
+from action_assistant.umrf.reading import read_tree
+from action_assistant.umrf.writing import Stamp, write
+
+__all__ = ["Reading", "Stamp", "Unreadable", "read", "stamp_of", "write"]
+
+
+class Reading(msgspec.Struct, frozen=True):
+    """A graph, and what is to be said about the text it came from.
+
+    `notes`: what was translated or has no place in D3. `problems`: what is wrong in the text as it
+    stands and cannot be seen in the graph any more; `check` finds the rest. `states`, `graph_state`:
+    run states that the text carries (other than UNINITIALIZED).
+    """
+
+    graph: Graph
+    dialect: str
+    notes: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
+    states: dict[Key, str] = {}
+    graph_state: str | None = None
+
+
+def read(text: str | bytes) -> Reading:
+    """Reads a graph. Raises `Unreadable` for what is no UMRF or beyond the limits; everything else
+    is read, and reported where it is wrong."""
+    value = parse(text)
+    if not isinstance(value, dict):
+        raise Unreadable("not-umrf", "This is JSON, but no UMRF graph: the text is no object.")
+    dialect = dialect_of(value)
+    if dialect is None:
+        raise Unreadable(
+            "not-umrf", "This is JSON, but no UMRF graph: it has neither a graph_name nor actions."
+        )
+    file, notes, problems = translated(value, dialect)
+    tree = read_tree(file)
+    return Reading(
+        tree.graph, dialect, notes, (*problems, *tree.problems), tree.states, tree.graph_state
+    )
+
+
+def stamp_of(text: str | bytes) -> Stamp:
+    """The stamp that a file carries; empty where there is none. Raises `Unreadable`."""
+    value = parse(text)
+    attributes = value.get("gui_attributes") if isinstance(value, dict) else None
+    ours = attributes.get("action_assistant") if isinstance(attributes, dict) else None
+    if not isinstance(ours, dict):
+        return Stamp()
+    named = {key: ours.get(key) for key in ("graph", "version", "run")}
+    return Stamp(**{key: text for key, text in named.items() if isinstance(text, str)})

@@ -1,0 +1,34 @@
+"""The digest of a graph: what it means, whatever its layout, spelling of numbers and run state."""
+
+import hashlib
+from typing import Any
+
+import rfc8785
+
+from action_assistant.umrf.jsontext import Json, Number
+from action_assistant.umrf.model import Graph
+from action_assistant.umrf.writing import tree_of
+
+
+def digest(graph: Graph) -> str:
+    """Lower-case hex SHA-256 of the canonical graph (RFC 8785) without `gui_attributes`."""
+    tree = tree_of(graph)
+    tree.pop("gui_attributes", None)
+    actions = tree["actions"]
+    for action in actions if isinstance(actions, list) else []:
+        if isinstance(action, dict):
+            action.pop("gui_attributes", None)
+    return hashlib.sha256(rfc8785.dumps(_plain(tree))).hexdigest()
+
+
+def _plain(value: Json) -> Any:
+    """Numbers as the doubles that the engine reads."""
+    match value:
+        case dict():
+            return {key: _plain(member) for key, member in value.items()}
+        case list():
+            return [_plain(member) for member in value]
+        case Number():
+            return value.value
+        case _:
+            return value

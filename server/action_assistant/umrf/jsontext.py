@@ -1,0 +1,275 @@
+"""JSON text within bounds, with the spelling of its numbers.
+
+Python's own scanner does the reading; what it lacks is checked before (size, nesting, number of
+values) or through its hooks (double keys, NaN, spelling), so that no input costs more than its size.
+"""
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from json.encoder import encode_basestring as quote
+from typing import Any, Final, NoReturn, TypeAlias
+
+import msgspec
+
+MAX_BYTES: Final = 10 * 1024 * 1024
+MAX_DEPTH: Final = 64
+MAX_VALUES: Final = 1_000_000
+#: Longest spelling of a number; a double needs 25.
+MAX_NUMBER: Final = 1_000
+
+_STRING: Final = re.compile(r'"(?:[^"\\]|\\.)*+(?:"|\\?\Z)', re.DOTALL)
+_NOT_STRUCTURE: Final = re.compile(r"[^\[\]{},]+")
+_SURROGATE: Final = re.compile(r"[\ud800-\udfff]|\\u[dD][89a-fA-F]")
+
+
+class Unreadable(Exception):
+    """The text is no JSON, no UMRF, or beyond the limits.
+
+    `path` is a JSON pointer, empty if unknown; `line` and `column` count from 1.
+    """
+
+    def __init__(
+        self,
+        code: str,
+        message: str,
+        *,
+        path: str = "",
+        line: int | None = None,
+        column: int | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.code = code
+        self.message = message
+        self.path = path
+        self.line = line
+        self.column = column
+
+
+class Number(msgspec.Struct, frozen=True):
+    """A number as it is spelled."""
+
+    text: str
+
+    @property
+    def value(self) -> float:
+        """The double that the engine reads."""
+        return float(self.text)
+
+
+Json: TypeAlias = "dict[str, Json] | list[Json] | str | bool | Number | None"
+
+
+class _Doubled(dict[str, Any]):
+    """An object that names a key twice."""
+
+    key: str = ""
+
+
+def parse(text: str | bytes) -> Json:
+    """The value of a JSON text. Raises `Unreadable`."""
+    text = _decoded(text)
+    _bound(text)
+    hooks = _Hooks()
+    try:
+        value: Json = json.loads(
+            text,
+            object_pairs_hook=hooks.pairs,
+            parse_int=hooks.number,
+            parse_float=hooks.number,
+            parse_constant=_no_constant,
+        )
+    except json.JSONDecodeError as e:
+        message = f"This is not JSON: {e.msg} at line {e.lineno}, column {e.colno}."
+        raise Unreadable("not-json", message, line=e.lineno, column=e.colno) from None
+    if hooks.doubled:
+        _report_doubled(value)
+    if _SURROGATE.search(text):
+        _report_surrogate(value)
+    return value
+
+
+def parse_small(text: str) -> Json:
+    """The value of a text that a person or program put into a field; a text that is no JSON
+    stands for itself. Never raises."""
+    try:
+        return parse(text)
+    except Unreadable:
+        return text.encode(errors="replace").decode()
+
+
+def dump(value: Json) -> str:
+    """Compact JSON text; what `parse` reads gives the same value."""
+    out: list[str] = []
+    _compact(value, out)
+    return "".join(out)
+
+
+def dump_indented(value: Json) -> str:
+    """JSON text with two blanks per level."""
+    out: list[str] = []
+    _indented(value, "\n", out)
+    return "".join(out)
+
+
+def pointer(*keys: str | int) -> str:
+    """The JSON pointer (RFC 6901) that leads through these keys."""
+    return "".join("/" + str(key).replace("~", "~0").replace("/", "~1") for key in keys)
+
+
+def number(value: float) -> Number:
+    """A number in its shortest spelling, whole numbers without a point."""
+    return Number(str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value))
+
+
+class _Hooks:
+    """What the scanner calls for every object and number."""
+
+    def __init__(self) -> None:
+        self.doubled = False
+
+    def pairs(self, pairs: list[tuple[str, Json]]) -> dict[str, Json]:
+        members = dict(pairs)
+        if len(members) == len(pairs):
+            return members
+        seen: set[str] = set()
+        found = _Doubled(members)
+        for key, _ in pairs:
+            if key in seen:
+                found.key = key
+                break
+            seen.add(key)
+        self.doubled = True
+        return found
+
+    def number(self, text: str) -> Number:
+        if len(text) > MAX_NUMBER or math.isinf(float(text)):
+            raise Unreadable(
+                "number-too-big", f"The number {text[:30]}… is too big for the engine to read."
+            )
+        return Number(text)
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise Unreadable("not-json", f"This is not JSON: it contains {name}, which JSON does not know.")
+
+
+def _decoded(text: str | bytes) -> str:
+    if len(text) > MAX_BYTES:
+        raise Unreadable("too-large", "The text is larger than 10 MB.")
+    if isinstance(text, str):
+        return text.removeprefix("\ufeff")
+    try:
+        return text.decode().removeprefix("\ufeff")
+    except UnicodeDecodeError as e:
+        line = text[: e.start].count(b"\n") + 1
+        message = f"The text is not UTF-8 (byte {e.start}, line {line})."
+        raise Unreadable("not-utf-8", message, line=line) from None
+
+
+def _bound(text: str) -> None:
+    """Refuses what is nested too deeply or has too many values, before anything is built."""
+    structure = _NOT_STRUCTURE.sub("", _STRING.sub("", text))
+    if len(structure) > MAX_VALUES:
+        raise Unreadable("too-large", f"The text has more than {MAX_VALUES:,} values.")
+    depth = 0
+    for sign in structure.replace(",", ""):
+        if sign in "[{":
+            depth += 1
+            if depth > MAX_DEPTH:
+                raise Unreadable(
+                    "too-deep", f"The text is nested more than {MAX_DEPTH} levels deep."
+                )
+        else:
+            depth -= 1
+
+
+def _walk(value: Json, path: str = "") -> Iterator[tuple[str, Json]]:
+    """Every value with its pointer, the outer ones first."""
+    yield path, value
+    match value:
+        case dict():
+            for key, member in value.items():
+                yield from _walk(member, path + pointer(key))
+        case list():
+            for index, member in enumerate(value):
+                yield from _walk(member, path + pointer(index))
+        case _:
+            pass
+
+
+def _report_doubled(value: Json) -> NoReturn:
+    for path, found in _walk(value):
+        if isinstance(found, _Doubled):
+            place = path + pointer(found.key)
+            raise Unreadable("double-key", f"The key “{found.key}” stands twice.", path=place)
+    # what a doubled key hides is not in the value any more
+    raise Unreadable("double-key", "A key stands twice in one object.")
+
+
+def _report_surrogate(value: Json) -> None:
+    for path, found in _walk(value):
+        texts = (
+            list(found) if isinstance(found, dict) else [found] if isinstance(found, str) else []
+        )
+        for text in texts:
+            if any("\ud800" <= c <= "\udfff" for c in text):
+                raise Unreadable(
+                    "lone-surrogate", "A text contains half of a character pair.", path=path
+                )
+
+
+def _compact(value: Json, out: list[str]) -> None:
+    match value:
+        case dict():
+            start = "{"
+            for key, member in value.items():
+                out.append(f"{start}{quote(key)}:")
+                _compact(member, out)
+                start = ","
+            out.append("}" if value else "{}")
+        case list():
+            start = "["
+            for member in value:
+                out.append(start)
+                _compact(member, out)
+                start = ","
+            out.append("]" if value else "[]")
+        case _:
+            out.append(_scalar(value))
+
+
+def _indented(value: Json, newline: str, out: list[str]) -> None:
+    inner = newline + "  "
+    match value:
+        case dict() if value:
+            start = "{"
+            for key, member in value.items():
+                out.append(f"{start}{inner}{quote(key)}: ")
+                _indented(member, inner, out)
+                start = ","
+            out.append(newline + "}")
+        case list() if value:
+            start = "["
+            for member in value:
+                out.append(start + inner)
+                _indented(member, inner, out)
+                start = ","
+            out.append(newline + "]")
+        case _:
+            _compact(value, out)
+
+
+def _scalar(value: str | bool | Number | None) -> str:
+    match value:
+        case str():
+            return quote(value)
+        case True:
+            return "true"
+        case False:
+            return "false"
+        case None:
+            return "null"
+        case Number():
+            return value.text

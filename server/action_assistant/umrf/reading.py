@@ -1,0 +1,430 @@
+"""Graphs from the nested values of a D3 file, losing nothing (DESIGN 4, 5)."""
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from itertools import chain
+from typing import Final, TypeAlias
+
+import msgspec
+
+from action_assistant.umrf.jsontext import Json, Number, dump, pointer
+from action_assistant.umrf.model import (
+    ENGINE_DEFAULTS,
+    ENTRY,
+    ENTRY_CONDITIONS,
+    EXIT,
+    Action,
+    Conditions,
+    Graph,
+    Key,
+    Parameter,
+    Position,
+    Problem,
+    Relation,
+    Remap,
+    Where,
+)
+from action_assistant.umrf.parameters import flatten
+from action_assistant.umrf.relations import conditions_of, remap_of, whole_of
+
+AID: Final = re.compile(r"[A-Za-z0-9]{12}")
+NODE_STATES: Final = {
+    "UNINITIALIZED", "INITIALIZED", "RUNNING", "PAUSE_REQUESTED", "PAUSED", "STOPPING", "FINISHED",
+    "BYPASSED", "ERROR",
+}  # fmt: skip
+GRAPH_STATES: Final = {
+    "UNINITIALIZED", "INITIALIZED", "RUNNING", "PAUSED", "STOPPING", "STOPPED", "FINISHED", "ERROR",
+    "HALTED", "CLEARING",
+}  # fmt: skip
+_GRAPH_FIELDS: Final = {
+    "graph_name", "graph_description", "graph_state", "graph_entry", "graph_exit", "actions",
+    "gui_attributes",
+}  # fmt: skip
+_ACTION_FIELDS: Final = {
+    "name", "instance_id", "type", "actor", "description", "state", "runtime", "input_parameters",
+    "output_parameters", "parents", "children", "gui_attributes",
+}  # fmt: skip
+
+_ZERO: Final = Number("0")
+
+Extra: TypeAlias = list[tuple[str, str]]
+_Kind: TypeAlias = "Callable[[int, dict[str, Json], Extra], _Side]"
+_Name: TypeAlias = tuple[str, int]
+
+
+class Tree(msgspec.Struct, frozen=True):
+    """What `read_tree` found."""
+
+    graph: Graph
+    problems: tuple[Problem, ...]
+    states: dict[Key, str]
+    graph_state: str | None
+
+
+def read_tree(file: dict[str, Json]) -> Tree:
+    """The graph of a D3 file. Never fails: what does not fit is kept in `extra` or reported."""
+    return _Reader().read(file)
+
+
+class _Side(msgspec.Struct):
+    """One item of an action's `parents` or `children`, or of an end of the graph."""
+
+    order: float
+    conditions: Conditions = ENGINE_DEFAULTS
+    required: bool = True
+    remap: tuple[Remap, ...] = ()
+    extra: tuple[tuple[str, str], ...] = ()
+
+
+class _Item(msgspec.Struct):
+    """A place in a relations array that names another action."""
+
+    owner: int
+    name: str
+    instance_id: int
+    side: _Side
+
+
+class _Reader:
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
+        self.states: dict[Key, str] = {}
+        self.actions: list[Action] = []
+        self.by_name: dict[_Name, list[int]] = {}
+        self.listed: list[list[_Item]] = []
+        self.listing: list[list[_Item]] = []
+
+    def report(self, code: str, path: str, message: str) -> None:
+        where = Where(path=path)
+        self.problems.append(Problem(code=code, severity="error", where=where, message=message))
+
+    # The graph
+
+    def read(self, file: dict[str, Json]) -> Tree:
+        extra: Extra = []
+        if "graph_name" not in file:
+            self.report("graph-name-missing", "", "The graph has no name; the engine refuses it.")
+        name = _text(file, "graph_name", extra)
+        description = _text(file, "graph_description", extra)
+        ours, rest = _graph_attributes(file)
+        if rest is not None:
+            extra.append(("gui_attributes", rest))
+        notes = ours.get("notes")
+        self._read_actions(file, extra)
+        entries = self._end(file, "graph_entry", extra, self._child)
+        exits = self._end(file, "graph_exit", extra, self._parent)
+        extra.extend((key, dump(value)) for key, value in file.items() if key not in _GRAPH_FIELDS)
+        graph_state = self._state(file, "graph_state", "")
+        relations = self._relations(entries, exits)
+        graph = Graph(
+            name=name,
+            description=description,
+            actions=tuple(self.actions),
+            relations=tuple(relations),
+            entry_position=_position(ours.get("entry")),
+            exit_position=_position(ours.get("exit")),
+            notes=tuple((k, dump(v)) for k, v in notes.items()) if isinstance(notes, dict) else (),
+            extra=tuple(extra),
+        )
+        return Tree(graph, tuple(self.problems), self.states, graph_state)
+
+    def _state(self, item: dict[str, Json], field: str, path: str) -> str | None:
+        """A run state that says something, or None; a wrong one makes the engine refuse the file."""
+        if field not in item:
+            return None
+        value = item[field]
+        known = NODE_STATES if field == "state" else GRAPH_STATES
+        if not isinstance(value, str) or value not in known:
+            message = f"{dump(value)} is not a state that the engine knows; it refuses the file."
+            self.report("state-illegal", f"{path}/{field}", message)
+            return None
+        return None if value == "UNINITIALIZED" else value
+
+    def _end(self, file: dict[str, Json], field: str, extra: Extra, kind: _Kind) -> list[_Item]:
+        if field not in file:
+            if len(self.actions) == 1 and not file.keys() & {"graph_entry", "graph_exit"}:
+                only = self.actions[0]
+                return [_Item(-1, only.name, only.instance_id, _Side(0.0))]
+            message = f"The file has no {field}; the engine refuses it."
+            self.report("entry-exit-missing", "", message)
+            return []
+        value = file[field]
+        if not isinstance(value, list):
+            extra.append((field, dump(value)))
+            return []
+        return self._items(-1, value, pointer(field), kind)
+
+    # Actions
+
+    def _read_actions(self, file: dict[str, Json], extra: Extra) -> None:
+        value = file.get("actions", [])
+        if not isinstance(value, list):
+            extra.append(("actions", dump(value)))
+            return
+        used: set[str] = set()
+        for index, item in enumerate(value):
+            path = pointer("actions", index)
+            if isinstance(item, dict):
+                self._read_action(item, path, used)
+            else:
+                self.report("action-illegal", path, "This is not an action and was left out.")
+
+    def _read_action(self, item: dict[str, Json], path: str, used: set[str]) -> None:
+        extra: Extra = []
+        index = len(self.actions)
+        position, key, rest = _action_attributes(item)
+        if rest is not None:
+            extra.append(("gui_attributes", rest))
+        if key is None or key in used:
+            key = f"a{index + 1}"
+        used.add(key)
+        if "type" not in item:
+            message = "The action has no type; the engine refuses the file. “sync” is assumed."
+            self.report("type-missing", path, message)
+        name = _text(item, "name", extra)
+        instance_id = _whole(item, extra)
+        twins = self.by_name.setdefault((name, instance_id), [])
+        action = Action(
+            key=key,
+            name=name,
+            instance_id=instance_id,
+            type=_text(item, "type", extra, "sync"),
+            actor=_text(item, "actor", extra),
+            description=_text(item, "description", extra),
+            inputs=_parameters(item, "input_parameters", extra),
+            outputs=_parameters(item, "output_parameters", extra),
+            position=position,
+            twin=bool(twins),
+        )
+        twins.append(index)
+        self._read_run_state(item, key, path)
+        self.listed.append(self._side_items(index, item, "parents", path, extra, self._parent))
+        self.listing.append(self._side_items(index, item, "children", path, extra, self._child))
+        extra.extend((field, dump(item[field])) for field in item if field not in _ACTION_FIELDS)
+        self.actions.append(msgspec.structs.replace(action, extra=tuple(extra)))
+
+    def _read_run_state(self, item: dict[str, Json], key: Key, path: str) -> None:
+        if state := self._state(item, "state", path):
+            self.states[key] = state
+        if "runtime" in item and not _is_runtime(item["runtime"]):
+            message = "The run log of the action is malformed; the engine refuses the file."
+            self.report("runtime-illegal", path + "/runtime", message)
+
+    def _side_items(
+        self, owner: int, item: dict[str, Json], field: str, path: str, extra: Extra, kind: _Kind
+    ) -> list[_Item]:
+        if field not in item:
+            return []
+        value = item[field]
+        if not isinstance(value, list):
+            extra.append((field, dump(value)))
+            return []
+        return self._items(owner, value, f"{path}/{field}", kind)
+
+    # Relations
+
+    def _items(self, owner: int, items: list[Json], path: str, kind: _Kind) -> list[_Item]:
+        found: list[_Item] = []
+        for index, item in enumerate(items):
+            if not isinstance(item, dict) or not isinstance(item.get("name"), str):
+                message = "This relation names no action; the engine refuses it. It was left out."
+                self.report("relation-unnamed", path + pointer(index), message)
+                continue
+            extra: Extra = []
+            name = str(item["name"])
+            found.append(_Item(owner, name, _whole(item, extra), kind(index, item, extra)))
+        return found
+
+    @staticmethod
+    def _parent(order: int, item: dict[str, Json], extra: Extra) -> _Side:
+        conditions, fits = conditions_of(item.get("conditions", []))
+        if not fits:
+            extra.append(("conditions", dump(item["conditions"])))
+        required = item.get("required", True)
+        if not isinstance(required, bool):
+            extra.append(("required", dump(required)))
+            required = True
+        known = {"name", "instance_id", "required", "conditions"}
+        extra.extend((field, dump(item[field])) for field in item if field not in known)
+        return _Side(float(order), conditions, required, (), tuple(extra))
+
+    @staticmethod
+    def _child(order: int, item: dict[str, Json], extra: Extra) -> _Side:
+        remap, fits, plain = remap_of(item.get("remap", []))
+        if not (fits and plain):
+            extra.append(("remap", dump(item["remap"])))
+        known = {"name", "instance_id", "remap"}
+        extra.extend((field, dump(item[field])) for field in item if field not in known)
+        return _Side(float(order), remap=remap, extra=tuple(extra))
+
+    def _relations(self, entries: list[_Item], exits: list[_Item]) -> list[Relation]:
+        relations = self._ends(entries, exits)
+        parents: dict[tuple[int, int, int], _Side] = {}
+        children: dict[tuple[int, int, int], _Side] = {}
+        count: Counter[tuple[int, int]] = Counter()
+        listing = self._who_lists(self.listing)
+        for item in chain.from_iterable(self.listed):
+            parent = self._find(item, listing)
+            parents[parent, item.owner, count[parent, item.owner]] = item.side
+            count[parent, item.owner] += 1
+        count.clear()
+        listed = self._who_lists(self.listed)
+        for item in chain.from_iterable(self.listing):
+            child = self._find(item, listed)
+            children[item.owner, child, count[item.owner, child]] = item.side
+            count[item.owner, child] += 1
+        for place in parents | children:
+            relations.append(self._joined(place, parents.get(place), children.get(place)))
+        return relations
+
+    def _who_lists(self, sides: list[list[_Item]]) -> dict[tuple[_Name, _Name], int]:
+        """(name, name listed) → the first action of that name that lists it."""
+        found: dict[tuple[_Name, _Name], int] = {}
+        for item in chain.from_iterable(sides):
+            owner = self.actions[item.owner]
+            place = (owner.name, owner.instance_id), (item.name, item.instance_id)
+            found.setdefault(place, item.owner)
+        return found
+
+    def _joined(
+        self, place: tuple[int, int, int], parent: _Side | None, child: _Side | None
+    ) -> Relation:
+        return Relation(
+            parent=self.actions[place[0]].key,
+            child=self.actions[place[1]].key,
+            listing=place[2],
+            conditions=parent.conditions if parent else ENGINE_DEFAULTS,
+            required=parent.required if parent else True,
+            remap=child.remap if child else (),
+            only="parents" if child is None else "children" if parent is None else None,
+            parent_order=child.order if child else 0.0,
+            child_order=parent.order if parent else 0.0,
+            parents_extra=parent.extra if parent else (),
+            children_extra=child.extra if child else (),
+        )
+
+    def _ends(self, entries: list[_Item], exits: list[_Item]) -> list[Relation]:
+        relations: list[Relation] = []
+        count: Counter[tuple[Key, Key]] = Counter()
+        for item in entries:
+            child = self.actions[self._find(item, {})].key
+            relations.append(
+                Relation(
+                    parent=ENTRY,
+                    child=child,
+                    listing=count[ENTRY, child],
+                    conditions=ENTRY_CONDITIONS,
+                    remap=item.side.remap,
+                    parent_order=item.side.order,
+                    children_extra=item.side.extra,
+                )
+            )
+            count[ENTRY, child] += 1
+        for item in exits:
+            parent = self.actions[self._find(item, {})].key
+            relations.append(
+                Relation(
+                    parent=parent,
+                    child=EXIT,
+                    listing=count[parent, EXIT],
+                    conditions=item.side.conditions,
+                    required=item.side.required,
+                    child_order=item.side.order,
+                    parents_extra=item.side.extra,
+                )
+            )
+            count[parent, EXIT] += 1
+        return relations
+
+    def _find(self, item: _Item, back: dict[tuple[_Name, _Name], int]) -> int:
+        """The action that an item names: of twins the one that lists the owner back, else the
+        first; a ghost where there is none."""
+        name = item.name, item.instance_id
+        found = self.by_name.get(name)
+        if found is None:
+            found = self.by_name[name] = [len(self.actions)]
+            key = f"g{len(self.actions) + 1}"
+            self.actions.append(Action(key=key, name=name[0], instance_id=name[1], missing=True))
+        if len(found) > 1 and item.owner >= 0:
+            owner = self.actions[item.owner]
+            return back.get((name, (owner.name, owner.instance_id)), found[0])
+        return found[0]
+
+
+def _text(item: dict[str, Json], field: str, extra: Extra, default: str = "") -> str:
+    value = item.get(field, default)
+    if isinstance(value, str):
+        return value
+    extra.append((field, dump(value)))
+    return default
+
+
+def _whole(item: dict[str, Json], extra: Extra) -> int:
+    value = item.get("instance_id", _ZERO)
+    number, fits = whole_of(value)
+    if not fits:
+        extra.append(("instance_id", dump(value)))
+    return number
+
+
+def _parameters(item: dict[str, Json], field: str, extra: Extra) -> tuple[Parameter, ...]:
+    value = item.get(field, {})
+    if isinstance(value, dict):
+        return flatten(value)
+    extra.append((field, dump(value)))
+    return ()
+
+
+def _is_runtime(value: Json) -> bool:
+    messages = value.get("messages") if isinstance(value, dict) else None
+    return isinstance(messages, list) and all(
+        isinstance(message, dict)
+        and isinstance(message.get("timestamp"), Number)
+        and isinstance(message.get("message"), str)
+        for message in messages
+    )
+
+
+def _graph_attributes(file: dict[str, Json]) -> tuple[dict[str, Json], str | None]:
+    """Our part of a graph's `gui_attributes`, and the text of the rest."""
+    if "gui_attributes" not in file:
+        return {}, None
+    value = file["gui_attributes"]
+    ours = value.get("action_assistant") if isinstance(value, dict) else None
+    if not isinstance(value, dict) or not isinstance(ours, dict):
+        return {}, dump(value)
+    rest = {key: member for key, member in value.items() if key != "action_assistant"}
+    return ours, dump(rest) if rest else None
+
+
+def _action_attributes(
+    item: dict[str, Json],
+) -> tuple[Position | None, str | None, str | None]:
+    """Position and identity out of an action's `gui_attributes`, and the text of the rest."""
+    if "gui_attributes" not in item:
+        return None, None, None
+    value = item["gui_attributes"]
+    if not isinstance(value, dict):
+        return None, None, dump(value)
+    ours, point = value.get("action_assistant"), value.get("position")
+    aid = ours.get("aid") if isinstance(ours, dict) else None
+    position = _position(point)
+    rest = dict(value)
+    if isinstance(ours, dict):
+        del rest["action_assistant"]
+    if position is not None and isinstance(point, dict):
+        rest["position"] = {key: member for key, member in point.items() if key not in "xy"}
+        if not rest["position"]:
+            del rest["position"]
+    known = aid if isinstance(aid, str) and AID.fullmatch(aid) else None
+    return position, known, dump(rest) if rest or not value else None
+
+
+def _position(value: Json) -> Position | None:
+    if not isinstance(value, dict):
+        return None
+    x, y = value.get("x"), value.get("y")
+    if not isinstance(x, Number) or not isinstance(y, Number):
+        return None
+    return x.value, y.value
