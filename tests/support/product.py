@@ -1,0 +1,159 @@
+"""The real product for tests: `action-assistant serve` on free ports with a data folder of its own."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import psutil
+
+TOKEN = "test-token-" + "0123456789abcdef" * 2
+COMMAND = (sys.executable, "-m", "action_assistant")
+
+
+def free_ports() -> int:
+    """The first of two neighbouring ports that nobody listens on."""
+    while True:
+        with socket.socket() as one:
+            one.bind(("127.0.0.1", 0))
+            port: int = one.getsockname()[1]
+            if port == 65535:
+                continue
+            with socket.socket() as two:
+                try:
+                    two.bind(("127.0.0.1", port + 1))
+                except OSError:
+                    continue
+                return port
+
+
+class Product:
+    """A running editor and runner. `kill` and `start` may be called in turn."""
+
+    def __init__(self, data: Path) -> None:
+        self.data = data
+        self.port = free_ports()
+        self.log = data.parent / f"{data.name}.log"
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def url(self) -> str:
+        """Of the editor."""
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def runner_url(self) -> str:
+        """Of the runner."""
+        return f"http://127.0.0.1:{self.port + 1}"
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """With which commands find this server."""
+        return {
+            **os.environ,
+            "ACTION_ASSISTANT_TOKEN": TOKEN,
+            "ACTION_ASSISTANT_URL": self.url,
+        }
+
+    def start(self) -> None:
+        """Start it and wait until both processes answer."""
+        with self.log.open("ab") as log:
+            self._process = subprocess.Popen(
+                [
+                    *COMMAND,
+                    "serve",
+                    "--data",
+                    str(self.data),
+                    "--port",
+                    str(self.port),
+                    "--no-open",
+                ],
+                env=self.environment,
+                stderr=log,
+                stdout=log,
+                start_new_session=True,
+            )
+        self.wait_until_ready()
+
+    def wait_until_ready(self, seconds: float = 40) -> None:
+        """Wait until both processes can do their work."""
+        deadline = time.monotonic() + seconds
+        for url in (self.url, self.runner_url):
+            while not _ready(url):
+                if time.monotonic() > deadline or self._process is None or self._process.poll():
+                    raise AssertionError(f"not ready:\n{self.log.read_text()[-4000:]}")
+                time.sleep(0.05)
+
+    def process(self, name: str) -> psutil.Process:
+        """The editor or the runner."""
+        assert self._process is not None
+        for child in psutil.Process(self._process.pid).children():
+            if name in child.cmdline():
+                return child
+        raise AssertionError(f"no {name} is running")
+
+    def kill(self) -> None:
+        """kill -9 of everything at once."""
+        assert self._process is not None
+        os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        self._process = None
+
+    def end(self) -> int:
+        """Ask it to end; the exit code."""
+        if self._process is None:
+            return 0
+        self._process.terminate()
+        code = self._process.wait(20)
+        self._process = None
+        return code
+
+    def cli(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run a command against this server."""
+        return subprocess.run(
+            [*COMMAND, *arguments],
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+
+    def editor(self) -> httpx.Client:
+        """A client of the editor with the token."""
+        return _client(self.url)
+
+    def runner(self) -> httpx.Client:
+        """A client of the runner with the token."""
+        return _client(self.runner_url)
+
+
+def _client(url: str) -> httpx.Client:
+    return httpx.Client(
+        base_url=url, headers={"authorization": f"Bearer {TOKEN}"}, trust_env=False, timeout=20
+    )
+
+
+def _ready(url: str) -> bool:
+    try:
+        return httpx.get(f"{url}/readyz", trust_env=False, timeout=2).status_code == 200
+    except httpx.TransportError:
+        return False
+
+
+@contextmanager
+def running(data: Path) -> Iterator[Product]:
+    """A product that runs inside the block."""
+    product = Product(data)
+    product.start()
+    try:
+        yield product
+    finally:
+        if product.end() != 0:
+            raise AssertionError(f"serve failed:\n{product.log.read_text()[-4000:]}")
