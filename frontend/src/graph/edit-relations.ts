@@ -1,0 +1,213 @@
+/** Edits of relations: connect, responses, order of waiting, remaps, the graph's two ends. */
+
+import type * as Y from "yjs";
+import { endsOf, relationId, rootOf } from "./layout";
+import { ENTRY, EXIT, type Key, type Precondition, type Response } from "./model";
+import {
+  after,
+  erase,
+  hasEnd,
+  hasRelation,
+  keysOf,
+  moveKeys,
+  put,
+  relationOf,
+  settleGhosts,
+  together,
+} from "./pen";
+
+/**
+ * Draws an arrow that says what was drawn and nothing else: after `outcome` the child runs. Between
+ * two that are connected already it adds that response. Answers the relation's id, or null when the
+ * ends do not fit: nothing leads into the entry or out of the exit, nor from one to the other.
+ */
+export function connect(
+  doc: Y.Doc,
+  parent: Key,
+  child: Key,
+  outcome: Precondition = "on_true",
+  response: Response = "run",
+): string | null {
+  const drawn = relationId({ parent, child });
+  if (endsOf(drawn) === null || !hasEnd(doc, parent) || !hasEnd(doc, child)) return null;
+  return together(doc, () => {
+    settleGhosts(doc);
+    const known = pairOf(doc, parent, child);
+    const id = known ?? drawn;
+    if (known === null) {
+      erase(doc, "relations", ...keysOf(doc, "relations", id));
+      put(doc, "relations", `${id}|po`, nextOf(doc, "po", "parent", parent));
+      put(doc, "relations", `${id}|co`, nextOf(doc, "co", "child", child));
+    }
+    if (parent === ENTRY) put(doc, "relations", `${id}|on_true`, "run");
+    else put(doc, "relations", `${id}|${outcome}`, response);
+    erase(doc, "relations", `${id}|only`);
+    forget(doc, id, "conditions", "parents");
+    forgetSide(doc, id);
+    return id;
+  });
+}
+
+/** The id of the first relation of a pair; null when there is none. */
+function pairOf(doc: Y.Doc, parent: Key, child: Key): string | null {
+  const head = relationId({ parent, child });
+  if (hasRelation(doc, head)) return head;
+  const listings = new Set<number>();
+  for (const key of rootOf(doc, "relations").keys()) {
+    if (!key.startsWith(`${head};`)) continue;
+    const ends = endsOf(key.slice(0, key.indexOf("|")));
+    if (ends && hasRelation(doc, relationId(ends))) listings.add(ends.listing);
+  }
+  if (listings.size === 0) return null;
+  return relationId({ parent, child, listing: Math.min(...listings) });
+}
+
+function nextOf(doc: Y.Doc, field: "po" | "co", end: "parent" | "child", key: Key): number {
+  return after(doc, "relations", field, (head) => endsOf(head)?.[end] === key);
+}
+
+/** An imported value of a field that did not fit gives way. */
+function forget(doc: Y.Doc, id: string, field: string, side: "parents" | "children"): void {
+  erase(doc, "relations", `${id}|x/${side}/${field}`);
+}
+
+/** An imported list that was none, on either side, gives way to a real relation. */
+function forgetSide(doc: Y.Doc, id: string): void {
+  const ends = endsOf(id);
+  if (ends === null) return;
+  if (ends.parent === ENTRY) erase(doc, "meta", "x/graph_entry");
+  else erase(doc, "actions", `${ends.parent}|x/children`);
+  if (ends.child === EXIT) erase(doc, "meta", "x/graph_exit");
+  else erase(doc, "actions", `${ends.child}|x/parents`);
+}
+
+/** One edit of a relation that exists: false when it does not. */
+function edit(doc: Y.Doc, id: string, write: () => void): boolean {
+  return together(doc, () => {
+    settleGhosts(doc);
+    if (!hasRelation(doc, id)) return false;
+    write();
+    return true;
+  });
+}
+
+/** A field that lives on one side of the file needs that side to be written. */
+function needs(doc: Y.Doc, id: string, side: "parents" | "children"): void {
+  const only = rootOf(doc, "relations").get(`${id}|only`);
+  if (only !== undefined && only !== side) erase(doc, "relations", `${id}|only`);
+}
+
+/** What the child does after one outcome. An entry says `run` and nothing else. */
+export function setResponse(
+  doc: Y.Doc,
+  id: string,
+  outcome: Precondition,
+  response: Response,
+): boolean {
+  if (endsOf(id)?.parent === ENTRY) return false;
+  return edit(doc, id, () => {
+    put(doc, "relations", `${id}|${outcome}`, response);
+    forget(doc, id, "conditions", "parents");
+    needs(doc, id, "parents");
+  });
+}
+
+/** Whether the child waits until this parent has reported. */
+export function setRequired(doc: Y.Doc, id: string, required: boolean): boolean {
+  return edit(doc, id, () => {
+    if (required) erase(doc, "relations", `${id}|required`);
+    else put(doc, "relations", `${id}|required`, false);
+    forget(doc, id, "required", "parents");
+    needs(doc, id, "parents");
+  });
+}
+
+/** Under which name an output of the parent reaches the child; null: under its own. */
+export function setRemap(doc: Y.Doc, id: string, source: string, target: string | null): boolean {
+  return edit(doc, id, () => {
+    if (target === null) erase(doc, "relations", `${id}|remap/${source}`);
+    else put(doc, "relations", `${id}|remap/${source}`, target);
+    forget(doc, id, "remap", "children");
+    needs(doc, id, "children");
+  });
+}
+
+/** Makes a relation that a file listed on one side only known to both. */
+export function mirrorRelation(doc: Y.Doc, id: string): boolean {
+  return edit(doc, id, () => erase(doc, "relations", `${id}|only`));
+}
+
+export function removeRelation(doc: Y.Doc, id: string): boolean {
+  return edit(doc, id, () => erase(doc, "relations", ...keysOf(doc, "relations", id)));
+}
+
+export function removeRelations(doc: Y.Doc, ids: Iterable<string>): void {
+  together(doc, () => {
+    for (const id of ids) removeRelation(doc, id);
+  });
+}
+
+/** Leads an arrow from or to somewhere else, with everything it says. Null when that is taken. */
+export function moveRelation(
+  doc: Y.Doc,
+  id: string,
+  ends: { readonly parent?: Key; readonly child?: Key },
+): string | null {
+  return together(doc, () => {
+    settleGhosts(doc);
+    const old = endsOf(id);
+    if (old === null || !hasRelation(doc, id)) return null;
+    const parent = ends.parent ?? old.parent;
+    const child = ends.child ?? old.child;
+    const to = relationId({ parent, child });
+    if (to === id) return id;
+    if ((old.parent === ENTRY) !== (parent === ENTRY) || endsOf(to) === null) return null;
+    if (!hasEnd(doc, parent) || !hasEnd(doc, child) || pairOf(doc, parent, child)) return null;
+    erase(doc, "relations", ...keysOf(doc, "relations", to));
+    if (parent !== old.parent)
+      put(doc, "relations", `${id}|po`, nextOf(doc, "po", "parent", parent));
+    if (child !== old.child) put(doc, "relations", `${id}|co`, nextOf(doc, "co", "child", child));
+    moveKeys(doc, id, to);
+    erase(doc, "relations", `${to}|only`);
+    return to;
+  });
+}
+
+/** Puts an action into an arrow: it takes over what the arrow said, and its success leads on. */
+export function insertInto(doc: Y.Doc, id: string, key: Key): boolean {
+  return together(doc, () => {
+    const relation = relationOf(doc, id);
+    if (relation === undefined || relation.parent === key || relation.child === key) return false;
+    const onward = connect(doc, key, relation.child);
+    if (onward === null) return false;
+    put(doc, "relations", `${onward}|co`, relation.childOrder);
+    const into = moveRelation(doc, id, { child: key });
+    if (into === null) return removeRelation(doc, id);
+    put(doc, "relations", `${into}|po`, relation.parentOrder);
+    return true;
+  });
+}
+
+/** The graph starts with this action. */
+export const setEntry = (doc: Y.Doc, key: Key): string | null => connect(doc, ENTRY, key);
+
+export const unsetEntry = (doc: Y.Doc, key: Key): boolean => disconnect(doc, ENTRY, key);
+
+/** The graph ends after this outcome of the action. */
+export const setExit = (doc: Y.Doc, key: Key, outcome: Precondition = "on_true"): string | null =>
+  connect(doc, key, EXIT, outcome);
+
+export const unsetExit = (doc: Y.Doc, key: Key): boolean => disconnect(doc, key, EXIT);
+
+/** Removes every arrow from one to the other. */
+export function disconnect(doc: Y.Doc, parent: Key, child: Key): boolean {
+  return together(doc, () => {
+    settleGhosts(doc);
+    let removed = false;
+    for (let id = pairOf(doc, parent, child); id; id = pairOf(doc, parent, child)) {
+      erase(doc, "relations", ...keysOf(doc, "relations", id));
+      removed = true;
+    }
+    return removed;
+  });
+}

@@ -1,0 +1,81 @@
+/**
+ * Every edit of a graph, as functions over the Yjs document.
+ *
+ * Each is one transaction of the person's own (see `MINE`), so one update for the others and one
+ * step of undo; `together` joins several. An edit of something that a colleague has deleted
+ * meanwhile does nothing and says so by its answer: null or false. What was imported and did not fit
+ * (`x/<field>`) gives way to the first edit of its field.
+ */
+
+import type * as Y from "yjs";
+import { newAid } from "./ids";
+import { extraKey, noteKey, rootOf } from "./layout";
+import { ENTRY, EXIT, type JsonText, type Key, type Position } from "./model";
+import { erase, hasEnd, put, together } from "./pen";
+import { asJsonText } from "./values";
+
+export * from "./edit-actions";
+export * from "./edit-parameters";
+export * from "./edit-relations";
+export { MINE, together, undoOf } from "./pen";
+
+export function setGraphName(doc: Y.Doc, name: string): void {
+  together(doc, () => {
+    put(doc, "meta", "name", name);
+    erase(doc, "meta", "x/graph_name");
+  });
+}
+
+export function setGraphDescription(doc: Y.Doc, description: string): void {
+  together(doc, () => {
+    put(doc, "meta", "description", description);
+    erase(doc, "meta", "x/graph_description");
+  });
+}
+
+/** Writes where things stand, once, when they are dropped: actions, `ENTRY` and `EXIT`. */
+export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Position]>): void {
+  together(doc, () => {
+    for (const [key, [x, y]] of positions) {
+      if (!hasEnd(doc, key)) continue;
+      const old = rootOf(doc, "positions").get(key);
+      if (!Array.isArray(old) || old[0] !== x || old[1] !== y) {
+        rootOf(doc, "positions").set(key, [x, y]);
+      }
+      if (key !== ENTRY && key !== EXIT) forgetOddPosition(doc, key);
+    }
+  });
+}
+
+/** An imported position that was none stays in `x/gui_attributes` until the action is moved. */
+function forgetOddPosition(doc: Y.Doc, key: Key): void {
+  const field = extraKey(key, "gui_attributes");
+  const text = asJsonText(rootOf(doc, "actions").get(field));
+  if (text === undefined) return;
+  const value: unknown = JSON.parse(text);
+  if (typeof value !== "object" || value === null || Array.isArray(value)) {
+    erase(doc, "actions", field);
+  } else if ("position" in value) {
+    const { position: _odd, ...rest } = value;
+    put(doc, "actions", field, JSON.stringify(rest));
+  }
+}
+
+/** Adds a note or frame; `text` is its JSON. Answers its id. */
+export function addNote(doc: Y.Doc, text: JsonText): string {
+  const id = newAid();
+  together(doc, () => put(doc, "positions", noteKey(id), text));
+  return id;
+}
+
+export function setNote(doc: Y.Doc, id: string, text: JsonText): boolean {
+  if (!rootOf(doc, "positions").has(noteKey(id))) return false;
+  together(doc, () => put(doc, "positions", noteKey(id), text));
+  return true;
+}
+
+export function removeNotes(doc: Y.Doc, ids: Iterable<string>): void {
+  together(doc, () => {
+    for (const id of ids) erase(doc, "positions", noteKey(id));
+  });
+}

@@ -1,0 +1,295 @@
+/**
+ * From the document to a graph: total, and incremental.
+ *
+ * `readGraph` reads plain maps at once; `followGraph` keeps a graph in step with a Yjs document and
+ * reads again only what changed, so that everything else keeps its identity. Both are one reader.
+ */
+
+import type * as Y from "yjs";
+import { type Assembly, assemble, emptyAssembly, type RawAction } from "./assemble";
+import { isAid } from "./ids";
+import {
+  endsOf,
+  type Maps,
+  mapsOf,
+  ROOTS,
+  type Root,
+  relationId,
+  rootOf,
+  splitKey,
+} from "./layout";
+import {
+  type Action,
+  ENTRY,
+  ENTRY_CONDITIONS,
+  EXIT,
+  type Extra,
+  type Graph,
+  type JsonText,
+  type Key,
+  type Parameter,
+  PRECONDITIONS,
+  type Precondition,
+  type Relation,
+  type Remap,
+  type Response,
+} from "./model";
+import { same } from "./same";
+import {
+  asInstanceId,
+  asJsonText,
+  asNumber,
+  asPosition,
+  asResponse,
+  asText,
+  asTextList,
+  byText,
+} from "./values";
+
+/** The fields of one owner: what stands right of its first `|`. */
+type Fields = ReadonlyMap<string, unknown>;
+
+/** Reads one document state. Never throws. */
+export function readGraph(maps: Maps): Graph {
+  return new Reader(maps).graph();
+}
+
+/** The ghosts that real actions took up, and under which ids their arrows are shown since. */
+export function readTakenUp(maps: Maps): {
+  readonly ghosts: readonly Key[];
+  readonly arrows: readonly (readonly [from: string, to: string])[];
+} {
+  const { takenUp, redirected } = new Reader(maps).assembled();
+  return {
+    ghosts: [...takenUp.keys()],
+    arrows: [...redirected].map(([raw, shown]) => [relationId(raw), relationId(shown)] as const),
+  };
+}
+
+/** A graph that follows a document. `subscribe` and `graph` fit `useSyncExternalStore`. */
+export interface GraphSource {
+  /** The graph now; the same object until something of it changes. */
+  graph(): Graph;
+  /** Calls back once after each transaction that may have changed it. */
+  subscribe(listener: () => void): () => void;
+  /** Lets go of the document. */
+  close(): void;
+}
+
+export function followGraph(doc: Y.Doc): GraphSource {
+  const reader = new Reader(mapsOf(doc));
+  const listeners = new Set<() => void>();
+  let changed = false;
+  const stops = ROOTS.map((root) => {
+    const map = rootOf(doc, root);
+    const onChange = (event: Y.YMapEvent<unknown>) => {
+      for (const key of event.keysChanged as Set<string>) {
+        reader.set(root, key, map.has(key) ? map.get(key) : undefined);
+      }
+      changed = true;
+    };
+    map.observe(onChange);
+    return () => map.unobserve(onChange);
+  });
+  const onEnd = () => {
+    if (!changed) return;
+    changed = false;
+    for (const listener of [...listeners]) listener();
+  };
+  doc.on("afterTransaction", onEnd);
+  return {
+    graph: () => reader.graph(),
+    subscribe(listener) {
+      listeners.add(listener);
+      return () => listeners.delete(listener);
+    },
+    close() {
+      doc.off("afterTransaction", onEnd);
+      for (const stop of stops) stop();
+      listeners.clear();
+    },
+  };
+}
+
+class Reader {
+  private readonly actionFields = new Map<Key, Map<string, unknown>>();
+  private readonly relationFields = new Map<string, Map<string, unknown>>();
+  private readonly positions: Map<string, unknown>;
+  private readonly meta: Map<string, unknown>;
+  private readonly actions = new Map<Key, RawAction>();
+  private readonly relations = new Map<string, Relation>();
+  private readonly staleActions = new Set<Key>();
+  private readonly staleRelations = new Set<string>();
+  private stale = true;
+  private assembly = emptyAssembly();
+
+  constructor(maps: Maps) {
+    this.positions = new Map(maps.positions);
+    this.meta = new Map(maps.meta);
+    for (const [key, value] of maps.actions) this.set("actions", key, value);
+    for (const [key, value] of maps.relations) this.set("relations", key, value);
+  }
+
+  set(root: Root, key: string, value: unknown): void {
+    const { head, rest } = splitKey(key);
+    switch (root) {
+      case "meta":
+        put(this.meta, key, value);
+        break;
+      case "positions":
+        put(this.positions, key, value);
+        this.staleActions.add(key);
+        break;
+      case "actions":
+        if (!isAid(head)) return;
+        put(owner(this.actionFields, head), key === head ? "" : rest || "|", value);
+        this.staleActions.add(head);
+        break;
+      case "relations":
+        if (endsOf(head) === null) return;
+        put(owner(this.relationFields, head), rest, value);
+        this.staleRelations.add(head);
+        break;
+      case "comments":
+        return;
+    }
+    this.stale = true;
+  }
+
+  graph(): Graph {
+    return this.assembled().graph;
+  }
+
+  assembled(): Assembly {
+    if (!this.stale) return this.assembly;
+    for (const key of this.staleActions) {
+      const fields = this.actionFields.get(key);
+      const fresh = fields && readAction(key, fields, this.positions.get(key));
+      replace(this.actions, key, fresh ?? null);
+      if (fields?.size === 0) this.actionFields.delete(key);
+    }
+    for (const id of this.staleRelations) {
+      const fields = this.relationFields.get(id);
+      replace(this.relations, id, (fields && readRelation(id, fields)) ?? null);
+      if (fields?.size === 0) this.relationFields.delete(id);
+    }
+    this.staleActions.clear();
+    this.staleRelations.clear();
+    this.assembly = assemble(this.assembly, this.actions, this.relations, this.frame());
+    this.stale = false;
+    return this.assembly;
+  }
+
+  /** What belongs to the graph itself. */
+  private frame(): Omit<Graph, "actions" | "relations"> {
+    return {
+      name: asText(this.meta.get("name")) ?? "",
+      description: asText(this.meta.get("description")) ?? "",
+      entryPosition: asPosition(this.positions.get(ENTRY)) ?? null,
+      exitPosition: asPosition(this.positions.get(EXIT)) ?? null,
+      notes: under(this.positions, "g/"),
+      extra: under(this.meta, "x/"),
+    };
+  }
+}
+
+function put(map: Map<string, unknown>, key: string, value: unknown): void {
+  if (value === undefined) map.delete(key);
+  else map.set(key, value);
+}
+
+function owner(owners: Map<string, Map<string, unknown>>, key: string): Map<string, unknown> {
+  const known = owners.get(key);
+  if (known) return known;
+  const fresh = new Map<string, unknown>();
+  owners.set(key, fresh);
+  return fresh;
+}
+
+/** Puts a freshly read value in the place of the old one, which stays when it says the same. */
+function replace<T>(map: Map<string, T>, key: string, fresh: T | null): void {
+  if (fresh === null) map.delete(key);
+  else if (!same(map.get(key), fresh)) map.set(key, fresh);
+}
+
+/** The JSON texts under a prefix, by name. */
+function under(fields: Fields, prefix: string): Extra {
+  const found: [string, JsonText][] = [];
+  for (const [key, value] of fields) {
+    if (!key.startsWith(prefix)) continue;
+    const text = asJsonText(value);
+    if (text !== undefined) found.push([key.slice(prefix.length), text]);
+  }
+  return found.sort((a, b) => byText(a[0], b[0]));
+}
+
+function readAction(key: Key, fields: Fields, position: unknown): RawAction | null {
+  const name = asText(fields.get(""));
+  if (name === undefined) return null;
+  const action: Action = {
+    key,
+    name,
+    instanceId: asInstanceId(fields.get("instance_id")) ?? 0,
+    type: asText(fields.get("type")) ?? "sync",
+    actor: asText(fields.get("actor")) ?? "",
+    description: asText(fields.get("description")) ?? "",
+    inputs: readParameters(fields, "in"),
+    outputs: readParameters(fields, "out"),
+    position: asPosition(position) ?? null,
+    missing: fields.get("missing") === true,
+    twin: fields.get("twin") === true,
+    extra: under(fields, "x/"),
+  };
+  return { action, order: asNumber(fields.get("order")) ?? 0 };
+}
+
+/** Listed paths in the order of the list, then the others by name. */
+function readParameters(fields: Fields, side: "in" | "out"): readonly Parameter[] {
+  const texts = new Map(under(fields, `${side}/`));
+  const listed = new Set(asTextList(fields.get(side)) ?? []);
+  const paths = [...listed].filter((path) => texts.has(path));
+  for (const path of texts.keys()) if (!listed.has(path)) paths.push(path);
+  return paths.map((path) => ({ path, text: texts.get(path) ?? "" }));
+}
+
+function readRelation(id: string, fields: Fields): Relation | null {
+  const ends = endsOf(id);
+  if (ends === null) return null;
+  const answers = new Map<Precondition, Response>();
+  for (const outcome of PRECONDITIONS) {
+    const response = asResponse(fields.get(outcome));
+    if (response !== undefined) answers.set(outcome, response);
+  }
+  if (ends.parent === ENTRY ? answers.get("on_true") !== "run" : answers.size === 0) return null;
+  const answer = (outcome: Precondition) => answers.get(outcome) ?? "ignore";
+  const only = fields.get("only");
+  return {
+    ...ends,
+    conditions:
+      ends.parent === ENTRY
+        ? ENTRY_CONDITIONS
+        : {
+            on_true: answer("on_true"),
+            on_false: answer("on_false"),
+            on_error: answer("on_error"),
+            on_stopped: answer("on_stopped"),
+          },
+    required: fields.get("required") !== false,
+    remap: readRemaps(fields),
+    only: only === "parents" || only === "children" ? only : null,
+    parentOrder: asNumber(fields.get("po")) ?? 0,
+    childOrder: asNumber(fields.get("co")) ?? 0,
+    parentsExtra: under(fields, "x/parents/"),
+    childrenExtra: under(fields, "x/children/"),
+  };
+}
+
+function readRemaps(fields: Fields): readonly Remap[] {
+  const remaps: Remap[] = [];
+  for (const [key, value] of fields) {
+    const target = asText(value);
+    if (!key.startsWith("remap/") || target === undefined) continue;
+    remaps.push({ source: key.slice("remap/".length), target });
+  }
+  return remaps.sort((a, b) => byText(a.source, b.source));
+}

@@ -1,0 +1,384 @@
+/**
+ * The connection of one document to its room: Yjs sync, awareness and acknowledgements.
+ *
+ * Speaks y-protocols (sync 0, awareness 1, query awareness 3) and, as our server offers it, type
+ * 100: how many of this socket's messages are durable, and up to which entry of the log this client
+ * has been sent. So the page can say "saved" and mean it, and can name the moment it shows.
+ *
+ * Works without React. Edits go into `doc` at any time, also before the first answer and while
+ * offline; they are merged, and counted in `unsaved` until the server has stored them.
+ */
+
+import * as decoding from "lib0/decoding";
+import * as encoding from "lib0/encoding";
+import * as awarenessProtocol from "y-protocols/awareness";
+import { Awareness, removeAwarenessStates } from "y-protocols/awareness";
+import * as sync from "y-protocols/sync";
+import * as Y from "yjs";
+import { Outbox } from "./outbox";
+
+/** Why a room does not let this page in, or let it go. */
+export type Why =
+  | "session-ended"
+  | "forbidden"
+  | "no-such-graph"
+  | "other-epoch"
+  | "not-accepted"
+  | "restarting"
+  | "too-slow";
+
+export interface Link {
+  /** `refused` does not come back by itself: see `why` and `reconnect`. */
+  readonly state: "connecting" | "live" | "offline" | "refused";
+  readonly why?: Why;
+  /** Edits of this person that are not durable yet. */
+  readonly unsaved: number;
+  /** The page shows the log up to this entry, plus what is `unsaved`. 0 before the first sync. */
+  readonly seq: number;
+}
+
+export interface Room {
+  readonly doc: Y.Doc;
+  readonly awareness: Awareness;
+  /** The same object until something of it changes. */
+  link(): Link;
+  onLink(listener: () => void): () => void;
+  /** Resolves with `seq` once everything is stored; rejects when the room closes or `signal` aborts. */
+  settled(signal?: AbortSignal): Promise<number>;
+  /** Tries at once, also after a refusal (the person signed in again, say). */
+  reconnect(): void;
+  /** Leaves the room. Edits that were not stored stay in `doc`. */
+  close(): void;
+}
+
+/** The part of `WebSocket` that a room uses, so that tests can bring their own. */
+export interface Socket {
+  binaryType: BinaryType;
+  readonly readyState: number;
+  onopen: (() => void) | null;
+  onmessage: ((event: { data: unknown }) => void) | null;
+  onclose: ((event: { code: number }) => void) | null;
+  onerror: (() => void) | null;
+  send(data: Uint8Array<ArrayBuffer>): void;
+  close(code?: number): void;
+}
+
+export interface ConnectOptions {
+  /** `wss://host/api/graphs/ID/room`; `roomUrl` makes it. */
+  readonly url: string;
+  readonly doc?: Y.Doc;
+  /** Opens a socket; the browser's by default. */
+  readonly open?: (url: string) => Socket;
+  /** 0 … 1, for the spread of reconnects. */
+  readonly random?: () => number;
+}
+
+/** The address of a graph's room on the server that the page came from. */
+export function roomUrl(graph: string, base: string | URL = window.location.href): string {
+  const url = new URL(`/api/graphs/${encodeURIComponent(graph)}/room`, base);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  return url.href;
+}
+
+const SYNC = 0;
+const AWARENESS = 1;
+const QUERY_AWARENESS = 3;
+const ACK = 100;
+
+/** The server says something at least every 15 s; a socket this silent is dead. */
+const SILENCE_MS = 30_000;
+const OPENING_MS = 10_000;
+const FIRST_RETRY_MS = 300;
+const LAST_RETRY_MS = 10_000;
+const OPEN = 1;
+
+const REFUSED: ReadonlyMap<number, Why> = new Map([
+  [1003, "not-accepted"],
+  [1007, "not-accepted"],
+  [1008, "forbidden"],
+  [1009, "not-accepted"],
+  [4401, "session-ended"],
+  [4403, "forbidden"],
+  [4404, "no-such-graph"],
+  [4409, "other-epoch"],
+]);
+const PASSING: ReadonlyMap<number, Why> = new Map([
+  [1012, "restarting"],
+  [1013, "too-slow"],
+]);
+
+export function connect(options: ConnectOptions): Room {
+  return new Connection(options);
+}
+
+class Connection implements Room {
+  readonly doc: Y.Doc;
+  readonly awareness: Awareness;
+  private readonly url: string;
+  private readonly openSocket: (url: string) => Socket;
+  private readonly random: () => number;
+  private readonly outbox = new Outbox();
+  private readonly listeners = new Set<() => void>();
+  private current: Link = { state: "connecting", unsaved: 0, seq: 0 };
+  private socket: Socket | null = null;
+  private heardAt = 0;
+  private attempts = 0;
+  private retry: ReturnType<typeof setTimeout> | undefined;
+  private readonly watch: ReturnType<typeof setInterval>;
+  private closed = false;
+
+  constructor(options: ConnectOptions) {
+    this.doc = options.doc ?? new Y.Doc();
+    this.awareness = new Awareness(this.doc);
+    const url = new URL(options.url);
+    url.searchParams.set("acks", "1");
+    this.url = url.href;
+    this.openSocket = options.open ?? ((address) => new WebSocket(address) as unknown as Socket);
+    this.random = options.random ?? Math.random;
+    this.doc.on("update", this.onUpdate);
+    this.awareness.on("update", this.onAwareness);
+    globalThis.addEventListener?.("online", this.onOnline);
+    this.watch = setInterval(this.onWatch, 1_000);
+    this.dial();
+  }
+
+  // Bound, so that they can be handed to `useSyncExternalStore`.
+  readonly link = (): Link => this.current;
+
+  readonly onLink = (listener: () => void): (() => void) => {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  };
+
+  settled(signal?: AbortSignal): Promise<number> {
+    return new Promise((resolve, reject) => {
+      const look = () => {
+        const reason = signal?.aborted
+          ? signal.reason
+          : this.closed && new Error("the room was left");
+        const done = this.current.state === "live" && this.current.unsaved === 0;
+        if (!reason && !done) return;
+        stop();
+        signal?.removeEventListener("abort", look);
+        if (reason) reject(reason);
+        else resolve(this.current.seq);
+      };
+      const stop = this.onLink(look);
+      signal?.addEventListener("abort", look);
+      look();
+    });
+  }
+
+  reconnect(): void {
+    if (this.closed) return;
+    this.attempts = 0;
+    this.drop();
+    this.say({ state: "connecting", why: undefined });
+    this.dial();
+  }
+
+  close(): void {
+    if (this.closed) return;
+    this.awareness.setLocalState(null);
+    this.closed = true;
+    clearInterval(this.watch);
+    clearTimeout(this.retry);
+    globalThis.removeEventListener?.("online", this.onOnline);
+    this.doc.off("update", this.onUpdate);
+    this.awareness.off("update", this.onAwareness);
+    this.drop();
+    this.awareness.destroy();
+    this.say({ state: "offline" });
+  }
+
+  private say(change: Partial<Omit<Link, "why">> & { why?: Why | undefined }): void {
+    const { why, ...rest } = { ...this.current, ...change };
+    const next: Link = why === undefined ? rest : { ...rest, why };
+    const old = this.current;
+    if (
+      old.state === next.state &&
+      old.why === next.why &&
+      old.unsaved === next.unsaved &&
+      old.seq === next.seq &&
+      !this.closed
+    )
+      return;
+    this.current = next;
+    for (const listener of [...this.listeners]) listener();
+  }
+
+  // -- the socket -----------------------------------------------------------------------------
+
+  private dial(): void {
+    clearTimeout(this.retry);
+    const socket = this.openSocket(this.url);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    this.heardAt = Date.now();
+    socket.onopen = () => this.onOpen(socket);
+    socket.onmessage = ({ data }) => this.onMessage(socket, data);
+    socket.onclose = ({ code }) => this.onClose(socket, code);
+    socket.onerror = () => undefined; // a close event follows
+  }
+
+  private onOpen(socket: Socket): void {
+    if (socket !== this.socket) return;
+    this.heardAt = Date.now();
+    this.outbox.fresh();
+    const encoder = encoding.createEncoder();
+    encoding.writeVarUint(encoder, SYNC);
+    sync.writeSyncStep1(encoder, this.doc);
+    this.send(encoder);
+    // The others saw us go: only a newer clock brings us back.
+    const state = this.awareness.getLocalState();
+    if (state !== null) this.awareness.setLocalState(state);
+  }
+
+  private onClose(socket: Socket, code: number): void {
+    if (socket !== this.socket) return;
+    this.drop();
+    const refused = REFUSED.get(code);
+    if (refused !== undefined) {
+      this.say({ state: "refused", why: refused });
+      return;
+    }
+    this.say({ state: "offline", why: PASSING.get(code) });
+    this.dialLater();
+  }
+
+  private dialLater(): void {
+    const longest = Math.min(LAST_RETRY_MS, FIRST_RETRY_MS * 2 ** this.attempts);
+    this.attempts += 1;
+    clearTimeout(this.retry);
+    this.retry = setTimeout(() => this.dial(), longest * (0.5 + this.random() / 2));
+  }
+
+  /** Forgets the socket; the others are out of sight until it is back. */
+  private drop(): void {
+    clearTimeout(this.retry);
+    const socket = this.socket;
+    this.socket = null;
+    if (socket !== null) {
+      socket.onopen = socket.onmessage = socket.onclose = null;
+      socket.close();
+    }
+    const others = [...this.awareness.getStates().keys()].filter((id) => id !== this.doc.clientID);
+    removeAwarenessStates(this.awareness, others, this);
+  }
+
+  private readonly onOnline = (): void => {
+    if (this.current.state === "offline" && !this.closed) this.reconnectNow();
+  };
+
+  private reconnectNow(): void {
+    this.attempts = 0;
+    this.drop();
+    this.dial();
+  }
+
+  private readonly onWatch = (): void => {
+    if (this.socket === null) return;
+    const limit = this.socket.readyState === OPEN ? SILENCE_MS : OPENING_MS;
+    if (Date.now() - this.heardAt > limit) this.onClose(this.socket, 1006);
+  };
+
+  private send(encoder: encoding.Encoder): boolean {
+    if (this.socket?.readyState !== OPEN) return false;
+    this.socket.send(encoding.toUint8Array(encoder) as Uint8Array<ArrayBuffer>);
+    return true;
+  }
+
+  // -- what comes in --------------------------------------------------------------------------
+
+  private onMessage(socket: Socket, data: unknown): void {
+    if (socket !== this.socket) return;
+    this.heardAt = Date.now();
+    if (!(data instanceof ArrayBuffer)) return;
+    try {
+      this.take(decoding.createDecoder(new Uint8Array(data)));
+    } catch (error) {
+      console.error("The room sent something that cannot be read", error);
+      this.onClose(socket, 1006);
+    }
+  }
+
+  private take(decoder: decoding.Decoder): void {
+    switch (decoding.readVarUint(decoder)) {
+      case SYNC:
+        this.takeSync(decoder);
+        break;
+      case AWARENESS: {
+        const update = decoding.readVarUint8Array(decoder);
+        awarenessProtocol.applyAwarenessUpdate(this.awareness, update, this);
+        break;
+      }
+      case QUERY_AWARENESS:
+        this.sendAwareness();
+        break;
+      case ACK: {
+        this.outbox.durable(decoding.readVarUint(decoder));
+        const seq = decoding.readVarUint(decoder);
+        this.say({ unsaved: this.outbox.unsaved, seq });
+        break;
+      }
+    }
+  }
+
+  private takeSync(decoder: decoding.Decoder): void {
+    switch (decoding.readVarUint(decoder)) {
+      case sync.messageYjsSyncStep1: {
+        const encoder = encoding.createEncoder();
+        encoding.writeVarUint(encoder, SYNC);
+        sync.writeSyncStep2(encoder, this.doc, decoding.readVarUint8Array(decoder));
+        if (this.send(encoder)) this.outbox.sentAll();
+        break;
+      }
+      case sync.messageYjsSyncStep2:
+        Y.applyUpdate(this.doc, decoding.readVarUint8Array(decoder), this);
+        this.attempts = 0;
+        this.say({ state: "live", why: undefined });
+        break;
+      case sync.messageYjsUpdate:
+        Y.applyUpdate(this.doc, decoding.readVarUint8Array(decoder), this);
+        break;
+    }
+  }
+
+  // -- what goes out --------------------------------------------------------------------------
+
+  private readonly onUpdate = (
+    update: Uint8Array,
+    origin: unknown,
+    _doc: Y.Doc,
+    transaction: Y.Transaction,
+  ): void => {
+    if (origin === this) return;
+    if (transaction.local) this.outbox.edited();
+    // Until the room asked for what it lacks, everything travels with that answer, in order.
+    if (this.outbox.answered && this.socket?.readyState === OPEN) {
+      const encoder = encoding.createEncoder();
+      encoding.writeVarUint(encoder, SYNC);
+      sync.writeUpdate(encoder, update);
+      if (this.send(encoder)) this.outbox.sentAll();
+    }
+    this.say({ unsaved: this.outbox.unsaved });
+  };
+
+  private readonly onAwareness = (
+    { added, updated, removed }: { added: number[]; updated: number[]; removed: number[] },
+    origin: unknown,
+  ): void => {
+    if (origin === this) return;
+    if ([...added, ...updated, ...removed].includes(this.doc.clientID)) this.sendAwareness();
+  };
+
+  private sendAwareness(): void {
+    const encoder = encoding.createEncoder();
+    encoding.writeVarUint(encoder, AWARENESS);
+    encoding.writeVarUint8Array(
+      encoder,
+      awarenessProtocol.encodeAwarenessUpdate(this.awareness, [this.doc.clientID]),
+    );
+    this.send(encoder);
+  }
+}
