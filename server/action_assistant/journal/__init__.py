@@ -1,1 +1,1 @@
-"""The append-only log of what happened, and the tables folded from it."""
+"""The event log: streams of events, folded into tables that people query."""

@@ -1,0 +1,57 @@
+"""What a journal keeps: events in streams, and caches of what a stream adds up to."""
+
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import msgspec
+from sqlalchemy import Executable
+
+
+class Event(msgspec.Struct, frozen=True):
+    """Something that happened. Never changed, never deleted.
+
+    `seq` is gapless per stream from 1; `position` orders all streams of one journal. `kind` is past
+    tense with a version (`graph.updated.v1`). `at` is in microseconds since 1970, UTC: for people,
+    never for ordering.
+    """
+
+    stream: str
+    seq: int
+    kind: str
+    author: str
+    at: int
+    body: bytes
+    position: int
+
+
+class Draft(msgspec.Struct, frozen=True):
+    """An event before the journal has given it a place and a time."""
+
+    kind: str
+    author: str
+    body: bytes
+
+
+class Addition(msgspec.Struct, frozen=True):
+    """Drafts for one stream. `expected` is the newest `seq` that the caller knows of, or None."""
+
+    stream: str
+    drafts: tuple[Draft, ...]
+    expected: int | None = None
+
+
+class Snapshot(msgspec.Struct, frozen=True):
+    """What a stream added up to at `seq`. A cache: it may vanish at any time."""
+
+    stream: str
+    seq: int
+    state: bytes
+
+
+#: Which statements an event means for the tables. Pure; runs in the transaction of the event.
+Fold: TypeAlias = Callable[[Event], Sequence[Executable]]
+
+
+def nothing(_: Event) -> Sequence[Executable]:
+    """The fold of a journal without tables."""
+    return ()

@@ -1,0 +1,145 @@
+"""Every table of both journals. The scripts in `migrations/` make the same ones, step by step.
+
+`event` and `snapshot` are in both files. Everything else is a fold of the events: it can be thrown
+away and made again. Times are microseconds since 1970, UTC.
+"""
+
+from typing import Final
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Boolean,
+    Column,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    Table,
+    Text,
+)
+
+_NAMES: Final = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "pk": "pk_%(table_name)s",
+}
+
+EDITOR: Final = MetaData(naming_convention=_NAMES)
+RUNNER: Final = MetaData(naming_convention=_NAMES)
+
+
+def _log(metadata: MetaData) -> tuple[Table, Table]:
+    event = Table(
+        "event",
+        metadata,
+        Column("stream", Text, primary_key=True),
+        Column("seq", BigInteger, primary_key=True, autoincrement=False),
+        Column("kind", Text, nullable=False),
+        Column("author", Text, nullable=False),
+        Column("at", BigInteger, nullable=False),
+        Column("body", LargeBinary, nullable=False),
+        Column("position", BigInteger, nullable=False),
+        Index(None, "position", unique=True),
+    )
+    snapshot = Table(
+        "snapshot",
+        metadata,
+        Column("stream", Text, primary_key=True),
+        Column("seq", BigInteger, nullable=False),
+        Column("proof", LargeBinary, nullable=False),
+        Column("state", LargeBinary, nullable=False),
+    )
+    return event, snapshot
+
+
+editor_event, editor_snapshot = _log(EDITOR)
+runner_event, runner_snapshot = _log(RUNNER)
+
+#: What is not a fold.
+LOG: Final = frozenset({"event", "snapshot"})
+
+# --- editor -----------------------------------------------------------------------------------
+
+#: A graph of the catalogue. `name` and `description` follow the document.
+graph: Final = Table(
+    "graph",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("description", Text, nullable=False),
+    Column("made_at", BigInteger, nullable=False),
+    Column("made_by", Text, nullable=False),
+    Column("deleted_at", BigInteger),
+)
+
+#: A published version. Its UMRF stands in the body of the event `(stream, event_seq)`.
+version: Final = Table(
+    "version",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("graph", Text, nullable=False),
+    Column("label", Text, nullable=False),
+    Column("digest", Text, nullable=False),
+    Column("seq", BigInteger, nullable=False),
+    Column("author_id", Text, nullable=False),
+    Column("author_name", Text, nullable=False),
+    Column("at", BigInteger, nullable=False),
+    Column("stream", Text, nullable=False),
+    Column("event_seq", BigInteger, nullable=False),
+    Index(None, "graph", "at"),
+    Index(None, "digest"),
+)
+
+#: Somebody who acted here, under the name they last gave.
+person: Final = Table(
+    "person",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("seen_at", BigInteger, nullable=False),
+)
+
+# --- runner -----------------------------------------------------------------------------------
+
+#: A run. `number` counts for people; `request_id` makes a start happen once; `summary` is the run as
+#: the list shows it.
+run: Final = Table(
+    "run",
+    RUNNER,
+    Column("id", Text, primary_key=True),
+    Column("number", Integer, nullable=False, unique=True),
+    Column("graph", Text),
+    Column("graph_name", Text, nullable=False),
+    Column("version", Text),
+    Column("digest", Text, nullable=False),
+    Column("engine", Text, nullable=False),
+    Column("author_id", Text, nullable=False),
+    Column("author_name", Text, nullable=False),
+    Column("state", Text, nullable=False),
+    Column("desired", Text, nullable=False),
+    Column("simulated", Boolean(create_constraint=False), nullable=False),
+    Column("request_id", Text, nullable=False, unique=True),
+    Column("requested_at", BigInteger, nullable=False),
+    Column("started_at", BigInteger),
+    Column("ended_at", BigInteger),
+    Column("result", Text),
+    Column("stopped_by", Text),
+    Column("summary", JSON, nullable=False),
+    Index(None, "graph", "number"),
+    Index(None, "engine", "number"),
+    Index(None, "state"),
+)
+
+#: A robot that somebody registered, under its wake word.
+robot: Final = Table(
+    "robot",
+    RUNNER,
+    Column("name", Text, primary_key=True),
+    Column("domain", Integer, nullable=False),
+    Column("rmw", Text, nullable=False),
+    Column("get_service", Text, nullable=False),
+    Column("profile", JSON, nullable=False),
+    Column("registered_at", BigInteger, nullable=False),
+    Column("retired_at", BigInteger),
+)
