@@ -1,0 +1,101 @@
+/** One's own name, and light or dark. Asks for the name once. */
+import {
+  Avatar,
+  Button,
+  Group,
+  Popover,
+  SegmentedControl,
+  Stack,
+  Text,
+  TextInput,
+  UnstyledButton,
+  useMantineColorScheme,
+} from "@mantine/core";
+import { IconDeviceDesktop, IconMoon, IconSun } from "@tabler/icons-react";
+import { useState } from "react";
+import { sentence } from "../api/http";
+import { rememberedName } from "../api/session";
+import { initials, personColor } from "../ui/robot";
+import { usePerson } from "./person";
+
+const schemes = [
+  { value: "light", label: <IconSun size={15} aria-label="Light" /> },
+  { value: "dark", label: <IconMoon size={15} aria-label="Dark" /> },
+  { value: "auto", label: <IconDeviceDesktop size={15} aria-label="Like the system" /> },
+];
+
+export function AccountMenu() {
+  const { person, rename } = usePerson();
+  const [asked, setAsked] = useState(() => rememberedName() !== "");
+  const [open, setOpen] = useState(!asked);
+  const [name, setName] = useState(rememberedName() || person.name);
+  const [problem, setProblem] = useState("");
+  const { colorScheme, setColorScheme } = useMantineColorScheme();
+  const save = async () => {
+    try {
+      await rename(name.trim());
+      setAsked(true);
+      setOpen(false);
+    } catch (error) {
+      setProblem(sentence(error));
+    }
+  };
+  return (
+    <Popover opened={open} onChange={setOpen} position="bottom-end" withArrow width={264}>
+      <Popover.Target>
+        <UnstyledButton
+          onClick={() => setOpen((was) => !was)}
+          aria-label={`You are ${person.name}. Name and appearance`}
+          title={person.name}
+        >
+          <Avatar size={28} radius="xl" variant="filled" color={personColor(person.id)}>
+            <Text span size="xs" fw={650} c="var(--on-accent)">
+              {initials(person.name)}
+            </Text>
+          </Avatar>
+        </UnstyledButton>
+      </Popover.Target>
+      <Popover.Dropdown>
+        <form
+          onSubmit={(event) => {
+            event.preventDefault();
+            void save();
+          }}
+        >
+          <Stack gap="sm">
+            {!asked && <Text fw={600}>What should others see you as?</Text>}
+            <Group gap="sm" align="end" wrap="nowrap">
+              <TextInput
+                label="Your name"
+                value={name}
+                maxLength={60}
+                error={problem || undefined}
+                onChange={(event) => setName(event.currentTarget.value)}
+                data-autofocus
+                flex={1}
+              />
+              <Button
+                type="submit"
+                disabled={name.trim() === "" || (asked && name === person.name)}
+              >
+                Save
+              </Button>
+            </Group>
+            <div>
+              <Text size="sm" mb={4}>
+                Appearance
+              </Text>
+              <SegmentedControl
+                fullWidth
+                size="xs"
+                data={schemes}
+                value={colorScheme}
+                onChange={(value) => setColorScheme(value as "light" | "dark" | "auto")}
+              />
+            </div>
+          </Stack>
+        </form>
+      </Popover.Dropdown>
+    </Popover>
+  );
+}

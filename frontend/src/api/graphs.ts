@@ -1,0 +1,122 @@
+/** Graphs, versions and problems as the editor answers them. */
+import { type QueryClient, useQuery } from "@tanstack/react-query";
+import { ask, askText } from "./http";
+
+export interface Config {
+  mode: string;
+  version: string;
+  runner_url: string;
+}
+
+export interface GraphSummary {
+  id: string;
+  name: string;
+  description: string;
+  seq: number;
+  updated_at: string;
+  actions?: number;
+  problems?: { error: number; warning: number };
+}
+
+export interface Author {
+  id: string;
+  name: string;
+}
+
+export interface Version {
+  id: string;
+  graph: string;
+  label: string;
+  digest: string;
+  seq: number;
+  author: Author | string;
+  at: string;
+  umrf?: unknown;
+}
+
+export interface Problem {
+  code: string;
+  severity: "error" | "warning";
+  where: { path?: string; aid?: string; relation?: string };
+  message: string;
+  fix?: string | null;
+}
+
+export interface Problems {
+  seq: number;
+  problems: Problem[];
+}
+
+export const keys = {
+  config: ["config"] as const,
+  graphs: ["graphs"] as const,
+  graph: (id: string) => ["graphs", id] as const,
+  problems: (id: string, seq: number) => ["graphs", id, "problems", seq] as const,
+  versions: (id: string) => ["graphs", id, "versions"] as const,
+  version: (id: string) => ["versions", id] as const,
+};
+
+export function useConfig() {
+  return useQuery({
+    queryKey: keys.config,
+    queryFn: ({ signal }) => ask<Config>("/api/config", { signal }),
+    staleTime: Number.POSITIVE_INFINITY,
+  });
+}
+
+export function useGraphs() {
+  return useQuery({
+    queryKey: keys.graphs,
+    queryFn: ({ signal }) => ask<GraphSummary[]>("/api/graphs", { signal }),
+    refetchInterval: 8_000,
+  });
+}
+
+export function useVersions(graph: string) {
+  return useQuery({
+    queryKey: keys.versions(graph),
+    queryFn: ({ signal }) => ask<Version[]>(`/api/graphs/${graph}/versions`, { signal }),
+  });
+}
+
+/** Problems of the moment `seq`; the last known ones stay until the next answer is there. */
+export function useProblems(graph: string, seq: number) {
+  return useQuery({
+    queryKey: keys.problems(graph, seq),
+    queryFn: ({ signal }) => ask<Problems>(`/api/graphs/${graph}/problems?seq=${seq}`, { signal }),
+    enabled: seq > 0,
+    placeholderData: (before) => before,
+    staleTime: Number.POSITIVE_INFINITY,
+  });
+}
+
+export function createGraph(name: string): Promise<GraphSummary> {
+  return ask("/api/graphs", { method: "POST", body: { name } });
+}
+
+/** Imports a file's text as it is. */
+export function importGraph(text: string): Promise<GraphSummary> {
+  return ask("/api/graphs", { method: "POST", body: text });
+}
+
+export function deleteGraph(id: string): Promise<void> {
+  return ask(`/api/graphs/${id}`, { method: "DELETE" });
+}
+
+export function graphText(id: string): Promise<string> {
+  return askText(`/api/graphs/${id}/umrf`);
+}
+
+/** The version of what the page shows at `seq`, as text, because its numbers must stay as written. */
+export function publish(graph: string, seq: number): Promise<string> {
+  return askText(`/api/graphs/${graph}/versions`, { method: "POST", body: { seq } });
+}
+
+export function authorName(author: Author | string | null | undefined): string {
+  if (!author) return "somebody";
+  return typeof author === "string" ? author : author.name;
+}
+
+export function refreshGraphs(client: QueryClient): Promise<void> {
+  return client.invalidateQueries({ queryKey: keys.graphs, exact: true });
+}

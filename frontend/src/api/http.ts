@@ -1,0 +1,104 @@
+/** Requests to editor and runner, and how they refuse. */
+
+/** RFC 9457 as both processes answer it. */
+export interface ProblemDetails {
+  type: string;
+  title: string;
+  status: number;
+  detail: string;
+  where?: { path?: string; line?: number; column?: number };
+}
+
+/** The server answered, and the answer is no. */
+export class Refusal extends Error {
+  readonly details: ProblemDetails;
+  constructor(details: ProblemDetails) {
+    super(details.detail || details.title);
+    this.name = "Refusal";
+    this.details = details;
+  }
+}
+
+/** Nobody answered. */
+export class Unreachable extends Error {
+  constructor(who: string) {
+    super(`${who} does not answer.`);
+    this.name = "Unreachable";
+  }
+}
+
+export interface Ask {
+  method?: "GET" | "POST" | "PATCH" | "DELETE";
+  /** An object is sent as JSON, a string as it is (also JSON). */
+  body?: unknown;
+  signal?: AbortSignal;
+  /** Milliseconds until an answer must be there. */
+  patience?: number;
+}
+
+const PATIENCE = 20_000; // ms
+
+async function problemOf(response: Response): Promise<ProblemDetails> {
+  const fallback = {
+    type: "refused",
+    title: response.statusText || "Refused",
+    status: response.status,
+    detail: `The server answered ${response.status}.`,
+  };
+  try {
+    const body: unknown = await response.json();
+    if (typeof body !== "object" || body === null) return fallback;
+    return { ...fallback, ...body };
+  } catch {
+    return fallback;
+  }
+}
+
+async function send(url: string, ask: Ask): Promise<Response> {
+  const patience = AbortSignal.timeout(ask.patience ?? PATIENCE);
+  const init: RequestInit = {
+    method: ask.method ?? "GET",
+    credentials: "include",
+    signal: ask.signal ? AbortSignal.any([ask.signal, patience]) : patience,
+  };
+  if (ask.body !== undefined) {
+    init.headers = { "content-type": "application/json" };
+    init.body = typeof ask.body === "string" ? ask.body : JSON.stringify(ask.body);
+  }
+  try {
+    return await fetch(url, init);
+  } catch (error) {
+    if (ask.signal?.aborted) throw error;
+    throw new Unreachable(url.startsWith("/") ? "The editor" : "The runner");
+  }
+}
+
+/** What a route answers, as JSON. Throws `Refusal` or `Unreachable`. */
+export async function ask<T>(url: string, request: Ask = {}): Promise<T> {
+  const response = await send(url, request);
+  if (!response.ok) throw new Refusal(await problemOf(response));
+  if (response.status === 204) return undefined as T;
+  return (await response.json()) as T;
+}
+
+/** What a route answers, as the text it sent, so that `5` and `5.0` stay what they are. */
+export async function askText(url: string, request: Ask = {}): Promise<string> {
+  const response = await send(url, request);
+  if (!response.ok) throw new Refusal(await problemOf(response));
+  return response.text();
+}
+
+/** One sentence for people, whatever went wrong. */
+export function sentence(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
+/** Where in a file a refusal points, in words; empty when it points nowhere. */
+export function place(error: unknown): string {
+  if (!(error instanceof Refusal)) return "";
+  const where = error.details.where;
+  if (where?.line !== undefined) {
+    return `line ${where.line}${where.column === undefined ? "" : `, column ${where.column}`}`;
+  }
+  return where?.path ? `at ${where.path}` : "";
+}

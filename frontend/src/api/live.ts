@@ -1,0 +1,164 @@
+/** The one socket to the runner: live state of runs, and the way for Stop. */
+import { newAid } from "../graph/ids";
+import { postStop, type Run } from "./runs";
+
+export type LiveLink = "connecting" | "live" | "down";
+
+/** A Stop that a person asked for. It is done when the run's own state says so, not before. */
+export interface StopAsked {
+  id: string;
+  run: string | "all";
+  at: number;
+  /** `asked`: nobody has answered yet; `heard`: the runner is stopping; else why it will not. */
+  state: "asked" | "heard" | "refused" | "unheard";
+  detail: string;
+}
+
+export interface LiveNow {
+  link: LiveLink;
+  /** When the link became what it is, ms. */
+  since: number;
+  engines: readonly unknown[];
+  runs: ReadonlyMap<string, Run>;
+  stops: readonly StopAsked[];
+}
+
+type Message =
+  | { type: "hello"; engines: unknown[]; runs: Run[] }
+  | { type: "run"; run: Run }
+  | { type: "beat"; at: string }
+  | { type: "stopping"; stop_id: string; runs: string[] }
+  | { type: "refused"; stop_id: string; detail: string };
+
+const SILENCE = 3_500; // ms; the runner beats each second
+const STOPS_KEPT = 5;
+
+/** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
+export class Live {
+  now: LiveNow = { link: "connecting", since: Date.now(), engines: [], runs: new Map(), stops: [] };
+  readonly #runner: string;
+  readonly #listeners = new Set<() => void>();
+  #socket: WebSocket | null = null;
+  #watch: ReturnType<typeof setTimeout> | undefined;
+  #again: ReturnType<typeof setTimeout> | undefined;
+  #tries = 0;
+  #closed = false;
+
+  constructor(runner: string) {
+    this.#runner = runner;
+  }
+
+  open(): void {
+    this.#closed = false;
+    this.#connect();
+  }
+
+  close(): void {
+    this.#closed = true;
+    clearTimeout(this.#watch);
+    clearTimeout(this.#again);
+    this.#socket?.close();
+    this.#socket = null;
+  }
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  };
+
+  /** Sends Stop over the socket and by POST at once: whichever arrives first counts. */
+  stop(run: string | "all"): void {
+    const id = newAid();
+    this.#putStop({ id, run, at: Date.now(), state: "asked", detail: "" });
+    if (this.#socket?.readyState === WebSocket.OPEN) {
+      this.#socket.send(JSON.stringify({ type: "stop", run, stop_id: id }));
+    }
+    postStop(this.#runner, run).then(
+      () => this.#answerStop(id, "heard", ""),
+      (error: Error) => this.#answerStop(id, "unheard", error.message),
+    );
+  }
+
+  /** Takes in a run that this page has just started, before the socket tells of it. */
+  learn(run: Run): void {
+    if (!this.now.runs.has(run.id)) this.#putRun(run);
+  }
+
+  #connect(): void {
+    if (this.#closed) return;
+    const socket = new WebSocket(`${this.#runner.replace(/^http/, "ws")}/api/live`);
+    this.#socket = socket;
+    this.#expect(socket);
+    socket.onmessage = (event) => {
+      this.#expect(socket);
+      this.#hear(JSON.parse(String(event.data)) as Message);
+    };
+    socket.onclose = () => this.#lost(socket);
+  }
+
+  /** A socket that stays silent is as good as closed, whatever TCP believes. */
+  #expect(socket: WebSocket): void {
+    clearTimeout(this.#watch);
+    this.#watch = setTimeout(() => {
+      this.#lost(socket);
+      socket.close();
+    }, SILENCE);
+  }
+
+  #lost(socket: WebSocket): void {
+    if (this.#socket !== socket) return;
+    this.#socket = null;
+    clearTimeout(this.#watch);
+    if (this.now.link !== "down") this.#set({ link: "down", since: Date.now() });
+    if (this.#closed) return;
+    const wait = Math.min(5_000, 250 * 2 ** this.#tries) * (0.7 + 0.6 * Math.random());
+    this.#tries += 1;
+    this.#again = setTimeout(() => this.#connect(), wait);
+  }
+
+  #hear(message: Message): void {
+    switch (message.type) {
+      case "hello": {
+        this.#tries = 0;
+        const runs = new Map(this.now.runs);
+        const open = new Set(message.runs.map((run) => run.id));
+        // What this page believed to be open and the runner no longer names ended unseen.
+        for (const [id, run] of runs) if (!open.has(id) && run.ended_at === null) runs.delete(id);
+        for (const run of message.runs) runs.set(run.id, run);
+        this.#set({ link: "live", since: Date.now(), engines: message.engines, runs });
+        break;
+      }
+      case "run":
+        this.#putRun(message.run);
+        break;
+      case "stopping":
+        this.#answerStop(message.stop_id, "heard", "");
+        break;
+      case "refused":
+        this.#answerStop(message.stop_id, "refused", message.detail);
+        break;
+      case "beat":
+        break;
+    }
+  }
+
+  #putRun(run: Run): void {
+    this.#set({ runs: new Map(this.now.runs).set(run.id, run) });
+  }
+
+  #putStop(stop: StopAsked): void {
+    this.#set({ stops: [...this.now.stops.slice(1 - STOPS_KEPT), stop] });
+  }
+
+  #answerStop(id: string, state: StopAsked["state"], detail: string): void {
+    const stops = this.now.stops.map((stop) =>
+      stop.id === id && stop.state !== "heard" ? { ...stop, state, detail } : stop,
+    );
+    this.#set({ stops });
+  }
+
+  #set(part: Partial<LiveNow>): void {
+    this.now = { ...this.now, ...part };
+    for (const listener of this.#listeners) listener();
+  }
+}

@@ -1,0 +1,131 @@
+/** What can be said of an action of a run, and of the run, in one word and one tone. */
+import type { ActionRun, Run, Visit } from "./runs";
+
+export type Tone = "idle" | "run" | "true" | "false" | "error" | "stopped" | "done" | "unknown";
+
+export interface Progress {
+  tone: Tone;
+  word: string;
+  /** When the present visit began, ms; null when none goes on. */
+  since: number | null;
+  /** How long the last visit took, ms; null when none ended. */
+  took: number | null;
+  visits: number;
+  inferred: boolean;
+  message: string | null;
+}
+
+const time = (text: string | null | undefined): number | null => (text ? Date.parse(text) : null);
+
+export function begun(visit: Visit): number | null {
+  return time(visit.from) ?? time(visit.not_before) ?? time(visit.not_after);
+}
+
+export function ended(visit: Visit): number | null {
+  return time(visit.until);
+}
+
+const resultTone: Record<string, Tone> = {
+  true: "true",
+  false: "false",
+  error: "error",
+  stopped: "stopped",
+  on_true: "true",
+  on_false: "false",
+  on_error: "error",
+  on_stopped: "stopped",
+  on_halted: "stopped",
+};
+
+function finished(visit: Visit | undefined): { tone: Tone; word: string } {
+  const result = visit?.result;
+  if (!result) return { tone: "done", word: "finished" };
+  const tone = resultTone[result] ?? "done";
+  return { tone, word: result.replace(/^on_/, "") };
+}
+
+function stateOf(action: ActionRun, over: boolean, unsure: boolean): { tone: Tone; word: string } {
+  const last = action.visits.at(-1);
+  switch (action.state) {
+    case "RUNNING":
+      if (over) return finished(last);
+      return unsure ? { tone: "unknown", word: "unknown" } : { tone: "run", word: "running" };
+    case "PAUSE_REQUESTED":
+      return { tone: "run", word: "pausing" };
+    case "PAUSED":
+      return { tone: "stopped", word: "paused" };
+    case "STOPPING":
+      return { tone: "stopped", word: "stopping" };
+    case "BYPASSED":
+      return { tone: "done", word: "passed over" };
+    case "ERROR":
+      return { tone: "error", word: "error" };
+    case "FINISHED":
+      return finished(last);
+    default:
+      if (last !== undefined && ended(last) !== null) return finished(last);
+      return { tone: "idle", word: over ? "did not run" : "waits" };
+  }
+}
+
+/** `unsure`: nobody has heard of the run for too long. */
+export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progress {
+  const over = run.ended_at !== null;
+  const { tone, word } = stateOf(action, over, unsure || run.state === "unknown");
+  const last = action.visits.at(-1);
+  const from = last ? begun(last) : null;
+  const until = last ? ended(last) : null;
+  return {
+    tone,
+    word,
+    since: until === null && !over ? from : null,
+    took: from !== null && until !== null ? until - from : null,
+    visits: action.visits.length,
+    inferred: last?.how === "inferred",
+    message: action.messages.at(-1)?.text ?? null,
+  };
+}
+
+/** Progress by `aid`; actions of sub-graphs, which carry none, are left out. */
+export function progressByAid(run: Run | null, unsure: boolean): Map<string, Progress> {
+  const found = new Map<string, Progress>();
+  if (run === null) return found;
+  for (const action of Object.values(run.actions ?? {})) {
+    if (action.aid) found.set(action.aid, progressOf(action, run, unsure));
+  }
+  return found;
+}
+
+const runWords: Record<Run["state"], { tone: Tone; word: string }> = {
+  requested: { tone: "run", word: "requested" },
+  published: { tone: "run", word: "starting" },
+  running: { tone: "run", word: "running" },
+  paused: { tone: "stopped", word: "paused" },
+  stopping: { tone: "stopped", word: "stopping" },
+  unknown: { tone: "unknown", word: "unknown" },
+  finished: { tone: "true", word: "finished" },
+  halted: { tone: "stopped", word: "halted" },
+  stopped: { tone: "stopped", word: "stopped" },
+  error: { tone: "error", word: "error" },
+  refused: { tone: "error", word: "refused" },
+  lost: { tone: "unknown", word: "lost" },
+};
+
+/** The run's state, with the result where it has one that says more. */
+export function runWord(run: Run): { tone: Tone; word: string } {
+  if (run.state === "finished" && run.result && run.result !== "on_true") {
+    const word = run.result.replace(/^on_/, "");
+    return { tone: resultTone[run.result] ?? "done", word: `finished: ${word}` };
+  }
+  return runWords[run.state] ?? { tone: "unknown", word: run.state };
+}
+
+/** The end in words, for history. */
+export function endWords(run: Run): string {
+  const { word } = runWord(run);
+  const by = typeof run.stopped_by === "string" ? run.stopped_by : run.stopped_by?.name;
+  if (run.state === "stopped" && by) return `stopped by ${by}`;
+  if (run.state === "lost") return "lost: nothing proves its end";
+  if (run.state === "finished" && run.result === "on_true") return "finished";
+  return word;
+}

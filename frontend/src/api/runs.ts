@@ -1,0 +1,123 @@
+/** Runs as the runner tells them. */
+import { useQuery } from "@tanstack/react-query";
+import { ask } from "./http";
+
+export type RunState =
+  | "requested"
+  | "published"
+  | "running"
+  | "paused"
+  | "stopping"
+  | "unknown"
+  | "finished"
+  | "halted"
+  | "stopped"
+  | "error"
+  | "refused"
+  | "lost";
+
+export type RunResult = "on_true" | "on_false" | "on_error" | "on_stopped" | "on_halted";
+
+export type VisitResult = "true" | "false" | "error" | "stopped" | null;
+
+/** One time that an action ran: it began between `from` bounds and ended at `until`. */
+export interface Visit {
+  from: string | null;
+  not_before: string | null;
+  not_after: string | null;
+  until: string | null;
+  result: VisitResult;
+  how: "observed" | "inferred";
+}
+
+export interface ActionRun {
+  aid: string | null;
+  state: string;
+  visits: Visit[];
+  messages: { at: string; text: string }[];
+}
+
+export interface Run {
+  id: string;
+  number: number;
+  graph: string;
+  graph_name: string;
+  version: string;
+  digest: string;
+  engine: string;
+  simulated: boolean;
+  state: RunState;
+  desired: "running" | "paused" | "stopped";
+  proof_at: string | null;
+  unknown_since: string | null;
+  result: RunResult | null;
+  started_at: string | null;
+  ended_at: string | null;
+  author: { id: string; name: string } | null;
+  stopped_by: { id: string; name: string } | string | null;
+  alarms: unknown[];
+  actions?: Record<string, ActionRun>;
+  umrf?: unknown;
+}
+
+const ENDED: ReadonlySet<RunState> = new Set<RunState>([
+  "finished",
+  "halted",
+  "stopped",
+  "error",
+  "refused",
+  "lost",
+]);
+
+export function hasEnded(run: Run): boolean {
+  return ENDED.has(run.state);
+}
+
+export interface StartOrder {
+  runner: string;
+  version: string;
+  digest: string;
+  /** JSON text, sent exactly as the editor gave it. */
+  umrf: string;
+  graph: string;
+  engine: string;
+  request: string;
+}
+
+/** Starts a version by value. The same `request` never starts twice. */
+export function startRun(order: StartOrder): Promise<Run> {
+  const head = JSON.stringify({
+    version: order.version,
+    digest: order.digest,
+    graph: order.graph,
+    engine: order.engine,
+    request_id: order.request,
+  });
+  return ask(`${order.runner}/api/runs`, {
+    method: "POST",
+    body: `${head.slice(0, -1)},"umrf":${order.umrf}}`,
+  });
+}
+
+/** Asks to stop one run, or all of them. */
+export function postStop(runner: string, run: string | "all"): Promise<unknown> {
+  const path = run === "all" ? "/api/stop" : `/api/runs/${encodeURIComponent(run)}/stop`;
+  return ask(`${runner}${path}`, { method: "POST", patience: 6_000 });
+}
+
+export function useRuns(runner: string | undefined, graph?: string) {
+  const filter = graph === undefined ? "" : `&graph=${encodeURIComponent(graph)}`;
+  return useQuery({
+    queryKey: ["runs", "list", graph ?? ""],
+    queryFn: ({ signal }) => ask<Run[]>(`${runner}/api/runs?limit=200${filter}`, { signal }),
+    enabled: runner !== undefined,
+  });
+}
+
+export function useRun(runner: string | undefined, id: string) {
+  return useQuery({
+    queryKey: ["runs", "one", id],
+    queryFn: ({ signal }) => ask<Run>(`${runner}/api/runs/${encodeURIComponent(id)}`, { signal }),
+    enabled: runner !== undefined,
+  });
+}

@@ -1,0 +1,50 @@
+/** Who this browser is: trades the token of the link for a cookie. */
+import { ask } from "./http";
+
+export interface Person {
+  id: string;
+  name: string;
+}
+
+const NAME_KEY = "aa.name";
+
+/** The token in the address (`#t=…`), which is erased from it at once. */
+export function takeToken(): string | null {
+  const found = /[#&]t=([^&]+)/.exec(location.hash);
+  if (!found?.[1]) return null;
+  history.replaceState(history.state, "", location.pathname + location.search);
+  return decodeURIComponent(found[1]);
+}
+
+export function rememberedName(): string {
+  return localStorage.getItem(NAME_KEY) ?? "";
+}
+
+interface SessionAnswer {
+  person?: Person;
+  id?: string;
+  name?: string;
+}
+
+function personOf(answer: SessionAnswer): Person {
+  return answer.person ?? { id: answer.id ?? "", name: answer.name ?? "" };
+}
+
+/** Trades a token for a session. Throws `Refusal` when it is not the server's. */
+export async function openSession(token: string): Promise<Person> {
+  const name = rememberedName();
+  const body = name === "" ? { token } : { token, name };
+  return personOf(await ask<SessionAnswer>("/api/session", { method: "POST", body }));
+}
+
+/** Who the cookie says we are. Throws a `Refusal` with status 401 without one. */
+export async function currentPerson(): Promise<Person> {
+  return personOf(await ask<SessionAnswer>("/api/session"));
+}
+
+/** The same session under another name. */
+export async function rename(name: string): Promise<Person> {
+  const answer = await ask<SessionAnswer>("/api/session", { method: "PATCH", body: { name } });
+  localStorage.setItem(NAME_KEY, name);
+  return personOf(answer);
+}

@@ -1,0 +1,59 @@
+/** The live socket and the runner's address for React. */
+import {
+  createContext,
+  type ReactNode,
+  use,
+  useEffect,
+  useState,
+  useSyncExternalStore,
+} from "react";
+import { useConfig } from "./graphs";
+import { Live, type LiveNow } from "./live";
+import type { Run } from "./runs";
+
+interface LiveHold {
+  live: Live | null;
+  runner: string | undefined;
+}
+
+const Context = createContext<LiveHold>({ live: null, runner: undefined });
+
+/** Holds the page's one socket to the runner. */
+export function LiveProvider({ children }: { children: ReactNode }) {
+  const runner = useConfig().data?.runner_url;
+  const [live, setLive] = useState<Live | null>(null);
+  useEffect(() => {
+    if (runner === undefined) return;
+    const fresh = new Live(runner);
+    fresh.open();
+    setLive(fresh);
+    return () => fresh.close();
+  }, [runner]);
+  return <Context value={{ live, runner }}>{children}</Context>;
+}
+
+const NOTHING: LiveNow = { link: "connecting", since: 0, engines: [], runs: new Map(), stops: [] };
+const never = () => () => {};
+
+export function useLive(): LiveHold & { now: LiveNow } {
+  const hold = use(Context);
+  const { live } = hold;
+  const now = useSyncExternalStore(live?.subscribe ?? never, () => live?.now ?? NOTHING);
+  return { ...hold, now };
+}
+
+/** The runs that go on, newest first, as far as this page knows. */
+export function openRuns(now: LiveNow): Run[] {
+  return [...now.runs.values()]
+    .filter((run) => run.ended_at === null)
+    .sort((a, b) => b.number - a.number);
+}
+
+/** The newest run of a graph that this page has heard of live. */
+export function newestRun(now: LiveNow, graph: string): Run | null {
+  let newest: Run | null = null;
+  for (const run of now.runs.values()) {
+    if (run.graph === graph && (newest === null || run.number > newest.number)) newest = run;
+  }
+  return newest;
+}

@@ -1,0 +1,42 @@
+/** What a run was, in a table. */
+
+import { endWords } from "../api/progress";
+import type { Run } from "../api/runs";
+import { clock, day, duration, instant, useNow } from "../ui/when";
+import style from "./facts.module.css";
+
+interface Props {
+  run: Run;
+  version: string;
+  by: string;
+}
+
+export function Facts({ run, version, by }: Props) {
+  const now = useNow(60_000);
+  const start = instant(run.started_at);
+  const end = instant(run.ended_at);
+  const moment = (at: number | null) => (at === null ? "—" : `${day(at, now)} ${clock(at)}`);
+  const rows: [string, string][] = [
+    ["Graph", run.graph_name],
+    ["Version", version],
+    ["Digest", run.digest],
+    ["Engine", run.simulated ? "simulator" : run.engine],
+    ["Started by", by],
+    ["Started", moment(start)],
+    ["Ended", moment(end)],
+    ["Took", start !== null && end !== null ? duration(end - start) : "—"],
+    ["End", end === null ? "goes on" : endWords(run)],
+    ["Result", run.result?.replace(/^on_/, "") ?? "—"],
+    ["Last proof", moment(instant(run.proof_at))],
+  ];
+  return (
+    <dl className={style.facts}>
+      {rows.map(([name, value]) => (
+        <div key={name}>
+          <dt>{name}</dt>
+          <dd className={name === "Digest" ? style.mono : undefined}>{value}</dd>
+        </div>
+      ))}
+    </dl>
+  );
+}

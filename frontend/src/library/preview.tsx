@@ -1,0 +1,103 @@
+/** A graph in miniature: cards as blocks, arrows as lines in the colours of their outcomes. */
+import { useQuery } from "@tanstack/react-query";
+import { useMemo } from "react";
+import { graphText } from "../api/graphs";
+import { ENTRY, EXIT, type Graph, spoken } from "../graph/model";
+import { CARD, PILL, placesOf } from "../ui/canvas/arrange";
+import { fromUmrf } from "../ui/canvas/from-umrf";
+import { outcomeColor } from "../ui/outcome";
+import { robotColor } from "../ui/robot";
+
+const MARGIN = 40;
+
+interface Box {
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+}
+
+function boxes(graph: Graph): Map<string, Box> {
+  const found = new Map<string, Box>();
+  for (const [key, [x, y]] of placesOf(graph)) {
+    const end = key === ENTRY || key === EXIT;
+    found.set(key, { x, y, ...(end ? PILL : CARD) });
+  }
+  return found;
+}
+
+export function Miniature({ graph }: { graph: Graph }) {
+  const places = useMemo(() => boxes(graph), [graph]);
+  const all = [...places.values()];
+  const left = Math.min(...all.map((box) => box.x)) - MARGIN;
+  const top = Math.min(...all.map((box) => box.y)) - MARGIN;
+  const right = Math.max(...all.map((box) => box.x + box.width)) + MARGIN;
+  const bottom = Math.max(...all.map((box) => box.y + box.height)) + MARGIN;
+  return (
+    <svg
+      viewBox={`${left} ${top} ${right - left} ${bottom - top}`}
+      width="100%"
+      height="100%"
+      aria-hidden
+      focusable="false"
+    >
+      {graph.relations.map((relation) => {
+        const from = places.get(relation.parent);
+        const to = places.get(relation.child);
+        if (!from || !to) return null;
+        const [x1, y1] = [from.x + from.width / 2, from.y + from.height];
+        const [x2, y2] = [to.x + to.width / 2, to.y];
+        const bend = Math.max(30, Math.abs(y2 - y1) / 2);
+        const outcome = spoken(relation.conditions)[0] ?? "on_true";
+        const color = relation.parent === ENTRY ? "var(--ink4)" : outcomeColor[outcome];
+        return (
+          <path
+            key={`${relation.parent}>${relation.child};${relation.listing}`}
+            d={`M${x1} ${y1}C${x1} ${y1 + bend} ${x2} ${y2 - bend} ${x2} ${y2}`}
+            fill="none"
+            strokeWidth={5}
+            style={{ stroke: color }}
+          />
+        );
+      })}
+      {[...places].map(([key, box]) => {
+        const end = key === ENTRY || key === EXIT;
+        const action = graph.actions.find((candidate) => candidate.key === key);
+        return (
+          <g key={key}>
+            <rect
+              {...box}
+              rx={end ? 16 : 16}
+              strokeWidth={4}
+              style={{
+                fill: "var(--raised)",
+                stroke: key === ENTRY ? "var(--true)" : "var(--line2)",
+              }}
+            />
+            {action && (
+              <rect
+                x={box.x + 10}
+                y={box.y + 18}
+                width={7}
+                height={box.height - 36}
+                rx={3}
+                style={{ fill: robotColor(action.actor) }}
+              />
+            )}
+          </g>
+        );
+      })}
+    </svg>
+  );
+}
+
+export function Preview({ graph, seq }: { graph: string; seq: number }) {
+  const umrf = useQuery({
+    queryKey: ["graphs", graph, "umrf", seq],
+    queryFn: () => graphText(graph).then((text) => JSON.parse(text) as unknown),
+    staleTime: Number.POSITIVE_INFINITY,
+    retry: false,
+  });
+  const drawn = useMemo(() => (umrf.data === undefined ? null : fromUmrf(umrf.data)), [umrf.data]);
+  return drawn === null ? null : <Miniature graph={drawn} />;
+}

@@ -1,0 +1,125 @@
+/** The list on the left: graphs to open, actions to place. */
+import { ActionIcon, Kbd, TextInput, Tooltip } from "@mantine/core";
+import { IconFileImport, IconGripVertical, IconPlus, IconSearch } from "@tabler/icons-react";
+import { useState } from "react";
+import { useGraphs } from "../api/graphs";
+import type { NewAction } from "../graph/edit";
+import { actionCarrier } from "../ui/carry";
+import { GraphRow, RowSkeletons } from "./graph-rows";
+import { type KnownAction, signature, useKnownActions } from "./known";
+import style from "./sidebar.module.css";
+
+interface Props {
+  current?: string;
+  onNew: () => void;
+  onImport: () => void;
+  /** Puts an action on the canvas; absent where there is none. */
+  onPlace?: (template: NewAction) => void;
+}
+
+export function fits(search: string, ...texts: (string | undefined)[]): boolean {
+  const words = search.toLowerCase().split(/\s+/).filter(Boolean);
+  const all = texts.join(" ").toLowerCase();
+  return words.every((word) => all.includes(word));
+}
+
+function ActionRow({ known, onPlace }: { known: KnownAction; onPlace: (t: NewAction) => void }) {
+  const { template, used } = known;
+  return (
+    <button
+      type="button"
+      className={style.row}
+      title={template.description || template.name}
+      onPointerDown={(event) => actionCarrier.press(event, template, template.name)}
+      onClick={() => onPlace(template)}
+    >
+      <span className={style.grip} aria-hidden>
+        <IconGripVertical size={14} />
+      </span>
+      <span className={style.text}>
+        <span className={style.name}>{template.name}</span>
+        <span className={style.sub}>
+          {signature(template)}
+          {used > 0 && ` · used in ${used}`}
+        </span>
+      </span>
+    </button>
+  );
+}
+
+function ActionList({ search, onPlace }: { search: string; onPlace: (t: NewAction) => void }) {
+  const { actions, ready } = useKnownActions();
+  const shown = actions.filter(({ template }) =>
+    fits(search, template.name, template.description, signature(template)),
+  );
+  const fresh = search.trim();
+  const exact = shown.some(({ template }) => template.name === fresh);
+  if (!ready) return <RowSkeletons count={4} />;
+  return (
+    <>
+      {shown.map((known) => (
+        <ActionRow key={known.template.name} known={known} onPlace={onPlace} />
+      ))}
+      {fresh !== "" && !exact && (
+        <ActionRow known={{ template: { name: fresh }, used: 0 }} onPlace={onPlace} />
+      )}
+      {shown.length === 0 && fresh === "" && (
+        <p className={style.hint}>
+          Actions appear here once a graph uses them. Type a name above to make a new one.
+        </p>
+      )}
+    </>
+  );
+}
+
+export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
+  const [search, setSearch] = useState("");
+  const graphs = useGraphs();
+  const shown = (graphs.data ?? []).filter((graph) => fits(search, graph.name, graph.description));
+  return (
+    <div className={style.sidebar}>
+      <TextInput
+        aria-label="Search graphs and actions"
+        placeholder="Search graphs and actions"
+        leftSection={<IconSearch size={15} aria-hidden />}
+        rightSection={search === "" ? <Kbd>/</Kbd> : undefined}
+        value={search}
+        onChange={(event) => setSearch(event.currentTarget.value)}
+        data-search
+      />
+      <div className={style.scroll}>
+        <div className={style.heading}>
+          <h2>Graphs</h2>
+          <Tooltip label="Import a file">
+            <ActionIcon size="sm" aria-label="Import a file" onClick={onImport}>
+              <IconFileImport size={15} />
+            </ActionIcon>
+          </Tooltip>
+          <Tooltip label="New graph">
+            <ActionIcon size="sm" aria-label="New graph" onClick={onNew}>
+              <IconPlus size={15} />
+            </ActionIcon>
+          </Tooltip>
+        </div>
+        {graphs.isPending && <RowSkeletons count={4} />}
+        <nav aria-label="Graphs">
+          {shown.map((graph) => (
+            <GraphRow key={graph.id} graph={graph} current={graph.id === current} />
+          ))}
+        </nav>
+        {graphs.isSuccess && shown.length === 0 && (
+          <p className={style.hint}>{search === "" ? "No graph yet." : "No graph is called so."}</p>
+        )}
+        {onPlace && (
+          <>
+            <div className={style.heading}>
+              <h2>Actions</h2>
+              <span className={style.how}>drag or tap to place</span>
+            </div>
+            <ActionList search={search} onPlace={onPlace} />
+          </>
+        )}
+      </div>
+    </div>
+  );
+}

@@ -1,0 +1,77 @@
+/** The strip under the canvas: the newest run of the graph as it goes. */
+import { Button, Text } from "@mantine/core";
+import { IconTimeline } from "@tabler/icons-react";
+import { useMemo } from "react";
+import { Link } from "wouter";
+import { authorName } from "../api/graphs";
+import { endWords, runWord } from "../api/progress";
+import type { Run } from "../api/runs";
+import { useLive } from "../api/use-live";
+import type { Graph } from "../graph/model";
+import { lanesOf } from "../ui/lanes";
+import { StateWord } from "../ui/state-word";
+import { Timeline } from "../ui/timeline";
+import { clock, instant, stopwatch, useNow } from "../ui/when";
+import style from "./run-strip.module.css";
+
+interface Props {
+  run: Run | null;
+  graph: Graph;
+  versionLabel: string;
+  selected: string | null;
+  onPick: (aid: string) => void;
+}
+
+export function RunStrip({ run, graph, versionLabel, selected, onPick }: Props) {
+  const { now } = useLive();
+  const goes = run !== null && run.ended_at === null;
+  const present = useNow(250, goes);
+  const lanes = useMemo(() => (run ? lanesOf(run, graph) : []), [run, graph]);
+  if (run === null) {
+    return (
+      <section className={style.strip} aria-label="Run">
+        <div className={style.none}>
+          <IconTimeline size={18} aria-hidden />
+          <span>
+            Not run yet. Hold <b>Start</b> and every action appears here as a lane, while it runs.
+          </span>
+        </div>
+      </section>
+    );
+  }
+  const down = now.link === "down";
+  const start = instant(run.started_at) ?? present;
+  const until = down ? now.since : present;
+  const { tone, word } = runWord(run);
+  const unsure = down && goes;
+  return (
+    <section className={style.strip} aria-label="Run">
+      <header className={style.head}>
+        <b>Run {run.number}</b>
+        <span className={style.version}>{versionLabel}</span>
+        <StateWord
+          pill
+          tone={unsure ? "unknown" : tone}
+          word={unsure ? `unknown since ${clock(now.since)}` : goes ? word : endWords(run)}
+        />
+        <Text span c="dimmed" size="xs" truncate>
+          {run.simulated && "simulated · "}
+          started by {authorName(run.author)} at {clock(start)} ·{" "}
+          {stopwatch((instant(run.ended_at) ?? until) - start)}
+        </Text>
+        <span className={style.gap} />
+        <Button component={Link} to={`/runs/${run.id}`} size="compact-xs" variant="subtle">
+          Open run
+        </Button>
+      </header>
+      <Timeline
+        run={run}
+        lanes={lanes}
+        until={until}
+        unsure={unsure}
+        selected={selected}
+        onPick={onPick}
+      />
+    </section>
+  );
+}

@@ -1,0 +1,103 @@
+/** An action on the canvas: robot, name, state, two parameters; input above, four outcomes below. */
+import { IconAlertTriangleFilled, IconGhost2 } from "@tabler/icons-react";
+import { Handle, type NodeProps, Position } from "@xyflow/react";
+import { memo } from "react";
+import type { Progress } from "../../api/progress";
+import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../outcome";
+import { robotColor } from "../robot";
+import { StateWord } from "../state-word";
+import { duration, stopwatch, useNow } from "../when";
+import style from "./action-card.module.css";
+import type { CardNode, ProblemCount } from "./elements";
+import { cardLines } from "./value-text";
+
+function ProgressLine({ progress }: { progress: Progress | null }) {
+  const going = progress?.since != null;
+  const now = useNow(1000, going);
+  if (progress === null) return null;
+  const parts: string[] = [];
+  if (progress.since !== null) parts.push(stopwatch(now - progress.since));
+  else if (progress.took !== null) parts.push(duration(progress.took));
+  if (progress.visits > 1) parts.push(`${progress.visits}×`);
+  const more = parts.join(" · ");
+  return <StateWord tone={progress.tone} word={progress.word} {...(more === "" ? {} : { more })} />;
+}
+
+function ProblemBadge({ problems }: { problems: ProblemCount }) {
+  const worst = problems.error > 0 ? "error" : "warning";
+  const count = problems.error + problems.warning;
+  const words = `${count} ${count === 1 ? "problem" : "problems"}`;
+  return (
+    <span className={style.badge} data-worst={worst} title={words}>
+      <IconAlertTriangleFilled size={10} aria-hidden /> {count}
+      <span className="visually-hidden">{words}</span>
+    </span>
+  );
+}
+
+export const ActionCard = memo(function ActionCard({
+  data,
+  selected,
+  isConnectable,
+}: NodeProps<CardNode>) {
+  const { action, progress, problems } = data;
+  const lines = cardLines(action.inputs, 2);
+  const color = robotColor(action.actor);
+  return (
+    <div
+      className={style.card}
+      style={{ "--c": color } as React.CSSProperties}
+      data-selected={selected || undefined}
+      data-tone={progress?.tone}
+      data-ghost={action.missing || undefined}
+    >
+      <Handle
+        type="target"
+        id="in"
+        position={Position.Top}
+        className={style.input ?? ""}
+        isConnectable={isConnectable}
+        aria-label={`Input of ${action.name} ${action.instanceId}`}
+      />
+      {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
+      {problems && <ProblemBadge problems={problems} />}
+      <div className={style.head}>
+        <b className={style.name} title={action.name}>
+          {action.missing && <IconGhost2 size={13} aria-hidden />}
+          {action.name}
+        </b>
+        <span className={style.instance}>{action.instanceId}</span>
+      </div>
+      {action.missing ? (
+        <div className={style.hint}>named by an arrow, but not there</div>
+      ) : (
+        <ProgressLine progress={progress} />
+      )}
+      {lines.length > 0 && (
+        <div className={style.lines}>
+          {lines.map((line) => (
+            <div key={line} title={line}>
+              {line}
+            </div>
+          ))}
+        </div>
+      )}
+      {OUTCOMES.map((outcome, i) => (
+        <Handle
+          key={outcome}
+          type="source"
+          id={outcome}
+          position={Position.Bottom}
+          className={style.outcome ?? ""}
+          isConnectable={isConnectable}
+          data-outcome={outcome}
+          aria-label={`When ${outcomeWord[outcome]}`}
+          title={`When ${action.name} ${action.instanceId} is ${outcomeWord[outcome]}`}
+          style={{ left: `${14 + i * 24}%`, color: outcomeColor[outcome] }}
+        >
+          <OutcomeSign outcome={outcome} size={11} />
+        </Handle>
+      ))}
+    </div>
+  );
+});

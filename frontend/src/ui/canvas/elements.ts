@@ -1,0 +1,174 @@
+/** A graph as nodes and edges of the canvas; what did not change keeps its identity. */
+import type { Edge, Node } from "@xyflow/react";
+import type { Progress } from "../../api/progress";
+import { relationId } from "../../graph/layout";
+import {
+  type Action,
+  ENTRY,
+  EXIT,
+  type Graph,
+  type Key,
+  type Precondition,
+  type Relation,
+  type Response,
+  spoken,
+} from "../../graph/model";
+import { OUTCOMES } from "../outcome";
+import type { Places } from "./arrange";
+
+export interface ProblemCount {
+  readonly error: number;
+  readonly warning: number;
+}
+
+export type CardNode = Node<
+  { action: Action; progress: Progress | null; problems: ProblemCount | null },
+  "action"
+>;
+export type EndNode = Node<{ end: "entry" | "exit"; progress: null }, "end">;
+export type CanvasNode = CardNode | EndNode;
+
+export interface Answer {
+  readonly outcomes: readonly Precondition[];
+  readonly response: Response;
+}
+
+export type Arrow = Edge<
+  {
+    relation: string;
+    outcome: Precondition;
+    response: Response;
+    /** What the whole relation says; only the first arrow of a relation carries the label. */
+    answers: readonly Answer[] | null;
+    optional: boolean;
+    lead: boolean;
+    entry: boolean;
+    lit: boolean;
+  },
+  "outcome"
+>;
+
+/** The outcomes that get the same response, together, in the fixed order of outcomes. */
+export function answersOf(relation: Relation): Answer[] {
+  const answers: { outcomes: Precondition[]; response: Response }[] = [];
+  for (const outcome of OUTCOMES) {
+    const response = relation.conditions[outcome];
+    if (response === "ignore") continue;
+    const known = answers.find((answer) => answer.response === response);
+    if (known) known.outcomes.push(outcome);
+    else answers.push({ outcomes: [outcome], response });
+  }
+  return answers;
+}
+
+export interface NodeOptions {
+  places: Places;
+  selected: ReadonlySet<string>;
+  progress: ReadonlyMap<Key, Progress>;
+  problems: ReadonlyMap<Key, ProblemCount>;
+  measured: ReadonlyMap<Key, { width?: number; height?: number }>;
+}
+
+function place(key: Key, options: NodeOptions) {
+  const [x, y] = options.places.get(key) ?? [0, 0];
+  const measured = options.measured.get(key);
+  return {
+    id: key,
+    position: { x, y },
+    selected: options.selected.has(key),
+    ...(measured ? { measured } : {}),
+  };
+}
+
+export function nodesOf(graph: Graph, options: NodeOptions): CanvasNode[] {
+  const ends = ([ENTRY, EXIT] as const).map(
+    (end): EndNode => ({
+      ...place(end, options),
+      type: "end",
+      data: { end: end as "entry" | "exit", progress: null },
+      deletable: false,
+    }),
+  );
+  const cards = graph.actions.map(
+    (action): CardNode => ({
+      ...place(action.key, options),
+      type: "action",
+      data: {
+        action,
+        progress: options.progress.get(action.key) ?? null,
+        problems: options.problems.get(action.key) ?? null,
+      },
+    }),
+  );
+  return [...ends, ...cards];
+}
+
+/** Whether the arrow has been taken: its parent ended this way in its last visit. */
+function isLit(relation: Relation, outcome: Precondition, options: NodeOptions): boolean {
+  const parent = options.progress.get(relation.parent);
+  if (relation.parent === ENTRY) return options.progress.size > 0;
+  return parent !== undefined && `on_${parent.tone}` === outcome;
+}
+
+function arrowsOf(relation: Relation, options: NodeOptions): Arrow[] {
+  const id = relationId(relation);
+  const outcomes = spoken(relation.conditions);
+  const shown: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
+  const entry = relation.parent === ENTRY;
+  return shown.map((outcome, i) => ({
+    id: `${id}|${outcome}`,
+    type: "outcome",
+    source: relation.parent,
+    target: relation.child,
+    sourceHandle: entry ? "start" : outcome,
+    targetHandle: "in",
+    selected: options.selected.has(id),
+    data: {
+      relation: id,
+      outcome,
+      response: relation.conditions[outcome],
+      answers: i === 0 && !entry ? answersOf(relation) : null,
+      optional: !relation.required,
+      lead: i === 0,
+      entry,
+      lit: isLit(relation, outcome, options),
+    },
+  }));
+}
+
+export function edgesOf(graph: Graph, options: NodeOptions): Arrow[] {
+  const there = new Set<Key>([ENTRY, EXIT, ...graph.actions.map((action) => action.key)]);
+  return graph.relations
+    .filter(({ parent, child }) => there.has(parent) && there.has(child))
+    .flatMap((relation) => arrowsOf(relation, options));
+}
+
+/** `next`, with every element of `before` that says the same in its place. */
+export function keep<T extends { id: string; data?: object }>(
+  before: readonly T[],
+  next: T[],
+): T[] {
+  const old = new Map(before.map((item) => [item.id, item]));
+  let changed = before.length !== next.length;
+  const kept = next.map((item, i) => {
+    const known = old.get(item.id);
+    const same = known !== undefined && alike(known, item);
+    if (!same || before[i] !== known) changed = true;
+    return same ? known : item;
+  });
+  return changed ? kept : (before as T[]);
+}
+
+function alike(a: object, b: object): boolean {
+  const keys = Object.keys(a);
+  if (keys.length !== Object.keys(b).length) return false;
+  return keys.every((key) => {
+    const [x, y] = [(a as Record<string, unknown>)[key], (b as Record<string, unknown>)[key]];
+    if (Object.is(x, y)) return true;
+    return isPlain(x) && isPlain(y) && alike(x, y);
+  });
+}
+
+function isPlain(value: unknown): value is object {
+  return typeof value === "object" && value !== null;
+}

@@ -1,0 +1,28 @@
+/** Entry and exit of a graph. */
+import { IconFlag, IconPlayerPlayFilled } from "@tabler/icons-react";
+import { Handle, type NodeProps, Position } from "@xyflow/react";
+import { memo } from "react";
+import type { EndNode } from "./elements";
+import style from "./end-pill.module.css";
+
+export const EndPill = memo(function EndPill({
+  data,
+  selected,
+  isConnectable,
+}: NodeProps<EndNode>) {
+  const entry = data.end === "entry";
+  return (
+    <div className={style.pill} data-end={data.end} data-selected={selected || undefined}>
+      {entry ? <IconPlayerPlayFilled size={11} aria-hidden /> : <IconFlag size={13} aria-hidden />}
+      {entry ? "Entry" : "Exit"}
+      <Handle
+        type={entry ? "source" : "target"}
+        id={entry ? "start" : "in"}
+        position={entry ? Position.Bottom : Position.Top}
+        className={style.handle ?? ""}
+        isConnectable={isConnectable}
+        aria-label={entry ? "Start with" : "End with"}
+      />
+    </div>
+  );
+});

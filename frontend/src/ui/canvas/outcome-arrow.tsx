@@ -1,0 +1,143 @@
+/** An arrow from one outcome to what answers it, with the relation's answers in words. */
+import { BaseEdge, EdgeLabelRenderer, type EdgeProps, getBezierPath } from "@xyflow/react";
+import { memo } from "react";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../outcome";
+import type { Answer, Arrow } from "./elements";
+import style from "./outcome-arrow.module.css";
+
+interface Line {
+  path: string;
+  x: number;
+  y: number;
+}
+
+/** Round the side for an arrow that leads back up, so that loops can be told from the way down. */
+function backwards(sx: number, sy: number, tx: number, ty: number): Line {
+  const side = Math.max(sx, tx) + 150;
+  const [low, high] = [sy + 34, ty - 34];
+  const r = 18;
+  const path =
+    `M${sx} ${sy}V${low - r}Q${sx} ${low} ${sx + r} ${low}H${side - r}` +
+    `Q${side} ${low} ${side} ${low - r}V${high + r}Q${side} ${high} ${side - r} ${high}` +
+    `H${tx + r}Q${tx} ${high} ${tx} ${high + r}V${ty}`;
+  return { path, x: side, y: (low + high) / 2 };
+}
+
+function lineOf(props: EdgeProps<Arrow>): Line {
+  const { sourceX, sourceY, targetX, targetY } = props;
+  const from = sourceY + 9;
+  const to = targetY - 6;
+  if (to < from + 8) return backwards(sourceX, from, targetX, to);
+  const [path, x, y] = getBezierPath({
+    sourceX,
+    sourceY: from,
+    targetX,
+    targetY: to,
+    sourcePosition: props.sourcePosition,
+    targetPosition: props.targetPosition,
+    curvature: 0.3,
+  });
+  return { path, x, y };
+}
+
+export function answerWords(answer: Answer): string {
+  return `${answer.outcomes.map((outcome) => outcomeWord[outcome]).join(", ")} → ${answer.response}`;
+}
+
+function AnswerLine({ answer }: { answer: Answer }) {
+  return (
+    <span className={style.answer}>
+      {answer.outcomes.map((outcome) => (
+        <span key={outcome} className={style.part} style={{ color: outcomeColor[outcome] }}>
+          <OutcomeSign outcome={outcome} size={10} />
+          {outcomeWord[outcome]}
+        </span>
+      ))}
+      <span className={style.response}>→ {answer.response}</span>
+    </span>
+  );
+}
+
+export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) {
+  const { id, data, selected } = props;
+  const { path, x, y } = lineOf(props);
+  if (!data) return null;
+  const color = data.entry
+    ? "var(--ink3)"
+    : data.response === "ignore"
+      ? "var(--ink4)"
+      : outcomeColor[data.outcome];
+  const dash = data.entry || data.response === "run" ? undefined : "6 4";
+  return (
+    <>
+      <BaseEdge
+        id={id}
+        path={path}
+        interactionWidth={22}
+        markerEnd={`url(#tip-${data.entry ? "entry" : data.response === "ignore" ? "ignore" : data.outcome})`}
+        style={{
+          stroke: color,
+          strokeWidth: selected ? 3 : data.lit ? 2.6 : 1.8,
+          ...(dash ? { strokeDasharray: dash } : {}),
+        }}
+      />
+      {data.answers && (
+        <EdgeLabelRenderer>
+          <div
+            className={style.label}
+            data-selected={selected || undefined}
+            data-plain={isPlain(data.answers) || undefined}
+            data-relation={data.relation}
+            style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
+          >
+            {data.answers.map((answer) => (
+              <AnswerLine key={answer.response} answer={answer} />
+            ))}
+            {data.answers.length === 0 && <span className={style.response}>ignores all</span>}
+            {data.optional && <span className={style.response}>optional</span>}
+          </div>
+        </EdgeLabelRenderer>
+      )}
+    </>
+  );
+});
+
+/** Only `true → run`: what most arrows say, so it may be quiet. */
+function isPlain(answers: readonly Answer[]): boolean {
+  const [only] = answers;
+  return answers.length === 1 && only?.response === "run" && only.outcomes.join() === "on_true";
+}
+
+const TIPS = {
+  entry: "var(--ink3)",
+  ignore: "var(--ink4)",
+  on_true: "var(--true)",
+  on_false: "var(--false)",
+  on_error: "var(--error)",
+  on_stopped: "var(--stopped)",
+} as const;
+
+/** Arrow heads in the colours of the outcomes; once per canvas. */
+export function ArrowTips() {
+  return (
+    <svg aria-hidden className={style.tips}>
+      <defs>
+        {Object.entries(TIPS).map(([name, fill]) => (
+          <marker
+            key={name}
+            id={`tip-${name}`}
+            viewBox="0 0 10 10"
+            refX="7"
+            refY="5"
+            markerWidth="9"
+            markerHeight="9"
+            markerUnits="userSpaceOnUse"
+            orient="auto-start-reverse"
+          >
+            <path d="M0 0.8 9 5 0 9.2Z" style={{ fill }} />
+          </marker>
+        ))}
+      </defs>
+    </svg>
+  );
+}

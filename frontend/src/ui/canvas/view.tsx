@@ -1,0 +1,73 @@
+/** A graph to look at: the canvas of the run page and of previews. */
+import {
+  Background,
+  BackgroundVariant,
+  type EdgeTypes,
+  type NodeTypes,
+  ReactFlow,
+} from "@xyflow/react";
+import { useMemo, useState } from "react";
+import type { Progress } from "../../api/progress";
+import type { Graph, Key } from "../../graph/model";
+import { ActionCard } from "./action-card";
+import { placesOf } from "./arrange";
+import { type CanvasNode, edgesOf, nodesOf, type ProblemCount } from "./elements";
+import { EndPill } from "./end-pill";
+import { ArrowTips, OutcomeArrow } from "./outcome-arrow";
+import "./canvas.css";
+
+export const nodeTypes: NodeTypes = { action: ActionCard, end: EndPill };
+export const edgeTypes: EdgeTypes = { outcome: OutcomeArrow };
+
+const NONE: ReadonlySet<string> = new Set();
+const NO_PROBLEMS: ReadonlyMap<Key, ProblemCount> = new Map();
+
+interface Props {
+  graph: Graph;
+  progress: ReadonlyMap<Key, Progress>;
+  selected?: ReadonlySet<string>;
+  label: string;
+  onSelect?: (key: Key | null) => void;
+}
+
+export function GraphView({ graph, progress, selected = NONE, label, onSelect }: Props) {
+  const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
+  const places = useMemo(() => placesOf(graph), [graph]);
+  const options = useMemo(
+    () => ({ places, selected, progress, problems: NO_PROBLEMS, measured }),
+    [places, selected, progress, measured],
+  );
+  const nodes = useMemo(() => nodesOf(graph, options), [graph, options]);
+  const edges = useMemo(() => edgesOf(graph, options), [graph, options]);
+  return (
+    <ReactFlow<CanvasNode>
+      nodes={nodes}
+      edges={edges}
+      nodeTypes={nodeTypes}
+      edgeTypes={edgeTypes}
+      onNodesChange={(changes) => {
+        const sized = changes.filter((change) => change.type === "dimensions");
+        if (sized.length === 0) return;
+        setMeasured((before) => {
+          const next = new Map(before);
+          for (const change of sized) if (change.dimensions) next.set(change.id, change.dimensions);
+          return next;
+        });
+      }}
+      onNodeClick={(_, node) => onSelect?.(node.type === "action" ? node.id : null)}
+      onPaneClick={() => onSelect?.(null)}
+      nodesDraggable={false}
+      nodesConnectable={false}
+      edgesFocusable={false}
+      fitView
+      fitViewOptions={{ maxZoom: 1, padding: 0.12 }}
+      minZoom={0.1}
+      maxZoom={2}
+      proOptions={{ hideAttribution: true }}
+      aria-label={label}
+    >
+      <ArrowTips />
+      <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
+    </ReactFlow>
+  );
+}

@@ -1,0 +1,102 @@
+/** A button that asks to be held, so that a slip of the finger starts nothing. */
+import { Button, type ButtonProps, Popover, Text } from "@mantine/core";
+import { type KeyboardEvent, type ReactNode, useEffect, useRef, useState } from "react";
+import style from "./hold-button.module.css";
+
+const HOLD = 600; // ms
+
+interface Props {
+  label: ReactNode;
+  /** Read out and shown on hover. */
+  name: string;
+  question: string;
+  disabled?: boolean;
+  size?: ButtonProps["size"];
+  icon?: ReactNode;
+  onHeld: () => void;
+}
+
+/** Held by pointer, Enter or space; a click that is no hold (a screen reader's) asks first. */
+export function HoldButton({ label, name, question, disabled = false, size, icon, onHeld }: Props) {
+  const [holding, setHolding] = useState(false);
+  const [asking, setAsking] = useState(false);
+  const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
+  useEffect(() => () => clearTimeout(timer.current), []);
+
+  const begin = () => {
+    if (disabled || holding) return;
+    setAsking(false);
+    setHolding(true);
+    timer.current = setTimeout(() => {
+      setHolding(false);
+      onHeld();
+    }, HOLD);
+  };
+  const letGo = (slipped: boolean) => {
+    clearTimeout(timer.current);
+    if (holding && slipped) setAsking(true);
+    setHolding(false);
+  };
+  const isHoldKey = (event: KeyboardEvent) => event.key === "Enter" || event.key === " ";
+
+  return (
+    <Popover
+      opened={asking && !disabled}
+      onChange={setAsking}
+      position="bottom-end"
+      withArrow
+      trapFocus
+    >
+      <Popover.Target>
+        <Button
+          size={size ?? "sm"}
+          className={style.button ?? ""}
+          data-holding={holding || undefined}
+          disabled={disabled}
+          aria-label={name}
+          title={`${name} (hold)`}
+          leftSection={icon}
+          onPointerDown={(event) => {
+            if (event.button === 0) begin();
+          }}
+          onPointerUp={() => letGo(true)}
+          onPointerLeave={() => letGo(false)}
+          onPointerCancel={() => letGo(false)}
+          onContextMenu={(event) => event.preventDefault()}
+          onKeyDown={(event) => {
+            if (!isHoldKey(event)) return;
+            event.preventDefault();
+            if (!event.repeat) begin();
+          }}
+          onKeyUp={(event) => {
+            if (isHoldKey(event)) letGo(true);
+          }}
+          onBlur={() => letGo(false)}
+          onClick={(event) => {
+            if (event.detail === 0 && !holding) setAsking(true);
+          }}
+        >
+          {label}
+        </Button>
+      </Popover.Target>
+      <Popover.Dropdown>
+        <Text size="sm" mb="sm">
+          {question}
+        </Text>
+        <Button
+          variant="filled"
+          fullWidth
+          onClick={() => {
+            setAsking(false);
+            onHeld();
+          }}
+        >
+          {name}
+        </Button>
+        <Text size="xs" c="dimmed" mt="xs">
+          Or hold the button for a moment.
+        </Text>
+      </Popover.Dropdown>
+    </Popover>
+  );
+}

@@ -1,0 +1,24 @@
+/** The actions of a run as lanes of its timeline. */
+import type { Run } from "../api/runs";
+import { fullName, type Graph } from "../graph/model";
+
+export interface Lane {
+  name: string;
+  aid: string | null;
+  robot: string;
+}
+
+/** Every action, those that ran first, in the order in which they began. */
+export function lanesOf(run: Run, graph: Graph): Lane[] {
+  const known = new Map(graph.actions.map((action) => [fullName(action), action]));
+  const own = Object.keys(run.actions ?? {});
+  const names = own.length > 0 ? own : [...known.keys()];
+  const began = (name: string) => run.actions?.[name]?.visits[0]?.from ?? "~";
+  return names
+    .map((name) => ({
+      name,
+      aid: run.actions?.[name]?.aid ?? known.get(name)?.key ?? null,
+      robot: known.get(name)?.actor ?? "",
+    }))
+    .sort((a, b) => began(a.name).localeCompare(began(b.name)));
+}

@@ -1,0 +1,100 @@
+/** Something carried by the pointer from a list to a place that takes it. By pointer events: works for fingers. */
+import { type PointerEvent as ReactPointerEvent, useEffect, useSyncExternalStore } from "react";
+import style from "./placing.module.css";
+
+export interface Carried<T> {
+  readonly load: T;
+  readonly label: string;
+  readonly x: number;
+  readonly y: number;
+}
+
+type Taker<T> = (carried: Carried<T>) => void;
+
+const THRESHOLD = 6; // px until a press becomes a drag
+
+/** One carrier for each kind of load. */
+export class Carrier<T> {
+  #now: Carried<T> | null = null;
+  #listeners = new Set<() => void>();
+  #taker: Taker<T> | null = null;
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  };
+  now = (): Carried<T> | null => this.#now;
+
+  /** Who takes what is dropped; answers how to stop taking. */
+  onDrop(taker: Taker<T>): () => void {
+    this.#taker = taker;
+    return () => {
+      if (this.#taker === taker) this.#taker = null;
+    };
+  }
+
+  /** To be called by `onPointerDown`: becomes a drag when the pointer moves, else stays a click. */
+  press(event: ReactPointerEvent, load: T, label: string): void {
+    if (event.button !== 0) return;
+    const [x0, y0, id] = [event.clientX, event.clientY, event.pointerId];
+    const onMove = (move: PointerEvent) => {
+      if (move.pointerId !== id) return;
+      const far = Math.hypot(move.clientX - x0, move.clientY - y0) > THRESHOLD;
+      if (this.#now === null && !far) return;
+      move.preventDefault();
+      this.#set({ load, label, x: move.clientX, y: move.clientY });
+    };
+    const end = (drop: boolean) => (up: PointerEvent | KeyboardEvent) => {
+      if ("pointerId" in up && up.pointerId !== id) return;
+      if ("key" in up && up.key !== "Escape") return;
+      window.removeEventListener("pointermove", onMove);
+      window.removeEventListener("pointerup", onUp);
+      window.removeEventListener("pointercancel", onCancel);
+      window.removeEventListener("keydown", onCancel);
+      const carried = this.#now;
+      this.#set(null);
+      if (drop && carried) {
+        swallowClick();
+        this.#taker?.(carried);
+      }
+    };
+    const onUp = end(true);
+    const onCancel = end(false);
+    window.addEventListener("pointermove", onMove, { passive: false });
+    window.addEventListener("pointerup", onUp);
+    window.addEventListener("pointercancel", onCancel);
+    window.addEventListener("keydown", onCancel);
+  }
+
+  #set(next: Carried<T> | null): void {
+    this.#now = next;
+    for (const listener of this.#listeners) listener();
+  }
+}
+
+/** The click that a browser makes of the end of a drag is none. */
+function swallowClick(): void {
+  const swallow = (event: MouseEvent) => event.stopPropagation();
+  window.addEventListener("click", swallow, { capture: true, once: true });
+  setTimeout(() => window.removeEventListener("click", swallow, { capture: true }), 0);
+}
+
+/** What is carried, under the pointer. */
+export function CarriedGhost<T>({ carrier }: { carrier: Carrier<T> }) {
+  const carried = useSyncExternalStore(carrier.subscribe, carrier.now);
+  const active = carried !== null;
+  useEffect(() => {
+    document.body.classList.toggle(style.carrying ?? "", active);
+    return () => document.body.classList.remove(style.carrying ?? "");
+  }, [active]);
+  if (carried === null) return null;
+  return (
+    <div
+      className={style.ghost}
+      style={{ transform: `translate(${carried.x - 104}px, ${carried.y - 24}px)` }}
+      aria-hidden
+    >
+      {carried.label}
+    </div>
+  );
+}

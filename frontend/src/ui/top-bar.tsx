@@ -1,0 +1,56 @@
+/** The bar on top of every page: where one is, what one may do, and STOP at its right end. */
+
+import { Fragment, type ReactNode } from "react";
+import { Link } from "wouter";
+import style from "./top-bar.module.css";
+
+export interface Crumb {
+  label: ReactNode;
+  to?: string;
+}
+
+interface Props {
+  crumbs: readonly Crumb[];
+  /** Beside the crumbs: states in words. */
+  status?: ReactNode;
+  /** Before STOP. */
+  actions?: ReactNode;
+  account: ReactNode;
+  stop: ReactNode;
+}
+
+export function Mark() {
+  return <img src="/mark.svg" alt="" width={24} height={24} className={style.mark} />;
+}
+
+export function TopBar({ crumbs, status, actions, account, stop }: Props) {
+  return (
+    <header className={style.bar}>
+      <Link to="/" className={style.home} aria-label="All graphs">
+        <Mark />
+      </Link>
+      <nav className={style.crumbs} aria-label="Where you are">
+        {crumbs.map((crumb, i) => (
+          <Fragment key={crumb.to ?? "here"}>
+            {i > 0 && (
+              <span className={style.slash} aria-hidden>
+                /
+              </span>
+            )}
+            {crumb.to === undefined ? (
+              <h1 className={style.here}>{crumb.label}</h1>
+            ) : (
+              <Link to={crumb.to} className={style.crumb}>
+                {crumb.label}
+              </Link>
+            )}
+          </Fragment>
+        ))}
+      </nav>
+      <div className={style.status}>{status}</div>
+      <div className={style.actions}>{actions}</div>
+      <div className={style.account}>{account}</div>
+      <div className={style.stop}>{stop}</div>
+    </header>
+  );
+}

@@ -1,0 +1,70 @@
+/** Times in words. All instants are milliseconds since 1970. */
+import { useEffect, useState } from "react";
+
+export function instant(text: string | null | undefined): number | null {
+  if (!text) return null;
+  const at = Date.parse(text);
+  return Number.isNaN(at) ? null : at;
+}
+
+/** `0.4 s`, `12.4 s`, `1:12`, `2:05:00`. */
+export function duration(ms: number): string {
+  const whole = Math.max(0, ms);
+  if (whole < 60_000) return `${(whole / 1000).toFixed(1)} s`;
+  const s = Math.floor(whole / 1000);
+  const two = (n: number) => String(n).padStart(2, "0");
+  const hours = Math.floor(s / 3600);
+  const minutes = Math.floor(s / 60) % 60;
+  return hours > 0 ? `${hours}:${two(minutes)}:${two(s % 60)}` : `${minutes}:${two(s % 60)}`;
+}
+
+/** For something that goes on: whole seconds, so that it does not flicker. */
+export function stopwatch(ms: number): string {
+  const s = Math.max(0, Math.floor(ms / 1000));
+  return `${Math.floor(s / 60)}:${String(s % 60).padStart(2, "0")}`;
+}
+
+export function clock(at: number): string {
+  return new Date(at).toLocaleTimeString(undefined, {
+    hour: "2-digit",
+    minute: "2-digit",
+    second: "2-digit",
+    hour12: false,
+  });
+}
+
+export function ago(at: number, now: number): string {
+  const s = Math.max(0, Math.round((now - at) / 1000));
+  if (s < 5) return "just now";
+  if (s < 60) return `${s} s ago`;
+  if (s < 3600) return `${Math.floor(s / 60)} min ago`;
+  if (s < 86_400) return `${Math.floor(s / 3600)} h ago`;
+  return day(at, now);
+}
+
+/** `today`, `yesterday`, `Mon 3 Nov`. */
+export function day(at: number, now: number): string {
+  const midnight = (t: number) => new Date(t).setHours(0, 0, 0, 0);
+  const days = Math.round((midnight(now) - midnight(at)) / 86_400_000);
+  if (days === 0) return "today";
+  if (days === 1) return "yesterday";
+  const far = days > 300 ? ({ year: "numeric" } as const) : {};
+  return new Date(at).toLocaleDateString(undefined, {
+    weekday: "short",
+    day: "numeric",
+    month: "short",
+    ...far,
+  });
+}
+
+/** The present, renewed every `every` ms while `going`. */
+export function useNow(every = 1000, going = true): number {
+  const [now, setNow] = useState(() => Date.now());
+  useEffect(() => {
+    if (!going) return;
+    setNow(Date.now());
+    const timer = setInterval(() => setNow(Date.now()), every);
+    return () => clearInterval(timer);
+  }, [every, going]);
+  return now;
+}
