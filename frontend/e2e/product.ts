@@ -1,0 +1,144 @@
+/** The real product for browser tests: `action-assistant serve` on free ports, killable at any moment. */
+
+import { type ChildProcess, spawn } from "node:child_process";
+import { mkdtempSync, openSync, readFileSync, rmSync } from "node:fs";
+import { createServer } from "node:net";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import type { Browser, BrowserContext, Page } from "@playwright/test";
+
+const COMMAND = resolve(import.meta.dirname, "../../.venv/bin/action-assistant");
+const TOKEN = "browser-test-token-0123456789abcdef0123456789";
+
+/** A running editor and runner with a data folder of their own. */
+export class Product {
+  readonly data = mkdtempSync(join(tmpdir(), "action-assistant-"));
+  readonly log = join(this.data, "serve.log");
+  port = 0;
+  private process: ChildProcess | undefined;
+
+  get url(): string {
+    return `http://127.0.0.1:${this.port}`;
+  }
+
+  get runnerUrl(): string {
+    return `http://127.0.0.1:${this.port + 1}`;
+  }
+
+  /** Starts both processes and waits until they answer. */
+  async start(): Promise<void> {
+    if (this.port === 0) this.port = await freePorts();
+    const log = openSync(this.log, "a");
+    this.process = spawn(
+      COMMAND,
+      ["serve", "--data", this.data, "--port", String(this.port), "--no-open"],
+      {
+        detached: true,
+        stdio: ["ignore", log, log],
+        env: { ...process.env, ACTION_ASSISTANT_TOKEN: TOKEN },
+      },
+    );
+    await this.untilReady();
+  }
+
+  /** Waits until both processes can do their work. */
+  async untilReady(): Promise<void> {
+    const deadline = Date.now() + 60_000;
+    for (const url of [this.url, this.runnerUrl]) {
+      while (!(await answers(`${url}/readyz`))) {
+        if (Date.now() > deadline) throw new Error(readFileSync(this.log, "utf8"));
+        await pause(50);
+      }
+    }
+  }
+
+  /** kill -9 of everything at once. */
+  async kill(): Promise<void> {
+    const { process: child } = this;
+    if (child?.pid === undefined) return;
+    const gone = new Promise((done) => child.once("exit", done));
+    process.kill(-child.pid, "SIGKILL");
+    await gone;
+    this.process = undefined;
+  }
+
+  /** Kills it and throws its data away. */
+  async dispose(): Promise<void> {
+    await this.kill();
+    rmSync(this.data, { recursive: true, force: true, maxRetries: 5 });
+  }
+
+  /** A request as a program makes it. */
+  async ask<T>(path: string, init: RequestInit = {}, base = this.url): Promise<T> {
+    const headers = { authorization: `Bearer ${TOKEN}`, ...(init.headers ?? {}) };
+    const answer = await fetch(base + path, { ...init, headers });
+    if (!answer.ok) throw new Error(`${path}: ${answer.status} ${await answer.text()}`);
+    return (await answer.json()) as T;
+  }
+
+  /** A person with a browser of their own, signed in, on the first page. */
+  async person(
+    browser: Browser,
+    name: string,
+    options: Parameters<Browser["newContext"]>[0] = {},
+  ): Promise<Person> {
+    const context = await browser.newContext(options);
+    const page = await context.newPage();
+    const failures: string[] = [];
+    page.on("pageerror", (error) => failures.push(error.message));
+    await page.goto(`${this.url}/#t=${TOKEN}`);
+    const field = page.getByRole("textbox", { name: /your name/i });
+    await field.fill(name);
+    await field.press("Enter");
+    await field.waitFor({ state: "detached" });
+    return { context, page, failures };
+  }
+}
+
+/** Somebody at a browser. `failures` are errors that the page threw. */
+export interface Person {
+  context: BrowserContext;
+  page: Page;
+  failures: string[];
+}
+
+export function pause(milliseconds: number): Promise<void> {
+  return new Promise((done) => setTimeout(done, milliseconds));
+}
+
+async function answers(url: string): Promise<boolean> {
+  try {
+    return (await fetch(url)).ok;
+  } catch {
+    return false;
+  }
+}
+
+/** The first of two neighbouring ports that nobody listens on. */
+async function freePorts(): Promise<number> {
+  for (;;) {
+    const first = await listen(0);
+    const port = first.port;
+    const second = await listen(port + 1).catch(() => undefined);
+    await first.close();
+    if (second !== undefined) {
+      await second.close();
+      return port;
+    }
+  }
+}
+
+function listen(port: number): Promise<{ port: number; close: () => Promise<void> }> {
+  return new Promise((done, fail) => {
+    const server = createServer();
+    server.once("error", fail);
+    server.listen(port, "127.0.0.1", () => {
+      const address = server.address();
+      if (address === null || typeof address === "string") throw new Error("no port");
+      done({
+        port: address.port,
+        close: () => new Promise((closed) => server.close(() => closed())),
+      });
+    });
+  });
+}

@@ -1,0 +1,185 @@
+"""check, convert and simulate, as a person or a script runs them."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from action_assistant import places
+from action_assistant.cli import main
+from action_assistant.umrf import codec
+from action_assistant.umrf.digest import digest
+from support.product import COMMAND
+
+EXAMPLES = sorted(places.examples().glob("*.json"))
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """A command in a process of its own."""
+    return subprocess.run(
+        [*COMMAND, *arguments], capture_output=True, text=True, check=False, timeout=60
+    )
+
+
+@pytest.fixture
+def example() -> Path:
+    """One of the graphs that greet a new user."""
+    return EXAMPLES[0]
+
+
+def written(folder: Path, value: object) -> str:
+    """A file with this JSON."""
+    path = folder / "graph.json"
+    path.write_text(value if isinstance(value, str) else json.dumps(value))
+    return str(path)
+
+
+TWO = {
+    "graph_name": "two",
+    "graph_entry": [{"name": "A"}],
+    "graph_exit": [{"name": "B"}],
+    "actions": [
+        {"name": "A", "type": "sync", "children": [{"name": "B"}]},
+        {
+            "name": "B",
+            "type": "sync",
+            "parents": [
+                {
+                    "name": "A",
+                    "conditions": ["on_false -> run", "on_true -> ignore", "on_error -> ignore"],
+                }
+            ],
+        },
+    ],
+}
+
+
+def test_a_good_file_has_no_errors_and_exit_code_0(example: Path) -> None:
+    answer = run("check", str(example))
+    assert answer.returncode == 0
+    assert "0 errors" in answer.stdout
+
+
+def test_a_ghost_is_an_error_with_its_place(tmp_path: Path) -> None:
+    graph = {**TWO, "graph_entry": [{"name": "Missing"}]}
+    answer = run("check", "--json", written(tmp_path, graph))
+    assert answer.returncode == 1
+    (verdict,) = json.loads(answer.stdout)
+    assert verdict["dialect"] == "D3"
+    assert any(
+        problem["severity"] == "error" and "Missing" in problem["message"]
+        for problem in verdict["problems"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "line"),
+        ("{", "line"),
+        ("[]", "no object"),
+        ('{"a": 1}', "neither"),
+        ('{"graph_name": "g", "graph_name": "h", "actions": []}', "graph_name"),
+        ('{"graph_name": "g", "actions": [], "x": NaN}', "NaN"),
+        ('{"graph_name": "g", "actions": ' + "[" * 500 + "]" * 500 + "}", "deep"),
+    ],
+)
+def test_a_file_that_is_no_umrf_is_a_problem_too(tmp_path: Path, text: str, words: str) -> None:
+    path = written(tmp_path, text)
+    checked = run("check", "--json", path)
+    assert checked.returncode == 1
+    (verdict,) = json.loads(checked.stdout)
+    (problem,) = verdict["problems"]
+    assert problem["severity"] == "error"
+    converted = run("convert", path)
+    assert converted.returncode == 1
+    assert converted.stdout == ""
+    assert words in problem["message"] or words in converted.stderr
+
+
+def test_a_file_that_is_not_there_is_wrong_use(tmp_path: Path) -> None:
+    answer = run("check", str(tmp_path / "none.json"))
+    assert answer.returncode == 2
+    assert len(answer.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("through", [[], ["--through-document"]])
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_converting_keeps_the_meaning(
+    path: Path, through: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["convert", *through, str(path)]) == 0
+    converted = capsys.readouterr().out
+    before, after = codec.read(path.read_bytes()).graph, codec.read(converted).graph
+    assert digest(before) == digest(after)
+
+
+def test_simulate_prints_a_trace_for_programs(tmp_path: Path) -> None:
+    answer = run("simulate", "--trace", written(tmp_path, TWO))
+    assert answer.returncode == 0
+    events = [json.loads(line) for line in answer.stdout.splitlines()]
+    assert events[0]["kind"] == "graph_state"
+    assert events[0]["state"] == "UNINITIALIZED"
+    nodes = [(event["node"], event["state"]) for event in events if event["kind"] == "node_state"]
+    assert nodes == [("A_0", "INITIALIZED"), ("A_0", "RUNNING"), ("A_0", "FINISHED")]
+
+
+@pytest.mark.parametrize(("result", "ran"), [("on_true", "C_0"), ("on_false", "B_0")])
+def test_exactly_one_of_two_branches_runs(tmp_path: Path, result: str, ran: str) -> None:
+    def branch(name: str, outcome: str) -> dict[str, object]:
+        rest = [f"{o} -> ignore" for o in ("on_true", "on_false", "on_error") if o != outcome]
+        parent = {"name": "A", "conditions": [f"{outcome} -> run", *rest]}
+        return {"name": name, "type": "sync", "parents": [parent]}
+
+    graph = {
+        "graph_name": "branches",
+        "graph_entry": [{"name": "A"}],
+        "graph_exit": [{"name": "B", "required": False}, {"name": "C", "required": False}],
+        "actions": [
+            {"name": "A", "type": "sync", "children": [{"name": "B"}, {"name": "C"}]},
+            branch("B", "on_false"),
+            branch("C", "on_true"),
+        ],
+    }
+    script = tmp_path / "script.json"
+    script.write_text(json.dumps({"behaviours": {"A": [{"result": result}]}}))
+    answer = run("simulate", "--trace", "--script", str(script), written(tmp_path, graph))
+    events = [json.loads(line) for line in answer.stdout.splitlines()]
+    running = [e["node"] for e in events if e["kind"] == "node_state" and e["state"] == "RUNNING"]
+    assert running == ["A_0", ran]
+
+
+def test_a_stop_at_a_time_stops(tmp_path: Path) -> None:
+    answer = run("simulate", "--trace", "--at", "300:stop", written(tmp_path, TWO))
+    events = [json.loads(line) for line in answer.stdout.splitlines()]
+    graph = [event["state"] for event in events if event["kind"] == "graph_state"]
+    assert graph[-1] == "STOPPED"
+
+
+def test_a_script_that_makes_no_sense_is_wrong_use(tmp_path: Path) -> None:
+    script = tmp_path / "script.json"
+    script.write_text('{"behaviours": {"A": [{"after_s": "soon"}]}}')
+    answer = run("simulate", "--script", str(script), written(tmp_path, TWO))
+    assert answer.returncode == 2
+    assert "script" in answer.stderr
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["serve editor runner migrate check convert simulate import export graphs runs run stop"][
+        0
+    ].split(),
+)
+def test_every_command_has_help_with_an_example(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([command, "--help"])
+    assert ended.value.code == 0
+    assert f"example: action-assistant {command}" in capsys.readouterr().out
+
+
+def test_wrong_use_is_exit_code_2() -> None:
+    for arguments in ([], ["nonsense"], ["serve", "--port", "0"], ["simulate", "x", "--at", "y"]):
+        assert run(*arguments).returncode == 2

@@ -1,0 +1,79 @@
+"""The wheel in an empty environment: it brings the page and the migrations, and needs no Node."""
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import httpx
+import pytest
+
+from support.product import TOKEN, Product
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of this checkout, with the page that was built last."""
+    if not (ROOT / "frontend" / "dist" / "index.html").is_file():
+        pytest.skip("the page is not built; `make setup` builds it")
+    folder = tmp_path_factory.mktemp("wheel")
+    subprocess.run(
+        [
+            *(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"),
+            *("--no-build-isolation", "--wheel-dir", str(folder), str(ROOT)),
+        ],
+        check=True,
+    )
+    (found,) = folder.glob("*.whl")
+    return found
+
+
+def test_the_wheel_carries_page_and_migrations_and_nothing_foreign(wheel: Path) -> None:
+    names = zipfile.ZipFile(wheel).namelist()
+    assert "action_assistant/static/index.html" in names
+    assert "action_assistant/migrations/env.py" in names
+    assert any(name.startswith("action_assistant/examples/") for name in names)
+    tops = {name.split("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"action_assistant"}
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: Path) -> None:
+    environment = tmp_path / "venv"
+    subprocess.run([sys.executable, "-m", "venv", str(environment)], check=True)
+    python = environment / "bin" / "python"
+    subprocess.run([str(python), "-m", "pip", "install", "--quiet", str(wheel)], check=True)
+    product = Product(tmp_path / "data")
+    tools = tmp_path / "bin"
+    tools.mkdir()
+    clean = {
+        "PATH": str(tools),
+        "HOME": str(tmp_path),
+        "ACTION_ASSISTANT_TOKEN": TOKEN,
+        "LANG": os.environ.get("LANG", "C.UTF-8"),
+    }
+    assert shutil.which("node", path=clean["PATH"]) is None
+    command = [str(environment / "bin" / "action-assistant"), "serve", "--no-open"]
+    process = subprocess.Popen(
+        [*command, "--data", str(product.data), "--port", str(product.port)],
+        env=clean,
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+    )
+    try:
+        assert process.stderr
+        for line in process.stderr:
+            if b"ready" in line:
+                break
+        page = httpx.get(product.url, headers={"accept": "text/html"}, trust_env=False)
+        assert '<div id="root">' in page.text
+        with product.editor() as editor:
+            assert editor.get("/api/graphs").json()
+    finally:
+        process.terminate()
+        process.communicate(timeout=20)
