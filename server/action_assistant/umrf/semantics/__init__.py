@@ -1,0 +1,35 @@
+"""The engine's behaviour as a deterministic step function (SPEC 2)."""
+
+from action_assistant.umrf.semantics.engine import Engine, EngineRefused, GraphNow
+from action_assistant.umrf.semantics.script import Behaviour, Script, script_from
+from action_assistant.umrf.semantics.simulate import simulate
+from action_assistant.umrf.semantics.trace import (
+    Dispatch,
+    EdgeEval,
+    GraphResult,
+    GraphState,
+    Hazard,
+    NodeResult,
+    NodeState,
+    NotReady,
+    Trace,
+)
+
+__all__ = [
+    "Behaviour",
+    "Dispatch",
+    "EdgeEval",
+    "Engine",
+    "EngineRefused",
+    "GraphNow",
+    "GraphResult",
+    "GraphState",
+    "Hazard",
+    "NodeResult",
+    "NodeState",
+    "NotReady",
+    "Script",
+    "Trace",
+    "script_from",
+    "simulate",
+]

@@ -1,0 +1,357 @@
+"""A TeMoto Action Engine without I/O or clock: the commands and the life of graphs (SPEC 2)."""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Final, TypeAlias
+
+import msgspec
+
+from action_assistant.umrf.facts import SIMULATED, EngineFacts
+from action_assistant.umrf.jsontext import parse_small
+from action_assistant.umrf.model import ENTRY, EXIT, Graph, Key, Parameter
+from action_assistant.umrf.parameters import flat_name
+from action_assistant.umrf.semantics.core import Core, Task
+from action_assistant.umrf.semantics.parts import Node, Outcome, Running, build, exit_nodes
+from action_assistant.umrf.semantics.script import Script
+from action_assistant.umrf.semantics.trace import Trace
+
+_Deed: TypeAlias = Callable[[Running], None]
+
+_BUSY: Final = frozenset({"RUNNING", "PAUSED", "STOPPING", "CLEARING"})
+
+
+class EngineRefused(Exception):
+    """The engine throws instead of starting. What happened before comes with the next call."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.message = message
+
+
+class GraphNow(msgspec.Struct, frozen=True):
+    """What an engine knows of one graph: states by full name; the result once it ended."""
+
+    state: str
+    result: str | None
+    nodes: dict[str, str]
+
+
+class Engine(Core):
+    """One engine with its graphs and sub-graphs. Deterministic: same calls, same trace.
+
+    `library`: graphs that can be sub-graphs, by name. `actor`: the engine's name; without one it
+    plays the only actor that a graph names. `serial`: commands wait for each other as they do over
+    ROS; otherwise a second stop during a stop reaches the engine and kills it.
+    """
+
+    def __init__(
+        self,
+        *,
+        facts: EngineFacts = SIMULATED,
+        script: Script | None = None,
+        library: Mapping[str, Graph] | None = None,
+        actor: str = "",
+        serial: bool = True,
+    ) -> None:
+        super().__init__(facts, script or Script(), library or {}, actor)
+        self.serial = serial
+        self._busy = False
+        self._waiting: deque[Task] = deque()
+
+    # What callers ask
+
+    @property
+    def due(self) -> float | None:
+        """When something happens next by itself, in ms; None if nothing will."""
+        if self._out or self._tasks:
+            return self.now
+        return self._heap[0][0] if self._heap else None
+
+    def advance(self, to_ms: float) -> list[Trace]:
+        """Everything due up to and including `to_ms`, in order."""
+        self._run_until(to_ms)
+        return self._taken()
+
+    def states(self) -> dict[str, GraphNow]:
+        """All graphs by the name they run under, ended ones too."""
+        return {
+            name: GraphNow(g.state, g.result, {n.full_name: n.state for n in g.nodes.values()})
+            for name, g in self.graphs.items()
+        }
+
+    def start(
+        self, graph: Graph, at_ms: float, states: Mapping[Key, str] | None = None
+    ) -> list[Trace]:
+        """Starts a graph. `states`: run states that its file carries. Raises `EngineRefused`."""
+        self._run_until(at_ms)
+        old = self.graphs.get(graph.name)
+        if self.crashed or self.locked:
+            return self._taken()
+        if old is not None and old.state in _BUSY:
+            active = old.state
+            self._command(partial(self._stop_graph, old))
+            raise EngineRefused(
+                f"Cannot execute UMRF graph '{graph.name}' because it's already active ({active})"
+            )
+        running = self._built(graph.name, graph, None, None)
+        if running.has_ghost_ends:
+            raise EngineRefused(f"An end of graph '{graph.name}' names an action that is not there")
+        for node in running.nodes.values():
+            state = (states or {}).get(node.key, "UNINITIALIZED")
+            running.count(state, 1)
+            node.state = state
+        if old is None or not any(node.active for node in old.nodes.values()):
+            if old is not None:
+                self._clear(old)
+            self._begin_graph(running)
+        else:
+            self._command(partial(self._replace, old, running))
+        return self._taken()
+
+    def stop(self, graph_name: str, at_ms: float) -> list[Trace]:
+        """Stops a graph; nothing happens to one that does not run."""
+        return self._on(graph_name, at_ms, self._stop_graph)
+
+    def pause(self, graph_name: str, at_ms: float) -> list[Trace]:
+        """Pauses a RUNNING graph."""
+        return self._on(graph_name, at_ms, self._pause_graph)
+
+    def resume(self, graph_name: str, at_ms: float, continue_from: str = "") -> list[Trace]:
+        """Resumes a PAUSED or HALTED graph; `continue_from` is the full name of a node to run."""
+        return self._on(graph_name, at_ms, partial(self._resume_graph, continue_from=continue_from))
+
+    # Commands, one after the other
+
+    def _taken(self) -> list[Trace]:
+        self._settle()
+        taken, self._out = self._out, []
+        return taken
+
+    def _on(self, graph_name: str, at_ms: float, deed: _Deed) -> list[Trace]:
+        self._run_until(at_ms)
+        graph = self.graphs.get(graph_name)
+        if graph is not None and not self.crashed and not self.locked:
+            self._command(partial(deed, graph))
+        return self._taken()
+
+    def _command(self, deed: Task) -> None:
+        if self._busy:
+            self._waiting.append(deed)
+        else:
+            deed()
+
+    def _free(self) -> None:
+        """The command that held the engine is done; the next ones may go."""
+        self._busy = False
+        while self._waiting and not self._busy and not self.crashed and not self.locked:
+            self._waiting.popleft()()
+            self._settle()
+
+    # Start
+
+    def _built(self, name: str, graph: Graph, above: Node | None, home: Running | None) -> Running:
+        running = Running(name, graph, above, home)
+        behaviours = {
+            a.key: self.script.calls_of(name, graph.name, a.full_name, a.name)
+            for a in graph.actions
+        }
+        build(running, behaviours)
+        taken = running.own_names()
+        for node in running.nodes.values():
+            sub = self.library.get(node.name)
+            if sub is not None and node.name not in taken and _fits(node, sub):
+                node.subgraph = sub
+        return running
+
+    def _clear(self, old: Running) -> None:
+        self._graph_state(old, "CLEARING")
+        self._graph_state(old, "UNINITIALIZED")
+
+    def _replace(self, old: Running, new: Running) -> None:
+        """Starts a graph again although actions of the finished one still run."""
+        self._graph_state(old, "CLEARING")
+        stragglers = [node for node in old.nodes.values() if node.active]
+        self._busy = True
+        for node in stragglers:
+            if node.state != "STOPPING":
+                self._stop_node(old, node)
+
+        def then() -> None:
+            self._graph_state(old, "UNINITIALIZED")
+            try:
+                self._begin_graph(new)
+            except EngineRefused:
+                return
+            finally:
+                self._free()
+
+        self._wait(stragglers, self.facts.stop_poll_ms, then)
+
+    def _begin_graph(self, graph: Running) -> None:
+        self.graphs[graph.name] = graph
+        self._graph_state(graph, "UNINITIALIZED")
+        if len(graph.nodes) < sum(not action.missing for action in graph.graph.actions):
+            message = "Two actions have one full name: the engine throws and keeps a broken graph."
+            self._hazard(graph, "H6", "goes on", message)
+            raise EngineRefused("map::at")
+        named = {node.actor for node in graph.nodes.values() if node.actor}
+        remote = named - {self.actor} if self.actor or len(named) > 1 else set()
+        if remote and not self.facts.synchronises:
+            raise EngineRefused(
+                f"Cannot execute UMRF graph '{graph.name}': actor synchronizer not initialized."
+            )
+        if self._lacks_inputs(graph):
+            return
+        self._graph_state(graph, "RUNNING")
+        self._inform(graph, graph.entry, "on_true")
+
+    def _lacks_inputs(self, graph: Running) -> bool:
+        """The silent refusal: an entry action without a required value."""
+        from_outside = {name: slot.value for name, slot in graph.entry.outputs.items()}
+        for edge in graph.entry.children:
+            if edge.child is None:
+                continue
+            renamed = {r.source: r.target for r in edge.remap}
+            given = {renamed.get(name, name) for name in from_outside}
+            for slot in edge.child.inputs.values():
+                if slot.required and not slot.has_value() and slot.name not in given:
+                    message = (
+                        f"The input “{slot.name}” has no value: the graph silently never starts."
+                    )
+                    self._hazard(graph, "H7", "goes on", message, edge.child)
+                    return True
+        return False
+
+    # Stop, pause, resume
+
+    def _stop_graph(self, graph: Running) -> None:
+        if graph.state == "STOPPING" and not self.serial:
+            message = "A second stop reaches a graph that is stopping: the engine aborts."
+            self._crash(graph, "H4", message)
+            return
+        if graph.state not in ("RUNNING", "PAUSED", "HALTED"):
+            return
+        self._graph_state(graph, "STOPPING")
+        nodes = [node for node in graph.nodes.values() if node.active]
+        graph.stop_failed = False
+        for node in nodes:
+            if node.state != "STOPPING":
+                self._stop_node(graph, node)
+                if self.crashed:
+                    return
+        if not nodes:
+            self._graph_stopped(graph)
+            return
+        hold = self.serial and graph.home is None
+        self._busy = self._busy or hold
+
+        def then() -> None:
+            self._graph_stopped(graph)
+            if hold:
+                self._free()
+
+        self._wait(nodes, self.facts.stop_poll_ms, then)
+
+    def _graph_stopped(self, graph: Running) -> None:
+        graph.result = "on_error" if graph.stop_failed else "on_stopped"
+        self._graph_state(graph, "ERROR" if graph.stop_failed else "STOPPED")
+        result: Outcome = "on_error" if graph.stop_failed else "on_stopped"
+        self._soon(partial(self._sub_ended, graph, result))
+
+    def _pause_graph(self, graph: Running) -> None:
+        if graph.state != "RUNNING":
+            return
+        nodes = [node for node in graph.nodes.values() if node.state == "RUNNING"]
+        paused = [self._pause_node(graph, node) for node in nodes]
+        if not all(paused):
+            message = "The pause never completes: the engine answers no command any more."
+            self._lock(graph, "H5", message)
+            return
+        if not nodes:
+            self._graph_state(graph, "PAUSED")
+            return
+        self._busy = True
+
+        def then() -> None:
+            if graph.state == "RUNNING":
+                self._graph_state(graph, "PAUSED")
+            self._free()
+
+        self._at(self.now + self.facts.pause_poll_ms, then)
+
+    def _resume_graph(self, graph: Running, continue_from: str = "") -> None:
+        if graph.state not in ("PAUSED", "HALTED"):
+            return
+        graph.stuck = False
+        graph.result = None
+        self._graph_state(graph, "RUNNING")
+        for node in list(graph.nodes.values()):
+            if node.state != "PAUSED":
+                continue
+            self._state(graph, node, "RUNNING")
+            if node.pending is not None:
+                result, node.pending = node.pending, None
+                self._soon(partial(self._ended, graph, node, result))
+            elif node.rest_ms is not None:
+                self._let_run(graph, node, node.rest_ms)
+                node.rest_ms = None
+        if node_to_run := graph.nodes.get(continue_from):
+            self._run(graph, node_to_run)
+
+    # Sub-graphs
+
+    def _start_sub(self, graph: Running, node: Node, sub: Graph) -> None:
+        name = f"{graph.name}__{node.name}__{node.instance_id}"
+        if old := self.graphs.get(name):
+            self._clear(old)
+        running = self._built(name, sub, node, graph)
+        node.sub = running
+        running.entry.outputs = dict(node.inputs)
+        if running.has_ghost_ends:
+            self._ended(graph, node, "on_error")
+            return
+        try:
+            self._begin_graph(running)
+        except EngineRefused:
+            self._ended(graph, node, "on_error")
+
+    def _stop_sub(self, node: Node) -> None:
+        if node.sub is not None:
+            self._stop_graph(node.sub)
+
+    def _sub_ended(self, graph: Running, result: Outcome) -> None:
+        above, home = graph.above, graph.home
+        if above is None or home is None or above.sub is not graph:
+            return
+        for node in exit_nodes(graph):
+            for name, slot in node.outputs.items():
+                if target := above.outputs.get(name):
+                    target.receive(slot.type, slot.value)
+        above.sub = None
+        if above.state in ("RUNNING", "STOPPING", "PAUSED", "PAUSE_REQUESTED"):
+            self._ended(home, above, result)
+
+
+def _fits(node: Node, sub: Graph) -> bool:
+    """Whether an indexed graph has the signature that a node expects (SPEC 2.1)."""
+    entries = {r.child for r in sub.relations if r.parent == ENTRY}
+    exits = sorted((r.child_order, r.parent) for r in sub.relations if r.child == EXIT)
+    inputs: set[str] = set()
+    outputs: set[str] = set()
+    for action in sub.actions:
+        if action.key in entries:
+            inputs |= {name for name, has_value in _leaves(action.inputs) if not has_value}
+    for _, key in exits:
+        own = {name for a in sub.actions if a.key == key for name, _ in _leaves(a.outputs)}
+        outputs = own or outputs
+    return set(node.inputs) == inputs and set(node.outputs) == outputs
+
+
+def _leaves(parameters: tuple[Parameter, ...]) -> list[tuple[str, bool]]:
+    found = []
+    for parameter in parameters:
+        leaf = parse_small(parameter.text)
+        if isinstance(leaf, dict) and "pvf_type" in leaf:
+            found.append((flat_name(parameter.path), "pvf_value" in leaf))
+    return found

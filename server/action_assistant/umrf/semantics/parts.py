@@ -1,0 +1,257 @@
+"""Graphs in motion: nodes, edges and their run state, built from a graph value."""
+
+from collections.abc import Mapping, Sequence
+from operator import attrgetter
+from typing import TypeAlias
+
+from action_assistant.umrf.model import (
+    ENTRY,
+    ENTRY_CONDITIONS,
+    EXIT,
+    Action,
+    Conditions,
+    Graph,
+    Key,
+    Precondition,
+    Relation,
+    Remap,
+)
+from action_assistant.umrf.semantics.script import Behaviour
+from action_assistant.umrf.semantics.values import Slot, slots_of
+from action_assistant.umrf.writing import name_order
+
+ENTRY_NODE = "graph_entry_0"
+EXIT_NODE = "graph_exit_0"
+
+#: How a call of an action can end.
+Outcome: TypeAlias = Precondition
+
+#: States in which an action holds a thread of its own.
+ACTIVE = frozenset({"RUNNING", "PAUSE_REQUESTED", "PAUSED", "STOPPING"})
+HELD = frozenset({"PAUSE_REQUESTED", "PAUSED"})
+
+
+class Link:
+    """What a child knows of one parent."""
+
+    __slots__ = ("conditions", "received", "required")
+
+    def __init__(self, conditions: Conditions, required: bool) -> None:
+        self.conditions = conditions
+        self.required = required
+        self.received = False
+
+
+class Edge:
+    """One item of a parent's `children`. `child` is None where no such action exists."""
+
+    __slots__ = ("child", "label", "remap")
+
+    def __init__(self, child: "Node | None", label: str, remap: Sequence[Remap]) -> None:
+        self.child = child
+        self.label = label
+        self.remap = remap
+
+
+class Node:
+    """An action while its graph runs.
+
+    `token` counts what makes scheduled events void. `loaded`: the plugin instance lives. `due_ms`:
+    when the call returns by itself, `rest_ms`: what was left of it when it was paused. `pending`: the
+    result of a call that returned while paused. `returning`: it returned, its children wait.
+    """
+
+    __slots__ = (
+        "actor", "again", "behaviours", "busy_until", "call", "calls", "children", "due_ms",
+        "full_name", "inputs", "instance_id", "key", "links", "loaded", "name", "outputs", "pending",
+        "rest_ms", "returning", "started_ms", "state", "sub", "subgraph", "token", "type",
+        "waiting_links",
+    )  # fmt: skip
+
+    def __init__(self, action: Action, full_name: str, behaviours: tuple[Behaviour, ...]) -> None:
+        self.key = action.key
+        self.name = action.name
+        self.instance_id = action.instance_id
+        self.full_name = full_name
+        self.type = action.type
+        self.actor = action.actor
+        self.behaviours = behaviours
+        self.children: list[Edge] = []
+        self.links: dict[str, Link] = {}
+        self.waiting_links = 0
+        self.inputs: dict[str, Slot] = slots_of(action.inputs)
+        self.outputs: dict[str, Slot] = slots_of(action.outputs)
+        self.state = "UNINITIALIZED"
+        self.loaded = False
+        self.calls = 0
+        self.call = behaviours[0]
+        self.token = 0
+        self.started_ms = -1.0
+        self.due_ms: float | None = None
+        self.rest_ms: float | None = None
+        self.busy_until = -1.0
+        self.pending: Outcome | None = None
+        self.returning = False
+        self.again = 0
+        self.subgraph: Graph | None = None
+        self.sub: Running | None = None
+
+    @property
+    def active(self) -> bool:
+        """Whether it holds a thread."""
+        return self.state in ACTIVE
+
+    def link(self, parent: str, link: Link) -> None:
+        """Adds a parent, unless an earlier listing has it."""
+        if parent not in self.links:
+            self.links[parent] = link
+            self.waiting_links += link.required
+
+    def receive(self, link: Link) -> None:
+        """Marks a parent as reported, for ever."""
+        if not link.received:
+            link.received = True
+            self.waiting_links -= link.required
+
+    def has_inputs(self) -> bool:
+        """Whether every required input holds a value."""
+        return all(slot.has_value() or not slot.required for slot in self.inputs.values())
+
+
+class Running:
+    """A graph in an engine. `name` is the one it runs under, `own` the one it calls itself.
+
+    `running`: nodes in state RUNNING; `active`: nodes that hold a thread; `held`: paused ones.
+    """
+
+    def __init__(self, name: str, graph: Graph, above: "Node | None", home: "Running | None"):
+        self.name = name
+        self.own = graph.name
+        self.graph = graph
+        self.above = above
+        self.home = home
+        self.nodes: dict[str, Node] = {}
+        self.entry: Node
+        self.exit: Node
+        self.state = "UNINITIALIZED"
+        self.result: str | None = None
+        self.running = 0
+        self.active = 0
+        self.held = 0
+        self.stuck = False
+        self.stop_failed = False
+        self.has_ghost_ends = False
+        self.linked: dict[Node, list[Node] | None] = {}
+
+    def own_names(self) -> set[str]:
+        """What this graph and those it runs inside call themselves."""
+        found = {self.own}
+        return found if self.home is None else found | self.home.own_names()
+
+    def count(self, state: str, by: int) -> None:
+        """Keeps the sums of states."""
+        self.running += by * (state == "RUNNING")
+        self.active += by * (state in ACTIVE)
+        self.held += by * (state in HELD)
+
+
+def build(running: Running, behaviours: Mapping[Key, tuple[Behaviour, ...]]) -> None:
+    """Fills a graph with nodes and edges. Of two actions with one full name the later is lost."""
+    graph = running.graph
+    nodes = {a.key: Node(a, a.full_name, behaviours[a.key]) for a in graph.actions if not a.missing}
+    for node in nodes.values():
+        running.nodes.setdefault(node.full_name, node)
+    running.entry = _end("graph_entry")
+    running.exit = _end("graph_exit")
+    ghosts = {a.key: a.full_name for a in graph.actions if a.missing}
+    _link_parents(running, nodes, ghosts)
+    _link_children(running, nodes, ghosts)
+
+
+def _end(name: str) -> Node:
+    action = Action(key=name, name=name, type="sync")
+    return Node(action, action.full_name, (Behaviour(),))
+
+
+def _link_parents(running: Running, nodes: Mapping[Key, Node], ghosts: Mapping[Key, str]) -> None:
+    for relation in sorted(running.graph.relations, key=lambda r: (r.child_order, name_order(r))):
+        if relation.only == "children":
+            continue
+        conditions = relation.conditions
+        if relation.parent == ENTRY:
+            parent, conditions = ENTRY_NODE, ENTRY_CONDITIONS
+        elif relation.parent in nodes:
+            parent = nodes[relation.parent].full_name
+        elif relation.parent in ghosts:
+            parent = ghosts[relation.parent]
+        else:
+            continue
+        if relation.child == EXIT:
+            if relation.parent in ghosts:
+                running.has_ghost_ends = True
+            running.exit.link(parent, Link(conditions, relation.required))
+        elif relation.child in nodes:
+            nodes[relation.child].link(parent, Link(conditions, relation.required))
+
+
+def _link_children(running: Running, nodes: Mapping[Key, Node], ghosts: Mapping[Key, str]) -> None:
+    ordered = sorted(running.graph.relations, key=lambda r: (r.parent_order, name_order(r)))
+    exits: list[tuple[Node, Relation]] = []
+    for relation in ordered:
+        if relation.only == "parents":
+            continue
+        parent = running.entry if relation.parent == ENTRY else nodes.get(relation.parent)
+        if parent is None:
+            continue
+        if relation.child == EXIT:
+            exits.append((parent, relation))
+            continue
+        child = nodes.get(relation.child)
+        if child is None and relation.child not in ghosts:
+            continue
+        if child is None and relation.parent == ENTRY:
+            running.has_ghost_ends = True
+        name = child.full_name if child else ghosts[relation.child]
+        parent.children.append(Edge(child, f"{parent.full_name} => {name}", relation.remap))
+    seen: set[str] = set()
+    for parent, _ in exits:
+        if parent.full_name not in seen:
+            seen.add(parent.full_name)
+            label = f"{parent.full_name} => {EXIT_NODE}"
+            parent.children.append(Edge(running.exit, label, ()))
+
+
+def exit_nodes(running: Running) -> list[Node]:
+    """The actions that lead to the exit, in the order of `graph_exit`."""
+    ends = [r for r in running.graph.relations if r.child == EXIT]
+    ends.sort(key=attrgetter("child_order"))
+    by_key = {node.key: node for node in running.nodes.values()}
+    return [by_key[r.parent] for r in ends if r.parent in by_key]
+
+
+def linked_nodes(running: Running, node: Node) -> list[Node] | None:
+    """Every action downstream of a node, or None if the way leads into a loop."""
+    if node not in running.linked:
+        running.linked[node] = _downstream(running, node)
+    return running.linked[node]
+
+
+def _downstream(running: Running, node: Node) -> list[Node] | None:
+    open_nodes = {node}
+    found: dict[Node, None] = {}
+    stack = [(node, iter(node.children))]
+    while stack:
+        above, edges = stack[-1]
+        for edge in edges:
+            child = edge.child
+            if child in open_nodes:
+                return None
+            if child is not None and child is not running.exit and child not in found:
+                found[child] = None
+                open_nodes.add(child)
+                stack.append((child, iter(child.children)))
+                break
+        else:
+            open_nodes.remove(above)
+            stack.pop()
+    return list(found)

@@ -1,0 +1,79 @@
+"""Scripts: what actions do in a simulation (DESIGN 8)."""
+
+from collections.abc import Iterable
+from typing import Any, Final
+
+import msgspec
+
+OUTCOMES: Final = ("on_true", "on_false", "on_error")
+
+
+class Behaviour(msgspec.Struct, frozen=True, kw_only=True):
+    """One call of an action. Times are seconds.
+
+    `never`: does not end by itself. `ignores_stop`: goes on until its own end. `pauses`: has an
+    onPause. `init_error`: throws when it is loaded. `outputs`: values by flat name.
+    """
+
+    after_s: float = 1.0
+    result: str = "on_true"
+    stop_s: float = 0.05
+    pauses: bool = True
+    never: bool = False
+    ignores_stop: bool = False
+    init_error: bool = False
+    outputs: dict[str, Any] | None = None
+    message: str | None = None
+
+
+DEFAULT: Final = Behaviour()
+
+
+class Script(msgspec.Struct, frozen=True):
+    """Behaviours by key: one entry per call, the last repeats."""
+
+    behaviours: dict[str, tuple[Behaviour, ...]] = {}
+
+    def calls_of(self, running: str, own: str, full_name: str, name: str) -> tuple[Behaviour, ...]:
+        """What an action of the graph that runs as `running` and calls itself `own` does; the
+        closest key wins."""
+        keys = (f"{running}/{full_name}", f"{own}/{full_name}", full_name, name, "*")
+        for key in keys:
+            if found := self.behaviours.get(key):
+                return found
+        return (DEFAULT,)
+
+
+def script_from(value: object) -> Script:
+    """A script from JSON values. Raises `ValueError` naming the place."""
+    if not isinstance(value, dict) or not isinstance(value.get("behaviours", {}), dict):
+        raise ValueError("A script is an object with “behaviours”, an object.")
+    unknown = sorted(map(str, value.keys() - {"behaviours"}))
+    if unknown:
+        raise ValueError(f"A script has no {', '.join(unknown)}; it has “behaviours”.")
+    found: dict[str, tuple[Behaviour, ...]] = {}
+    for key, calls in value.get("behaviours", {}).items():
+        if not isinstance(calls, list) or not calls:
+            raise ValueError(f"behaviours/{key}: a list with one object per call is expected.")
+        found[key] = tuple(_behaviours(key, calls))
+    return Script(found)
+
+
+def _behaviours(key: str, calls: list[object]) -> Iterable[Behaviour]:
+    known = set(Behaviour.__struct_fields__)
+    for index, call in enumerate(calls):
+        place = f"behaviours/{key}/{index}"
+        if not isinstance(call, dict):
+            raise ValueError(f"{place}: an object is expected.")
+        if unknown := sorted(map(str, call.keys() - known)):
+            raise ValueError(f"{place}: there is no {', '.join(unknown)}.")
+        given = {field: member for field, member in call.items() if member is not None}
+        try:
+            behaviour = msgspec.convert(given, Behaviour)
+        except msgspec.ValidationError as e:
+            raise ValueError(f"{place}: {e}") from None
+        if behaviour.result not in OUTCOMES:
+            raise ValueError(f"{place}/result: one of {', '.join(OUTCOMES)} is expected.")
+        if not (0 <= behaviour.after_s < 1e9 and 0 <= behaviour.stop_s < 1e9):
+            raise ValueError(f"{place}: times are seconds, not negative.")
+        yield behaviour

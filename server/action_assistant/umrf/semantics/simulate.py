@@ -1,0 +1,70 @@
+"""A whole simulation in one call, for the command line and for tests."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
+
+from action_assistant.umrf.facts import SIMULATED, EngineFacts
+from action_assistant.umrf.model import Graph, Key
+from action_assistant.umrf.semantics.engine import Engine, EngineRefused
+from action_assistant.umrf.semantics.script import Script
+from action_assistant.umrf.semantics.trace import Hazard, Trace
+
+DAY_MS: Final = 86_400_000.0
+
+
+def simulate(
+    graph: Graph,
+    *,
+    script: Script | None = None,
+    library: Mapping[str, Graph] | None = None,
+    facts: EngineFacts = SIMULATED,
+    commands: Iterable[tuple[float, str, str | None]] = (),
+    until_ms: float = DAY_MS,
+    max_events: int = 100_000,
+    states: Mapping[Key, str] | None = None,
+    actor: str = "",
+) -> Iterator[Trace]:
+    """Everything that happens from the start at 0 ms until nothing is left to happen, `until_ms`
+    or `max_events`. `commands`: (ms, `stop` | `pause` | `resume`, running name or None for the top
+    graph). Commands reach the engine as calls, so that two stops at once kill it. A start that the
+    engine refuses ends in a hazard `refused`."""
+    engine = Engine(facts=facts, script=script, library=library, actor=actor, serial=False)
+    pending = sorted(commands, key=lambda command: command[0])
+    left = max_events
+    for trace in _started(engine, graph, states):
+        yield trace
+        left -= 1
+    while left > 0 and not engine.crashed:
+        due = engine.due
+        if pending and (due is None or pending[0][0] <= due):
+            at_ms, verb, name = pending.pop(0)
+            if at_ms > until_ms:
+                return
+            traces = engine.advance(at_ms) + _commanded(engine, at_ms, verb, name or graph.name)
+        elif due is None or due > until_ms:
+            return
+        else:
+            traces = engine.advance(due)
+        for trace in traces[:left]:
+            yield trace
+        left -= len(traces)
+
+
+def _started(engine: Engine, graph: Graph, states: Mapping[Key, str] | None) -> list[Trace]:
+    try:
+        return engine.start(graph, 0.0, states)
+    except EngineRefused as e:
+        refused = Hazard(0.0, graph.name, "refused", "goes on", None, e.message)
+        return [*engine.advance(0.0), refused]
+
+
+def _commanded(engine: Engine, at_ms: float, verb: str, name: str) -> list[Trace]:
+    match verb:
+        case "stop":
+            return engine.stop(name, at_ms)
+        case "pause":
+            return engine.pause(name, at_ms)
+        case "resume":
+            return engine.resume(name, at_ms)
+        case _:
+            raise ValueError(f"{verb} is no command; stop, pause and resume are.")

@@ -1,0 +1,190 @@
+"""Parameters at run time: who holds which value, and what reaches a child (SPEC 2.7)."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Final
+
+import msgspec
+
+from action_assistant.umrf.jsontext import Json, Number, parse_small
+from action_assistant.umrf.model import Parameter, Remap
+from action_assistant.umrf.parameters import flat_name
+
+NEUTRAL: Final[dict[str, Any]] = {
+    "string": "", "strings": [], "number": 0.0, "numbers": [], "bool": False, "bools": [],
+}  # fmt: skip
+_CHECKED: Final = {"string", "number", "bool"}
+
+
+class Opaque(msgspec.Struct, frozen=True):
+    """A value whose type only the actions know."""
+
+    type: str
+
+
+class Missing:
+    """No value."""
+
+    def __repr__(self) -> str:
+        return "no value"
+
+
+MISSING: Final = Missing()
+
+
+class Slot:
+    """One parameter of an action while its graph runs."""
+
+    __slots__ = ("allowed", "name", "received", "required", "type", "updatable", "value")
+
+    def __init__(self, name: str, leaf: dict[str, Json]) -> None:
+        kind = leaf.get("pvf_type")
+        allowed = leaf.get("pvf_allowed_values")
+        self.name = name
+        self.type = kind if isinstance(kind, str) else ""
+        self.value: Any = plain(leaf["pvf_value"]) if "pvf_value" in leaf else MISSING
+        self.required = leaf.get("pvf_required") is not False
+        self.updatable = leaf.get("pvf_updatable") is not False
+        self.allowed = [plain(v) for v in allowed] if isinstance(allowed, list) else []
+        self.received = False
+
+    def has_value(self) -> bool:
+        """Whether there is something to work with."""
+        return self.value is not MISSING
+
+    def receive(self, kind: str, value: Any) -> None:
+        """Takes what a parent hands over, unless type, lock or allowed values forbid it."""
+        if value is MISSING or kind != self.type or not self.updatable:
+            return
+        if self.allowed and kind in _CHECKED and value not in self.allowed:
+            return
+        self.value = value
+        self.received = True
+
+    def end_of_run(self) -> None:
+        """A value that came from a parent is gone after the run; the static one does not return."""
+        if self.received:
+            self.value = MISSING
+            self.received = False
+
+
+class RemapUnknown(Exception):
+    """A renaming starts from an output that the parent does not have: the engine aborts."""
+
+
+def slots_of(parameters: Iterable[Parameter]) -> dict[str, Slot]:
+    """The parameters of one side by flat name, as an engine sorts them."""
+    found: dict[str, Slot] = {}
+    for parameter in parameters:
+        leaf = parse_small(parameter.text)
+        if isinstance(leaf, dict) and "pvf_type" in leaf:
+            name = flat_name(parameter.path)
+            found.setdefault(name, Slot(name, leaf))
+    return dict(sorted(found.items()))
+
+
+def fill_outputs(outputs: dict[str, Slot], given: dict[str, Any] | None) -> None:
+    """What an action leaves behind: the script's value, else `pvf_value`, else a neutral one."""
+    for name, slot in outputs.items():
+        value = (given or {}).get(name)
+        if value is not None:
+            slot.value = float(value) if type(value) is int else value
+        elif slot.value is MISSING:
+            slot.value = NEUTRAL.get(slot.type, Opaque(slot.type))
+
+
+def hand_over(outputs: dict[str, Slot], remap: Sequence[Remap], inputs: dict[str, Slot]) -> None:
+    """Moves a parent's outputs into the child's inputs of the same name after renaming.
+
+    Raises `RemapUnknown`. Renaming happens inside a sorted tree whose order is not restored, so
+    that other outputs may not be found any more, as in the engine.
+    """
+    if not remap:
+        for name, slot in outputs.items():
+            if target := inputs.get(name):
+                target.receive(slot.type, slot.value)
+        return
+    tree = _Tree(sorted(outputs))
+    for rename in remap:
+        place = tree.find(rename.source)
+        if place is None:
+            raise RemapUnknown(rename.source)
+        tree.names[place] = rename.target
+    source = [outputs[name] for name in sorted(outputs)]
+    for name, target in inputs.items():
+        place = tree.find(name)
+        if place is not None:
+            target.receive(source[place].type, source[place].value)
+
+
+def plain(value: Json) -> Any:
+    """A JSON value with numbers as doubles."""
+    match value:
+        case Number():
+            return value.value
+        case list():
+            return [plain(member) for member in value]
+        case dict():
+            return {key: plain(member) for key, member in value.items()}
+        case _:
+            return value
+
+
+class _Tree:
+    """A red-black tree into which sorted names were inserted one by one, like `std::set`."""
+
+    def __init__(self, names: list[str]) -> None:
+        self.names = names
+        count = len(names)
+        self.left: list[int | None] = [None] * count
+        self.right: list[int | None] = [None] * count
+        self.parent: list[int | None] = [None] * count
+        self.red = [True] * count
+        self.root: int | None = None
+        for index in range(count):
+            self._insert_greatest(index)
+
+    def find(self, name: str) -> int | None:
+        """The place of a name by the comparisons that the tree's order promises."""
+        place, best = self.root, None
+        while place is not None:
+            if self.names[place] < name:
+                place = self.right[place]
+            else:
+                best, place = place, self.left[place]
+        return best if best is not None and not name < self.names[best] else None
+
+    def _insert_greatest(self, new: int) -> None:
+        above = new - 1 if new else None
+        self.parent[new] = above
+        if above is None:
+            self.root = new
+        else:
+            self.right[above] = new
+        while (above := self.parent[new]) is not None and self.red[above]:
+            top = self.parent[above]
+            assert top is not None
+            uncle = self.left[top]
+            if uncle is not None and self.red[uncle]:
+                self.red[above] = self.red[uncle] = False
+                self.red[top] = True
+                new = top
+            else:
+                self.red[above], self.red[top] = False, True
+                self._turn_left(top)
+        assert self.root is not None
+        self.red[self.root] = False
+
+    def _turn_left(self, top: int) -> None:
+        up = self.right[top]
+        assert up is not None
+        inner, above = self.left[up], self.parent[top]
+        self.right[top] = inner
+        if inner is not None:
+            self.parent[inner] = top
+        self.parent[up] = above
+        if above is None:
+            self.root = up
+        else:
+            self.right[above] = up
+        self.left[up] = top
+        self.parent[top] = up
