@@ -1,1 +1,1 @@
-"""Links to engines: one port, several ways to reach a robot."""
+"""Links: how the runner reaches an engine."""

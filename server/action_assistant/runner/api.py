@@ -1,0 +1,226 @@
+"""The routes of the runner."""
+
+from collections.abc import AsyncIterator
+from datetime import datetime
+from typing import Annotated, Any, Final
+
+import anyio
+import msgspec
+from litestar import Request, Response, WebSocket, get, post, websocket
+from litestar.exceptions import HTTPException
+from litestar.params import Parameter
+from litestar.response import Stream
+from litestar.types import ControllerRouterHandler
+from sqlalchemy import Row
+
+from action_assistant.errors import BadInput, NotFound
+from action_assistant.journal.journal import Journal
+from action_assistant.runner import archive, shapes
+from action_assistant.runner.admission import read_request
+from action_assistant.runner.control import Control
+from action_assistant.runner.events import Author
+from action_assistant.runner.live import Hub, Stopping, attend
+from action_assistant.runner.robots import Registration, Robot
+from action_assistant.runner.runs import State
+from action_assistant.web.access import person_of
+
+_PAGE: Final = 500  # events read at once
+_ALIVE_S: Final = 15.0  # between two signs of life of an event stream
+_Asking = Request[Any, Any, Any]
+
+
+class House(msgspec.Struct):
+    """What the routes work on; there from the moment that the process is up."""
+
+    control: Control
+    hub: Hub
+    journal: Journal
+
+
+class StopAsked(msgspec.Struct, frozen=True):
+    """`stop_id` is made by the page, once per press; the same press may come by several ways."""
+
+    stop_id: str = ""
+
+
+class HistoryEvent(msgspec.Struct, frozen=True):
+    """One stored event, as programs that follow a run read it."""
+
+    seq: int
+    kind: str
+    author: str
+    at: datetime
+    body: msgspec.Raw
+
+
+def routes(house: House) -> list[ControllerRouterHandler]:
+    """All routes."""
+    return [*_starts(house), *_moves(house), *_reads(house), *_robots(house), _live(house)]
+
+
+def _starts(house: House) -> list[ControllerRouterHandler]:
+    @post("/api/runs", summary="Start a version, at most once per request_id")
+    async def start(request: _Asking) -> Response[shapes.RunShown]:
+        asked = read_request(await request.body())
+        started = await house.control.start(asked, _author(request))
+        return Response(
+            _shown(house, started.run.id) or shapes.shown(started.run),
+            status_code=201 if started.fresh else 200,
+            headers={"location": f"/api/runs/{started.run.id}"},
+        )
+
+    return [start]
+
+
+def _moves(house: House) -> list[ControllerRouterHandler]:
+    @post("/api/stop", status_code=202, summary="Stop everything")
+    async def stop_all(request: _Asking) -> Stopping:
+        stop_id = await _stop_id(request)
+        return Stopping(stop_id, house.control.stop_all(_author(request), stop_id))
+
+    @post("/api/runs/{run:str}/stop", status_code=202, summary="Stop a run")
+    async def stop(run: str, request: _Asking) -> Stopping:
+        stop_id = await _stop_id(request)
+        return Stopping(stop_id, await house.control.stop(run, _author(request), stop_id))
+
+    @post("/api/runs/{run:str}/pause", status_code=202, summary="Pause a run")
+    async def pause(run: str, request: _Asking) -> shapes.RunShown:
+        return shapes.shown(await house.control.pause(run, _author(request)))
+
+    @post("/api/runs/{run:str}/resume", status_code=202, summary="Let a paused run go on")
+    async def resume(run: str, request: _Asking) -> shapes.RunShown:
+        return shapes.shown(await house.control.resume(run, _author(request)))
+
+    @post("/api/runs/{run:str}/modify", status_code=202, summary="Change a running graph")
+    async def modify(run: str) -> shapes.RunShown:
+        return shapes.shown(await house.control.modify(run))
+
+    return [stop_all, stop, pause, resume, modify]
+
+
+def _reads(house: House) -> list[ControllerRouterHandler]:
+    @get("/api/runs", summary="Runs, newest first")
+    async def listed(
+        graph: str | None = None,
+        robot: str | None = None,
+        run_state: Annotated[State | None, Parameter(query="state")] = None,
+        before: str | None = None,
+        limit: Annotated[int, Parameter(ge=1, le=1000)] = 200,
+    ) -> list[shapes.Summary]:
+        query = archive.listed(
+            graph=graph, engine=robot, state=run_state, before=before, limit=limit
+        )
+        found = [_listed(house, row) for row in await house.control.rows(query)]
+        return [each for each in found if run_state is None or each.state == run_state]
+
+    @get("/api/runs/{run:str}", summary="A run, and the graph as it was sent")
+    async def one(run: str) -> shapes.RunWhole:
+        umrf = await house.control.umrf(run)
+        found = await house.control.find(run)
+        opened = house.control.open.get(run)
+        recorded = opened is None or opened.recorder.recorded
+        return shapes.whole(found, umrf, recorded=recorded)
+
+    @get("/api/runs/{run:str}/events", summary="A run's events as they are stored (SSE)")
+    async def events(run: str, request: _Asking) -> Stream | Response[None]:
+        after = _last_event_id(request)
+        found = await house.control.find(run)
+        if found.end is not None and not await house.control.events(run, after, 1):
+            return Response(None, status_code=204)  # tells an EventSource not to come again
+        return Stream(
+            _tail(house.control, run, after),
+            media_type="text/event-stream",
+            headers={"cache-control": "no-store"},
+        )
+
+    return [listed, one, events]
+
+
+def _robots(house: House) -> list[ControllerRouterHandler]:
+    @get("/api/robots", summary="Engines that runs can go to")
+    async def robots() -> list[Robot]:
+        return list(house.control.robots.all())
+
+    @post("/api/robots", summary="Register a robot")
+    async def register(data: Registration, request: _Asking) -> Response[Robot]:
+        robot = await house.control.register(data, _author(request))
+        return Response(robot, status_code=201, headers={"location": f"/api/robots/{robot.name}"})
+
+    @get("/api/robots/{name:str}", summary="One engine")
+    async def robot(name: str) -> Robot:
+        for each in house.control.robots.all():
+            if each.name == name:
+                return each
+        raise NotFound(f"No robot is called {name!r}.")
+
+    return [robots, register, robot]
+
+
+def _live(house: House) -> ControllerRouterHandler:
+    @websocket("/api/live")
+    async def live(socket: WebSocket[Any, Any, Any]) -> None:
+        await attend(socket, house.hub)
+
+    return live
+
+
+def _author(request: _Asking) -> Author:
+    person = person_of(request)
+    return Author(person.id, person.name)
+
+
+async def _stop_id(request: _Asking) -> str:
+    """Whatever the body is: a Stop is never refused for its form."""
+    try:
+        return msgspec.json.decode(await request.body(), type=StopAsked).stop_id[:100]
+    except (msgspec.DecodeError, HTTPException):
+        return ""
+
+
+def _shown(house: House, run: str) -> shapes.RunShown | None:
+    opened = house.control.open.get(run)
+    if opened is None:
+        return None
+    return shapes.shown(opened.run, recorded=opened.recorder.recorded)
+
+
+def _listed(house: House, row: Row[Any]) -> shapes.Summary:
+    opened = house.control.open.get(row.id)
+    if opened is None:
+        return shapes.summary_of_row(row)
+    return shapes.summary(opened.run, recorded=opened.recorder.recorded)
+
+
+def _last_event_id(request: _Asking) -> int:
+    asked = request.headers.get("last-event-id", "0")
+    if not asked.isascii() or not asked.isdigit():
+        raise BadInput("Last-Event-ID is the seq of the last event that was read.")
+    return int(asked)
+
+
+async def _tail(control: Control, run: str, after: int) -> AsyncIterator[bytes]:
+    """Stored events, then those that come, until the run is over."""
+    while True:
+        opened = control.open.get(run)
+        revision = opened.revision if opened is not None else 0
+        found = await control.events(run, after, _PAGE)
+        for event in found:
+            after = event.seq
+            body = msgspec.json.encode(
+                HistoryEvent(
+                    event.seq,
+                    event.kind,
+                    event.author,
+                    shapes.time(event.at),
+                    msgspec.Raw(event.body),
+                )
+            )
+            yield b"id: %d\nevent: %b\ndata: %b\n\n" % (after, event.kind.encode(), body)
+        if found:
+            continue
+        if opened is None:
+            return
+        with anyio.move_on_after(_ALIVE_S) as waited:
+            await control.change(run, revision)
+        if waited.cancelled_caught:
+            yield b": alive\n\n"

@@ -1,0 +1,76 @@
+"""The runner process: its journal, its service, its routes."""
+
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from litestar import Litestar
+from litestar.types import ASGIApp
+
+from action_assistant.errors import Refused
+from action_assistant.journal.journal import Journal
+from action_assistant.runner import archive
+from action_assistant.runner.api import House, routes
+from action_assistant.runner.control import Control
+from action_assistant.runner.live import Hub
+from action_assistant.runner.robots import Robots
+from action_assistant.settings import RunnerSettings
+from action_assistant.web.addresses import Addresses
+from action_assistant.web.asgi import Readiness, application
+from action_assistant.web.keys import Keys
+
+
+def wall_clock() -> int:
+    """Microseconds UTC."""
+    return time.time_ns() // 1000
+
+
+@asynccontextmanager
+async def open_house(settings: RunnerSettings) -> AsyncIterator[House]:
+    """Everything the routes need, working. Raises CannotStart."""
+    url = f"sqlite:///{settings.data / 'runner.db'}"
+    journal = await Journal.open(url, branch="runner", fold=archive.fold)
+    try:
+        async with Control.opened(journal, Robots(), wall=wall_clock) as control:
+            yield House(control, Hub(control, wall_clock), journal)
+    finally:
+        await journal.close()
+
+
+def create_app(settings: RunnerSettings) -> ASGIApp:
+    """The runner as an ASGI application."""
+    house = House.__new__(House)
+
+    @asynccontextmanager
+    async def lifespan(_: Litestar) -> AsyncIterator[None]:
+        async with open_house(settings) as opened:
+            house.control, house.hub, house.journal = opened.control, opened.hub, opened.journal
+            yield
+
+    async def ready() -> Readiness:
+        problems: list[str] = []
+        try:
+            await house.journal.position()
+        except Refused as refused:
+            problems.append(refused.detail)
+        unrecorded = [each for each in house.control.open.values() if not each.recorder.recorded]
+        if unrecorded:
+            problems.append(f"{len(unrecorded)} runs are not being recorded")
+        return Readiness(ready=not problems, problems=tuple(problems))
+
+    def measures() -> dict[str, float]:
+        return {
+            "action_assistant_runs_open": len(house.control.open),
+            "action_assistant_live_sockets": len(house.hub.boxes),
+        }
+
+    return application(
+        routes(house),
+        title="TeMoto Action Assistant: runner",
+        keys=Keys.of(settings.data),
+        addresses=Addresses(host=settings.host, page_port=settings.page_port, hosts=settings.hosts),
+        page_port=settings.page_port,
+        lifespan=[lifespan],
+        ready=ready,
+        measures=measures,
+    )

@@ -1,0 +1,208 @@
+"""The events of a run's stream: what was asked, what was sent, what was seen, how it ended.
+
+Bodies are msgspec JSON; the kind stands in the journal's own column. Fields are only ever added,
+with a default: streams of older versions must fold the same for ever. `at` is microseconds UTC,
+taken when the thing happened, which may be before it was stored.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar, Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.runner.seen import Seen
+
+End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "lost"]
+
+
+class Author(msgspec.Struct, frozen=True):
+    """The person behind a command."""
+
+    id: str
+    name: str
+
+
+class Override(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Problems that a person decided to start in spite of, and why."""
+
+    codes: tuple[str, ...]
+    reason: str
+
+
+class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Somebody asked for a start and nothing stood in its way. Stored before anything is sent."""
+
+    kind: ClassVar[str] = "run.requested.v1"
+
+    at: int
+    run: str
+    number: int
+    request_id: str
+    author: Author
+    graph: str | None
+    graph_name: str
+    version: str
+    digest: str
+    engine: str
+    simulated: bool
+    actions: dict[str, str]  # full name -> aid
+    umrf: str  # as sent
+    script: str = ""  # JSON text
+    override: Override | None = None
+
+
+class Published(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The one start message has left. `incarnation` names the life of the engine it went to."""
+
+    kind: ClassVar[str] = "run.published.v1"
+
+    at: int
+    incarnation: str = ""
+
+
+class Observed(msgspec.Struct, frozen=True):
+    """Something of the engine was seen, in this order."""
+
+    kind: ClassVar[str] = "run.observed.v1"
+
+    at: int
+    seen: tuple[Seen, ...]
+
+
+class PauseRequested(msgspec.Struct, frozen=True):
+    """Somebody wants the run to pause."""
+
+    kind: ClassVar[str] = "run.pause_requested.v1"
+
+    at: int
+    author: Author
+
+
+class ResumeRequested(msgspec.Struct, frozen=True):
+    """Somebody wants the run to go on."""
+
+    kind: ClassVar[str] = "run.resume_requested.v1"
+
+    at: int
+    author: Author
+
+
+class StopRequested(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Somebody wants the run stopped. Holds until the run has ended; nothing takes it back."""
+
+    kind: ClassVar[str] = "run.stop_requested.v1"
+
+    at: int
+    author: Author
+    stop_id: str = ""
+
+
+class StopSent(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A stop message has left, or (`failed`) could not."""
+
+    kind: ClassVar[str] = "run.stop_sent.v1"
+
+    at: int
+    attempt: int
+    failed: str = ""
+
+
+class Proof(msgspec.Struct, frozen=True):
+    """A get asked after the stop showed no running node. `hash` is SHA-256 over what it showed."""
+
+    kind: ClassVar[str] = "run.proof.v1"
+
+    at: int
+    asked_at: int
+    hash: str
+
+
+class Silent(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The engine answers no get; nothing is known since `since`."""
+
+    kind: ClassVar[str] = "run.silent.v1"
+
+    at: int
+    since: int
+    why: str = ""
+
+
+class Answered(msgspec.Struct, frozen=True):
+    """The engine answers again."""
+
+    kind: ClassVar[str] = "run.answered.v1"
+
+    at: int
+
+
+class AlarmRaised(msgspec.Struct, frozen=True):
+    """Something that a person must know now."""
+
+    kind: ClassVar[str] = "run.alarm_raised.v1"
+
+    at: int
+    code: str
+    text: str
+
+
+class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The run is over, and in which state; for `refused` and `lost` `detail` says why."""
+
+    kind: ClassVar[str] = "run.ended.v1"
+
+    at: int
+    state: End
+    result: str | None = None
+    detail: str = ""
+
+
+class Unknown(msgspec.Struct, frozen=True):
+    """An event of a kind that this version does not know: kept, and passed over."""
+
+    kind: ClassVar[str] = ""
+
+
+RunEvent: TypeAlias = (
+    Requested
+    | Published
+    | Observed
+    | PauseRequested
+    | ResumeRequested
+    | StopRequested
+    | StopSent
+    | Proof
+    | Silent
+    | Answered
+    | AlarmRaised
+    | Ended
+    | Unknown
+)
+
+_KINDS: Final[Mapping[str, type[RunEvent]]] = {
+    each.kind: each
+    for each in (
+        Requested,
+        Published,
+        Observed,
+        PauseRequested,
+        ResumeRequested,
+        StopRequested,
+        StopSent,
+        Proof,
+        Silent,
+        Answered,
+        AlarmRaised,
+        Ended,
+    )
+}
+
+
+def encode(event: RunEvent) -> bytes:
+    """The body of an event."""
+    return msgspec.json.encode(event)
+
+
+def decode(kind: str, body: bytes) -> RunEvent:
+    """The event of a stored body. Raises msgspec.DecodeError when the body is not of its kind."""
+    known = _KINDS.get(kind)
+    return Unknown() if known is None else msgspec.json.decode(body, type=known)

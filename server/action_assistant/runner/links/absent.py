@@ -1,0 +1,50 @@
+"""The link to a robot that cannot be reached: says so, whatever it is asked."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from typing import Final
+
+import anyio
+
+from action_assistant.runner.links.port import Answer, NoAnswer, NotSent, Order, Report
+
+
+class AbsentLink:
+    """Stands in where a run is known but its robot is out of reach."""
+
+    simulated: Final = False
+    pauses: Final = False
+
+    def __init__(self, why: str) -> None:
+        self._why = why
+
+    async def start(self, order: Order) -> None:
+        """Refuses."""
+        raise NotSent(self._why)
+
+    async def stop(self, graph_name: str) -> None:
+        """Refuses."""
+        raise NotSent(self._why)
+
+    async def pause(self, graph_name: str) -> None:
+        """Refuses."""
+        raise NotSent(self._why)
+
+    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+        """Refuses."""
+        raise NotSent(self._why)
+
+    async def get(self) -> Answer:
+        """Refuses."""
+        raise NoAnswer(self._why)
+
+    async def run(self) -> None:
+        """Nothing to keep going."""
+        await anyio.sleep_forever()
+
+    def listen(self, _: Callable[[Report], None]) -> AbstractContextManager[None]:
+        """Nothing is ever reported."""
+        return nullcontext()
+
+    async def aclose(self) -> None:
+        """Nothing to let go of."""

@@ -1,0 +1,196 @@
+"""The link to a simulated engine: `umrf.semantics` driven by the event loop's clock.
+
+The loop's clock may be a virtual one, which tests use to live through days in a second. Every graph
+that is started here keeps its name to itself, so one link serves many runs of different graphs.
+"""
+
+import math
+import secrets
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Final, assert_never
+
+import anyio
+
+from action_assistant.runner.links.port import (
+    Answer,
+    EngineChanged,
+    EngineRefused,
+    EngineState,
+    NoAnswer,
+    Order,
+    Report,
+    Transitions,
+)
+from action_assistant.runner.seen import (
+    Exact,
+    GraphResult,
+    GraphState,
+    Hazard,
+    NodeResult,
+    NodeState,
+    Snapshot,
+)
+from action_assistant.umrf import semantics
+
+_SLICE: Final = 50  # engine steps between two turns of the event loop
+
+
+class SimulatorLink:
+    """A simulated engine in this process. `wall` gives microseconds UTC."""
+
+    simulated: Final = True
+    pauses: Final = True
+
+    def __init__(self, engine: semantics.Engine, *, wall: Callable[[], int]) -> None:
+        self._engine = engine
+        self._wall = wall
+        self._origin = anyio.current_time()
+        self._origin_wall = wall()
+        self._incarnation = secrets.token_hex(8)
+        self._runs: dict[str, str] = {}  # graph name -> run
+        self._ears: list[Callable[[Report], None]] = []
+        self._wake = anyio.Event()
+        self._dead: str | None = None
+
+    async def start(self, order: Order) -> None:
+        """Start at this moment. Raises EngineRefused."""
+        self._alive()
+        self._runs[order.graph.name] = order.run
+        try:
+            self._tell(self._engine.start(order.graph, self._now()))
+        except semantics.EngineRefused as refused:
+            raise EngineRefused(str(refused)) from refused
+
+    async def stop(self, graph_name: str) -> None:
+        """Stop at this moment. As in the engine's node, a second stop waits for the first one and
+        then finds nothing to do."""
+        state = self._engine.states().get(graph_name)
+        if self._dead is None and state is not None and state.state != "STOPPING":
+            self._tell(self._engine.stop(graph_name, self._now()))
+
+    async def pause(self, graph_name: str) -> None:
+        """Pause at this moment."""
+        if self._dead is None:
+            self._tell(self._engine.pause(graph_name, self._now()))
+
+    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+        """Resume at this moment."""
+        if self._dead is None:
+            self._tell(self._engine.resume(graph_name, self._now(), continue_from=continue_from))
+
+    async def get(self) -> Answer:
+        """What the engine holds right now."""
+        self._alive()
+        self._advance()
+        at = self._wall()
+        graphs = tuple(
+            Snapshot(
+                at=at,
+                graph=name,
+                state=now.state,
+                nodes=dict(now.nodes),
+                asked_at=at,
+                run=self._run_of(name),
+            )
+            for name, now in self._engine.states().items()
+        )
+        return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=graphs)
+
+    async def run(self) -> None:
+        """Let the engine live until cancelled."""
+        while True:
+            due = self._engine.due
+            wait = math.inf if due is None else max(0.0, (due - self._now()) / 1000)
+            with anyio.move_on_after(wait):
+                await self._wake.wait()
+            self._wake = anyio.Event()
+            while not self._advance():
+                await anyio.lowlevel.checkpoint()
+
+    @contextmanager
+    def listen(self, hear: Callable[[Report], None]) -> Iterator[None]:
+        """Every transition from now on."""
+        self._ears.append(hear)
+        try:
+            yield
+        finally:
+            self._ears.remove(hear)
+
+    async def aclose(self) -> None:
+        """End the engine."""
+        self._dead = "the simulated engine was switched off"
+
+    def _now(self) -> float:
+        return (anyio.current_time() - self._origin) * 1000
+
+    def _alive(self) -> None:
+        if self._dead is not None:
+            raise NoAnswer(self._dead)
+
+    def _advance(self) -> bool:
+        """Catch up with the clock, a slice at most. Whether nothing is left to do now."""
+        told: list[semantics.Trace] = []
+        for _ in range(_SLICE):
+            due = self._engine.due
+            if self._dead is not None or due is None or due > self._now():
+                break
+            told += self._engine.advance(due)
+        self._tell(told)
+        due = self._engine.due
+        return self._dead is not None or due is None or due > self._now()
+
+    def _tell(self, traces: Sequence[semantics.Trace]) -> None:
+        self._wake.set()
+        per_run: dict[str, list[Exact]] = {}
+        for trace in traces:
+            seen = _seen(trace, self._at(trace.t_ms))
+            run = self._run_of(trace.graph)
+            if seen is not None and run is not None:
+                per_run.setdefault(run, []).append(seen)
+        for run, changes in per_run.items():
+            self._report(Transitions(run=run, changes=tuple(changes)))
+        for trace in traces:
+            if isinstance(trace, semantics.Hazard) and trace.effect in {"crash", "hang"}:
+                self._fail(trace)
+
+    def _fail(self, hazard: semantics.Hazard) -> None:
+        """From now on nobody answers, as with the real engine; a hung one still exists."""
+        what = "has crashed" if hazard.effect == "crash" else "hangs"
+        why = f"The simulated engine {what} ({hazard.code}). {hazard.message}".rstrip()
+        self._dead = why
+        state: EngineState = "gone" if hazard.effect == "crash" else "busy"
+        self._report(EngineChanged(at=self._at(hazard.t_ms), state=state, why=why))
+
+    def _report(self, report: Report) -> None:
+        for hear in tuple(self._ears):
+            hear(report)
+
+    def _at(self, t_ms: float) -> int:
+        return self._origin_wall + round(t_ms * 1000)
+
+    def _run_of(self, graph: str) -> str | None:
+        """Sub-graphs run as `GRAPH__NAME__ID`; the longest known beginning owns them."""
+        if graph in self._runs:
+            return self._runs[graph]
+        owners = [name for name in self._runs if graph.startswith(f"{name}__")]
+        return self._runs[max(owners, key=len)] if owners else None
+
+
+def _seen(trace: semantics.Trace, at: int) -> Exact | None:
+    """What of a trace is worth a place in the history; relations follow from results."""
+    match trace:
+        case semantics.NodeState():
+            return NodeState(at, trace.graph, trace.node, trace.state)
+        case semantics.NodeResult():
+            return NodeResult(at, trace.graph, trace.node, trace.result, trace.message)
+        case semantics.GraphState():
+            return GraphState(at, trace.graph, trace.state)
+        case semantics.GraphResult():
+            return GraphResult(at, trace.graph, trace.value)
+        case semantics.Hazard():
+            return Hazard(at, trace.graph, trace.code, trace.effect, trace.node, trace.message)
+        case semantics.EdgeEval() | semantics.Dispatch() | semantics.NotReady():
+            return None
+        case _:
+            assert_never(trace)

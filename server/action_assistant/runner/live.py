@@ -1,0 +1,244 @@
+"""The live socket: what goes on, to every page; Stop, from any of them.
+
+Nothing queues up behind a slow page: of each run only the newest state waits, and the answer to a
+Stop goes before it.
+"""
+
+import logging
+from collections import deque
+from collections.abc import Awaitable, Callable
+from datetime import datetime
+from typing import Any, Final
+from weakref import WeakKeyDictionary
+
+import anyio
+import msgspec
+from litestar import WebSocket
+from litestar.exceptions import WebSocketDisconnect, WebSocketException
+
+from action_assistant.errors import Refused
+from action_assistant.runner import shapes
+from action_assistant.runner.control import Control
+from action_assistant.runner.driving import Clock, OpenRun
+from action_assistant.runner.events import Author
+from action_assistant.runner.robots import Robot
+from action_assistant.web.access import person_of, session_of
+
+log: Final = logging.getLogger(__name__)
+
+_GAP_S: Final = 0.05  # between two states of one run
+_SHARE: Final = 20  # at most one part in so many of the time goes into encoding one run
+_BEAT_S: Final = 1.0
+_SEND_S: Final = 15.0
+_LETTERS: Final = 64
+_TOO_SLOW: Final = 1013
+_LONGEST: Final = 10_000  # characters of a message from the page
+
+
+class StopMessage(msgspec.Struct, frozen=True, tag="stop", tag_field="type"):
+    """The one thing that a page may say."""
+
+    run: str
+    stop_id: str = ""
+
+
+class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
+    """The runs that a Stop concerns."""
+
+    stop_id: str
+    runs: list[str]
+
+
+class RefusedMessage(msgspec.Struct, frozen=True, tag="refused", tag_field="type"):
+    """Why a message was not followed."""
+
+    stop_id: str
+    detail: str
+
+
+class Hello(msgspec.Struct, frozen=True, tag="hello", tag_field="type"):
+    """The first message."""
+
+    engines: list[Robot]
+    runs: list[shapes.RunShown]
+
+
+class RunMessage(msgspec.Struct, frozen=True, tag="run", tag_field="type"):
+    """A run as it is now."""
+
+    run: shapes.RunShown
+
+
+class Beat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
+    """Once a second: the link is alive."""
+
+    at: datetime
+
+
+class Frame(msgspec.Struct, frozen=True):
+    """An encoded run, and what encoding it took (seconds)."""
+
+    revision: int
+    text: str
+    cost: float
+
+
+class Hub:
+    """Everybody who watches."""
+
+    def __init__(self, control: Control, wall: Clock) -> None:
+        self.control = control
+        self.wall = wall
+        self.boxes: set[Outbox] = set()
+        self._frames: WeakKeyDictionary[OpenRun, Frame] = WeakKeyDictionary()
+        control.watch(self._changed)
+
+    def _changed(self, opened: OpenRun) -> None:
+        for box in self.boxes:
+            box.mark(opened)
+
+    def frame(self, opened: OpenRun) -> Frame:
+        """A run as text; encoded once for everybody."""
+        frame = self._frames.get(opened)
+        if frame is None or frame.revision != opened.revision:
+            began = anyio.current_time()
+            text = msgspec.json.encode(RunMessage(self._shown(opened))).decode()
+            frame = Frame(opened.revision, text, anyio.current_time() - began)
+            self._frames[opened] = frame
+        return frame
+
+    def hello(self) -> str:
+        """All that goes on now."""
+        runs = [self._shown(opened) for opened in self.control.open.values()]
+        return msgspec.json.encode(Hello(list(self.control.robots.all()), runs)).decode()
+
+    def _shown(self, opened: OpenRun) -> shapes.RunShown:
+        return shapes.shown(opened.run, recorded=opened.recorder.recorded)
+
+    async def follow(self, text: str, author: Author) -> str:
+        """Do what a page says; the answer."""
+        stop_id = ""
+        try:
+            if len(text) > _LONGEST:
+                raise msgspec.ValidationError("too long")
+            message = msgspec.json.decode(text, type=StopMessage)
+            stop_id = message.stop_id
+            if message.run == "all":
+                runs = self.control.stop_all(author, stop_id)
+            else:
+                runs = await self.control.stop(message.run, author, stop_id)
+        except msgspec.DecodeError as wrong:
+            return _text(RefusedMessage(stop_id, f"Not understood: {wrong}"))
+        except Refused as refused:
+            return _text(RefusedMessage(stop_id, refused.detail))
+        return _text(Stopping(stop_id, runs))
+
+
+class Outbox:
+    """What waits for one page: answers in order, and which runs have changed."""
+
+    def __init__(self, hub: Hub, is_allowed: Callable[[], bool]) -> None:
+        self._hub = hub
+        self._is_allowed = is_allowed
+        self._letters: deque[str] = deque()
+        self._changed: dict[str, OpenRun] = {}
+        self._next: dict[str, float] = {}  # run -> when it may be sent again
+        self._news = anyio.Event()
+
+    def mark(self, opened: OpenRun) -> None:
+        """A run has changed."""
+        if opened.run.id not in self._changed:
+            self._changed[opened.run.id] = opened
+            self._news.set()
+
+    def post(self, text: str) -> bool:
+        """An answer; false when the page has left too many unread."""
+        self._letters.append(text)
+        self._news.set()
+        return len(self._letters) <= _LETTERS
+
+    async def deliver(self, send: Callable[[str], Awaitable[None]]) -> None:
+        """Send until cancelled. `TimeoutError` when the page does not read."""
+        beat = anyio.current_time() + _BEAT_S
+        while True:
+            self._news = anyio.Event()
+            while (text := self._pick(beat)) is not None:
+                with anyio.fail_after(_SEND_S):
+                    await send(text)
+                if text.startswith('{"type":"beat"'):
+                    beat = anyio.current_time() + _BEAT_S
+            due = min([beat, *(self._next.get(run, 0.0) for run in self._changed)])
+            with anyio.move_on_after(max(0.0, due - anyio.current_time())):
+                await self._news.wait()
+
+    def _pick(self, beat: float) -> str | None:
+        """The next thing to send: answers, then a beat, then runs whose turn has come."""
+        now = anyio.current_time()
+        if self._letters:
+            return self._letters.popleft()
+        if now >= beat:
+            return _text(Beat(shapes.time(self._hub.wall())))
+        if not self._is_allowed():
+            self._changed.clear()
+            return None
+        for run, opened in self._changed.items():
+            if self._next.get(run, 0.0) <= now:
+                del self._changed[run]
+                frame = self._hub.frame(opened)
+                self._next[run] = now + max(_GAP_S, _SHARE * frame.cost)
+                if opened.run.end is not None and opened.recorder.idle:
+                    self._next.pop(run)
+                return frame.text
+        return None
+
+
+async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
+    """Serve one page until it goes away. The Stop of an expired session is followed, but it is
+    shown nothing more."""
+    person = person_of(socket)
+    session = session_of(socket)
+    author = Author(person.id, person.name)
+    box = Outbox(hub, lambda: session is None or not session.expired)
+    await socket.accept()
+    box.post(hub.hello())
+    hub.boxes.add(box)
+    try:
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(_read, socket, hub, box, author, tasks.cancel_scope)
+            await _write(socket, box)
+            tasks.cancel_scope.cancel()
+    finally:
+        hub.boxes.discard(box)
+
+
+async def _read(
+    socket: WebSocket[Any, Any, Any],
+    hub: Hub,
+    box: Outbox,
+    author: Author,
+    scope: anyio.CancelScope,
+) -> None:
+    try:
+        while True:
+            text = await socket.receive_text()
+            if not box.post(await hub.follow(text, author)):
+                await socket.close(code=_TOO_SLOW, reason="too slow")
+                break
+    except (WebSocketDisconnect, WebSocketException, OSError):
+        pass  # the page has gone; nothing of it is kept
+    scope.cancel()
+
+
+async def _write(socket: WebSocket[Any, Any, Any], box: Outbox) -> None:
+    try:
+        await box.deliver(socket.send_text)
+    except TimeoutError:
+        log.info("a page does not read; its live socket is closed")
+        with anyio.move_on_after(1):
+            await socket.close(code=_TOO_SLOW, reason="too slow")
+    except (WebSocketDisconnect, WebSocketException, OSError):
+        pass
+
+
+def _text(message: Stopping | RefusedMessage | Beat) -> str:
+    return msgspec.json.encode(message).decode()

@@ -1,0 +1,383 @@
+"""A run, as the pure fold of its events.
+
+The same function serves the live view and the history, so both always show the same. Nothing here
+knows a clock, a link or a database.
+"""
+
+from collections.abc import Iterable
+from typing import Final, Literal, TypeAlias, assert_never
+
+import msgspec
+from msgspec.structs import replace
+
+from action_assistant.runner.events import (
+    AlarmRaised,
+    Answered,
+    Author,
+    End,
+    Ended,
+    Observed,
+    Override,
+    PauseRequested,
+    Proof,
+    Published,
+    Requested,
+    ResumeRequested,
+    RunEvent,
+    Silent,
+    StopRequested,
+    StopSent,
+    Unknown,
+)
+from action_assistant.runner.seen import (
+    ACTIVE,
+    GraphResult,
+    GraphState,
+    Hazard,
+    NodeResult,
+    NodeState,
+    Seen,
+    Snapshot,
+)
+
+State: TypeAlias = Literal[
+    "requested",
+    "published",
+    "running",
+    "paused",
+    "stopping",
+    "unknown",
+    "finished",
+    "halted",
+    "stopped",
+    "error",
+    "refused",
+    "lost",
+]
+Desired: TypeAlias = Literal["running", "paused", "stopped"]
+Outcome: TypeAlias = Literal["true", "false", "error", "stopped"]
+How: TypeAlias = Literal["observed", "inferred"]
+
+#: States in which a run is over.
+ENDED: Final[frozenset[State]] = frozenset(
+    {"finished", "halted", "stopped", "error", "refused", "lost"}
+)
+#: Visits and messages of one action that a run carries; older ones are in its events.
+KEPT: Final = 100
+
+_END_OF: Final[dict[str, End]] = {
+    "FINISHED": "finished",
+    "HALTED": "halted",
+    "STOPPED": "stopped",
+    "ERROR": "error",
+}
+_OUTCOMES: Final[dict[str, Outcome]] = {
+    "on_true": "true",
+    "on_false": "false",
+    "on_error": "error",
+    "on_stopped": "stopped",
+}
+
+
+class Visit(msgspec.Struct, frozen=True, kw_only=True):
+    """One execution of an action.
+
+    It was seen going on from `start` to `until` (None: still); at most it lasted from `not_before`
+    to `not_after`. `how` says whether start and result were seen or follow from other things.
+    """
+
+    start: int
+    not_before: int
+    until: int | None = None
+    not_after: int | None = None
+    result: Outcome | None = None
+    how: How = "observed"
+
+
+class Message(msgspec.Struct, frozen=True):
+    """What an action had to say."""
+
+    at: int
+    text: str
+
+
+class ActionRun(msgspec.Struct, frozen=True, kw_only=True):
+    """One action of the run. `older` counts visits that are not listed any more."""
+
+    aid: str | None = None
+    state: str = "UNINITIALIZED"
+    seen_at: int = 0
+    visits: tuple[Visit, ...] = ()
+    older: int = 0
+    messages: tuple[Message, ...] = ()
+    heard: int = 0
+
+
+class Alarm(msgspec.Struct, frozen=True):
+    """Something that a person must know now."""
+
+    code: str
+    at: int
+    text: str
+
+
+class Run(msgspec.Struct, frozen=True, kw_only=True):
+    """All that is known of one run. Times are microseconds UTC."""
+
+    id: str
+    number: int
+    request_id: str
+    author: Author
+    graph: str | None
+    graph_name: str
+    version: str
+    digest: str
+    engine: str
+    simulated: bool
+    requested_at: int
+    override: Override | None = None
+    desired: Desired = "running"
+    incarnation: str | None = None  # None: nothing has been sent, as far as is known
+    graph_state: str | None = None
+    parts: dict[str, str] = {}  # running sub-graphs of this run, and their states
+    actions: dict[str, ActionRun] = {}
+    result: str | None = None
+    started_at: int | None = None
+    ended_at: int | None = None
+    end: End | None = None
+    detail: str = ""
+    unknown_since: int | None = None
+    proof_at: int | None = None
+    stop_requested_at: int | None = None
+    stopped_by: Author | None = None
+    stops_sent: int = 0
+    alarms: tuple[Alarm, ...] = ()
+
+    @property
+    def state(self) -> State:
+        """One word for where the run is."""
+        if self.end is not None:
+            return self.end
+        if self.unknown_since is not None:
+            return "unknown"
+        if self.desired == "stopped" or self.graph_state == "STOPPING":
+            return "stopping"
+        if self.incarnation is None:
+            return "requested"
+        match self.graph_state:
+            case None | "UNINITIALIZED" | "INITIALIZED":
+                return "published"
+            case "PAUSED":
+                return "paused"
+            case _:  # also a graph that has finished while nodes still run (H12)
+                return "running"
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Actions that move or may move again."""
+        return tuple(name for name, action in self.actions.items() if action.state in ACTIVE)
+
+    @property
+    def apparent_end(self) -> End | None:
+        """How the run would end if what was seen last is all there is."""
+        if self.end is not None or self.graph_state is None or self.active:
+            return None
+        if any(state in {"RUNNING", "STOPPING", "PAUSED"} for state in self.parts.values()):
+            return None
+        return _END_OF.get(self.graph_state)
+
+
+def replay(events: Iterable[RunEvent]) -> Run | None:
+    """The run that these events tell; None before it was requested."""
+    run: Run | None = None
+    for event in events:
+        if run is not None:
+            run = follow(run, event)
+        elif isinstance(event, Requested):
+            run = begin(event)
+    return run
+
+
+def begin(event: Requested) -> Run:
+    """A run at its first event."""
+    return Run(
+        id=event.run,
+        number=event.number,
+        request_id=event.request_id,
+        author=event.author,
+        graph=event.graph,
+        graph_name=event.graph_name,
+        version=event.version,
+        digest=event.digest,
+        engine=event.engine,
+        simulated=event.simulated,
+        requested_at=event.at,
+        override=event.override,
+        actions={name: ActionRun(aid=aid) for name, aid in event.actions.items()},
+    )
+
+
+def follow(run: Run, event: RunEvent) -> Run:
+    """The run after one more event. Total: no event that can be decoded is refused."""
+    if run.end is not None and not isinstance(event, AlarmRaised):
+        return run
+    match event:
+        case Published():
+            return replace(run, incarnation=event.incarnation, started_at=event.at)
+        case Observed():
+            return _observe(run, event.seen)
+        case PauseRequested():
+            return run if run.desired == "stopped" else replace(run, desired="paused")
+        case ResumeRequested():
+            return run if run.desired == "stopped" else replace(run, desired="running")
+        case StopRequested():
+            if run.desired == "stopped":
+                return run
+            return replace(
+                run, desired="stopped", stop_requested_at=event.at, stopped_by=event.author
+            )
+        case StopSent():
+            return replace(run, stops_sent=run.stops_sent + (0 if event.failed else 1))
+        case Proof():
+            return replace(run, proof_at=event.at)
+        case Silent():
+            return replace(run, unknown_since=event.since)
+        case Answered():
+            return replace(run, unknown_since=None)
+        case AlarmRaised():
+            alarm = Alarm(event.code, event.at, event.text)
+            return replace(run, alarms=(*run.alarms, alarm)[-KEPT:])
+        case Ended():
+            return _end(run, event)
+        case Requested() | Unknown():
+            return run
+        case _:
+            assert_never(event)
+
+
+def _end(run: Run, event: Ended) -> Run:
+    """An end that nothing proves leaves the actions as they were seen last, without an end."""
+    return replace(
+        run,
+        end=event.state,
+        ended_at=event.at,
+        result=event.result or run.result,
+        detail=event.detail,
+        unknown_since=run.unknown_since if event.state == "lost" else None,
+    )
+
+
+def _observe(run: Run, seen: Iterable[Seen]) -> Run:
+    actions = dict(run.actions)
+    parts = run.parts
+    graph_state, result = run.graph_state, run.result
+    for item in seen:
+        match item:
+            case NodeState():
+                name = _key(run, item.graph, item.node)
+                actions[name] = _changed(actions.get(name, ActionRun()), item.state, item.at)
+            case NodeResult():
+                name = _key(run, item.graph, item.node)
+                actions[name] = _resulted(actions.get(name, ActionRun()), item)
+            case GraphState():
+                if item.graph == run.graph_name:
+                    graph_state = item.state
+                else:
+                    parts = parts | {item.graph: item.state}
+            case GraphResult():
+                result = item.result if item.graph == run.graph_name else result
+            case Snapshot():
+                for node, state in item.nodes.items():
+                    name = _key(run, item.graph, node)
+                    action = _shown(actions.get(name, ActionRun()), state, item, run)
+                    actions[name] = _heard(action, item.messages.get(node, ()), item.at)
+                if item.graph == run.graph_name:
+                    graph_state = item.state
+                else:
+                    parts = parts | {item.graph: item.state}
+            case Hazard():
+                pass  # the alarm that comes with it is an event of its own
+            case _:
+                assert_never(item)
+    return replace(run, actions=actions, parts=parts, graph_state=graph_state, result=result)
+
+
+def _key(run: Run, graph: str, node: str) -> str:
+    return node if graph == run.graph_name else f"{graph}/{node}"
+
+
+def _changed(action: ActionRun, state: str, at: int) -> ActionRun:
+    """After an exact transition."""
+    visits, older = action.visits, action.older
+    if state in ACTIVE:
+        if not _open(action):
+            visits, older = _kept(visits, older, Visit(start=at, not_before=at))
+    elif _open(action):
+        result = visits[-1].result or _implied(action.state, state)
+        visits = (*visits[:-1], replace(visits[-1], until=at, not_after=at, result=result))
+    elif state == "ERROR" and action.state != "ERROR":  # thrown while it was made ready
+        visit = Visit(start=at, not_before=at, until=at, not_after=at, result="error")
+        visits, older = _kept(visits, older, visit)
+    return replace(action, state=state, seen_at=at, visits=visits, older=older)
+
+
+def _resulted(action: ActionRun, item: NodeResult) -> ActionRun:
+    """After an exact result; it comes while the visit is still open, or right after its end."""
+    visits = action.visits
+    if visits:
+        visits = (*visits[:-1], replace(visits[-1], result=_OUTCOMES.get(item.result)))
+    messages = action.messages
+    if item.message is not None:
+        messages = (*messages, Message(item.at, item.message))[-KEPT:]
+    return replace(action, visits=visits, messages=messages)
+
+
+def _shown(action: ActionRun, state: str, item: Snapshot, run: Run) -> ActionRun:
+    """After a snapshot, which says how things are but not when they became so."""
+    at = item.at
+    before = min(at, max(item.since or 0, action.seen_at, run.started_at or run.requested_at))
+    visits, older = action.visits, action.older
+    if state in ACTIVE:
+        if not _open(action):
+            visits, older = _kept(visits, older, Visit(start=at, not_before=before))
+    elif _open(action):
+        last = visits[-1]
+        implied = last.result or _implied(action.state, state)
+        how: How = "inferred" if implied is not None and last.result is None else last.how
+        ended = replace(last, until=max(last.start, before), not_after=at, result=implied, how=how)
+        visits = (*visits[:-1], ended)
+    elif state in {"FINISHED", "ERROR"} and action.state not in {"FINISHED", "ERROR"}:
+        visit = Visit(
+            start=at,
+            not_before=before,
+            until=at,
+            not_after=at,
+            result="error" if state == "ERROR" else None,
+            how="inferred",
+        )
+        visits, older = _kept(visits, older, visit)
+    return replace(action, state=state, seen_at=at, visits=visits, older=older)
+
+
+def _heard(action: ActionRun, messages: tuple[str, ...], at: int) -> ActionRun:
+    """A snapshot repeats all messages so far; only the new ones are added."""
+    if len(messages) <= action.heard:
+        return action if len(messages) == action.heard else replace(action, heard=len(messages))
+    fresh = tuple(Message(at, text) for text in messages[action.heard :])
+    return replace(action, messages=(*action.messages, *fresh)[-KEPT:], heard=len(messages))
+
+
+def _implied(before: str, after: str) -> Outcome | None:
+    """The result that a pair of states leaves no doubt about."""
+    if after == "ERROR":
+        return "error"
+    return "stopped" if before == "STOPPING" else None
+
+
+def _open(action: ActionRun) -> bool:
+    return bool(action.visits) and action.visits[-1].until is None
+
+
+def _kept(visits: tuple[Visit, ...], older: int, visit: Visit) -> tuple[tuple[Visit, ...], int]:
+    over = len(visits) + 1 - KEPT
+    return ((*visits[over:], visit), older + over) if over > 0 else ((*visits, visit), older)

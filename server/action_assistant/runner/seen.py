@@ -1,0 +1,95 @@
+"""What a link can see of an engine: exact transitions from the simulator, snapshots from robots.
+
+Times are microseconds UTC by this process's clock. Graph and node names are the engine's: a graph's
+running name, a node's full name (`NAME_ID`). These values are journaled as they are, so fields are
+only ever added, with a default.
+"""
+
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+
+#: States in which a node moves, or may move again without a new start.
+ACTIVE: Final = frozenset({"RUNNING", "STOPPING", "PAUSE_REQUESTED", "PAUSED"})
+#: States of a graph in which the engine starts nothing more by itself.
+TERMINAL: Final = frozenset({"FINISHED", "HALTED", "STOPPED", "ERROR"})
+
+
+class NodeState(msgspec.Struct, frozen=True, tag="node_state", tag_field="kind"):
+    """A node changed its state at exactly this time."""
+
+    at: int
+    graph: str
+    node: str
+    state: str
+
+
+class NodeResult(
+    msgspec.Struct, frozen=True, omit_defaults=True, tag="node_result", tag_field="kind"
+):
+    """A node ended with this result (`on_true`, …); `message` is what it had to say."""
+
+    at: int
+    graph: str
+    node: str
+    result: str
+    message: str | None = None
+
+
+class GraphState(msgspec.Struct, frozen=True, tag="graph_state", tag_field="kind"):
+    """A graph changed its state at exactly this time."""
+
+    at: int
+    graph: str
+    state: str
+
+
+class GraphResult(msgspec.Struct, frozen=True, tag="graph_result", tag_field="kind"):
+    """A graph ended with this result."""
+
+    at: int
+    graph: str
+    result: str
+
+
+class Hazard(msgspec.Struct, frozen=True, omit_defaults=True, tag="hazard", tag_field="kind"):
+    """The engine did something it should not (codes `H1` …, umrf SPEC 3).
+
+    `effect`: `crash` and `hang` end all its answers, `goes on` is a warning.
+    """
+
+    at: int
+    graph: str
+    code: str
+    effect: str
+    node: str | None = None
+    message: str = ""
+
+
+class Snapshot(msgspec.Struct, frozen=True, omit_defaults=True, tag="snapshot", tag_field="kind"):
+    """One graph as the engine showed it at `at`; what happened in between is not known.
+
+    `source`: `get` was asked for by us at `asked_at`, `feedback` came by itself and may be late.
+    `since`: when this engine was last seen before, so that changes lie between `since` and `at`.
+    `run`: the identity that the graph carries; None for graphs that others started.
+    `messages`: per node, all runtime messages so far.
+    """
+
+    at: int
+    graph: str
+    state: str
+    nodes: dict[str, str]
+    source: Literal["get", "feedback"] = "get"
+    asked_at: int | None = None
+    since: int | None = None
+    run: str | None = None
+    messages: dict[str, tuple[str, ...]] = {}
+
+    @property
+    def active(self) -> bool:
+        """Whether any node moves or may move again."""
+        return any(state in ACTIVE for state in self.nodes.values())
+
+
+Exact: TypeAlias = NodeState | NodeResult | GraphState | GraphResult | Hazard
+Seen: TypeAlias = Exact | Snapshot

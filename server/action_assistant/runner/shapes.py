@@ -1,0 +1,188 @@
+"""Runs as the page and programs see them (DESIGN 7)."""
+
+from datetime import UTC, datetime, timedelta
+from typing import Any, Final
+
+import msgspec
+from sqlalchemy import Row
+
+from action_assistant.runner.events import Author, Override
+from action_assistant.runner.runs import ActionRun, Desired, How, Outcome, Run, State
+
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
+    """One execution of an action: seen from `from` to `until`, at most from `not_before` to
+    `not_after`."""
+
+    start: datetime
+    not_before: datetime
+    not_after: datetime | None
+    until: datetime | None
+    result: Outcome | None
+    how: How
+
+
+class MessageShown(msgspec.Struct, frozen=True):
+    """What an action had to say."""
+
+    at: datetime
+    text: str
+
+
+class ActionShown(msgspec.Struct, frozen=True):
+    """One action of a run. `older` visits are not listed."""
+
+    aid: str | None
+    state: str
+    visits: list[VisitShown]
+    older: int
+    messages: list[MessageShown]
+
+
+class AlarmShown(msgspec.Struct, frozen=True):
+    """Something that a person must know now."""
+
+    code: str
+    at: datetime
+    text: str
+
+
+class Summary(msgspec.Struct, frozen=True, kw_only=True):
+    """A run as a list shows it."""
+
+    id: str
+    number: int
+    graph: str | None
+    graph_name: str
+    version: str | None
+    digest: str
+    engine: str
+    simulated: bool
+    author: Author
+    state: State
+    desired: Desired
+    result: str | None
+    proof_at: datetime | None
+    unknown_since: datetime | None
+    requested_at: datetime
+    started_at: datetime | None
+    ended_at: datetime | None
+    stopped_by: Author | None
+    detail: str
+    alarms: list[AlarmShown]
+    recorded: bool
+
+
+class RunShown(Summary, frozen=True, kw_only=True):
+    """A run with its actions, by full name."""
+
+    actions: dict[str, ActionShown]
+
+
+class RunWhole(RunShown, frozen=True, kw_only=True):
+    """A run with the graph as it was sent."""
+
+    umrf: msgspec.Raw
+    override: Override | None
+
+
+def time(us: int) -> datetime:
+    """Microseconds UTC as a moment."""
+    return _EPOCH + timedelta(microseconds=us)
+
+
+def summary(run: Run, *, recorded: bool = True) -> Summary:
+    """A run without its actions."""
+    return Summary(**_fields(run, recorded))
+
+
+def shown(run: Run, *, recorded: bool = True) -> RunShown:
+    """A run with its actions."""
+    actions = {name: _action(action) for name, action in run.actions.items()}
+    return RunShown(**_fields(run, recorded), actions=actions)
+
+
+def whole(run: Run, umrf: str, *, recorded: bool = True) -> RunWhole:
+    """All there is."""
+    actions = {name: _action(action) for name, action in run.actions.items()}
+    raw = msgspec.Raw(umrf.encode())
+    return RunWhole(**_fields(run, recorded), actions=actions, umrf=raw, override=run.override)
+
+
+def summary_of_row(row: Row[Any]) -> Summary:
+    """A run that is over, from its row."""
+    more = row.summary
+    stopped_by = more.get("stopped_by")
+    return Summary(
+        id=row.id,
+        number=row.number,
+        graph=row.graph,
+        graph_name=row.graph_name,
+        version=row.version,
+        digest=row.digest,
+        engine=row.engine,
+        simulated=row.simulated,
+        author=Author(row.author_id, row.author_name),
+        state=row.state,
+        desired=row.desired,
+        result=row.result,
+        proof_at=_time(more.get("proof_at")),
+        unknown_since=_time(more.get("unknown_since")) if row.state == "lost" else None,
+        requested_at=time(row.requested_at),
+        started_at=_time(row.started_at),
+        ended_at=_time(row.ended_at),
+        stopped_by=Author(**stopped_by) if stopped_by else None,
+        detail=more.get("detail", ""),
+        alarms=[
+            AlarmShown(each["code"], time(each["at"]), each["text"]) for each in more["alarms"]
+        ],
+        recorded=True,
+    )
+
+
+def _fields(run: Run, recorded: bool) -> dict[str, Any]:
+    return {
+        "id": run.id,
+        "number": run.number,
+        "graph": run.graph,
+        "graph_name": run.graph_name,
+        "version": run.version,
+        "digest": run.digest,
+        "engine": run.engine,
+        "simulated": run.simulated,
+        "author": run.author,
+        "state": run.state,
+        "desired": run.desired,
+        "result": run.result,
+        "proof_at": _time(run.proof_at),
+        "unknown_since": _time(run.unknown_since),
+        "requested_at": time(run.requested_at),
+        "started_at": _time(run.started_at),
+        "ended_at": _time(run.ended_at),
+        "stopped_by": run.stopped_by,
+        "detail": run.detail,
+        "alarms": [AlarmShown(each.code, time(each.at), each.text) for each in run.alarms],
+        "recorded": recorded,
+    }
+
+
+def _action(action: ActionRun) -> ActionShown:
+    visits = [
+        VisitShown(
+            time(each.start),
+            time(each.not_before),
+            _time(each.not_after),
+            _time(each.until),
+            each.result,
+            each.how,
+        )
+        for each in action.visits
+    ]
+    messages = [MessageShown(time(each.at), each.text) for each in action.messages]
+    return ActionShown(action.aid, action.state, visits, action.older, messages)
+
+
+def _time(us: int | None) -> datetime | None:
+    return None if us is None else time(us)
