@@ -52,6 +52,7 @@ export function addAction(doc: Y.Doc, action: NewAction): Key {
     writeParameters(doc, key, "out", action.outputs ?? []);
     for (const [field, text] of action.extra ?? []) put(doc, "actions", extraKey(key, field), text);
     if (action.position) rootOf(doc, "positions").set(key, [...action.position]);
+    erase(doc, "meta", "x/actions");
     settleGhosts(doc);
     return key;
   });
@@ -143,6 +144,16 @@ function writeNumber(doc: Y.Doc, key: Key, number: number): void {
   const field = actionKey(key, "instance_id");
   if (number !== 0 || rootOf(doc, "actions").has(field)) put(doc, "actions", field, number);
   erase(doc, "actions", extraKey(key, "instance_id"), actionKey(key, "twin"));
+  const odd = [...rootOf(doc, "relations").keys()].filter((field) => saysNumberOf(field, key));
+  erase(doc, "relations", ...odd);
+}
+
+/** Whether a key keeps an imported number that refers to the action and did not fit. */
+function saysNumberOf(field: string, key: Key): boolean {
+  const { head, rest } = splitKey(field);
+  const ends = endsOf(head);
+  if (rest === "x/children/instance_id") return ends?.child === key;
+  return rest === "x/parents/instance_id" && ends?.parent === key;
 }
 
 interface Fields {

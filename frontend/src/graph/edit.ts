@@ -9,10 +9,9 @@
 
 import type * as Y from "yjs";
 import { newAid } from "./ids";
-import { extraKey, noteKey, rootOf } from "./layout";
-import { ENTRY, EXIT, type JsonText, type Key, type Position } from "./model";
+import { noteKey, rootOf } from "./layout";
+import type { JsonText, Key, Position } from "./model";
 import { erase, hasEnd, put, together } from "./pen";
-import { asJsonText } from "./values";
 
 export * from "./edit-actions";
 export * from "./edit-parameters";
@@ -42,23 +41,8 @@ export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Posit
       if (!Array.isArray(old) || old[0] !== x || old[1] !== y) {
         rootOf(doc, "positions").set(key, [x, y]);
       }
-      if (key !== ENTRY && key !== EXIT) forgetOddPosition(doc, key);
     }
   });
-}
-
-/** An imported position that was none stays in `x/gui_attributes` until the action is moved. */
-function forgetOddPosition(doc: Y.Doc, key: Key): void {
-  const field = extraKey(key, "gui_attributes");
-  const text = asJsonText(rootOf(doc, "actions").get(field));
-  if (text === undefined) return;
-  const value: unknown = JSON.parse(text);
-  if (typeof value !== "object" || value === null || Array.isArray(value)) {
-    erase(doc, "actions", field);
-  } else if ("position" in value) {
-    const { position: _odd, ...rest } = value;
-    put(doc, "actions", field, JSON.stringify(rest));
-  }
 }
 
 /** Adds a note or frame; `text` is its JSON. Answers its id. */

@@ -243,13 +243,19 @@ function readAction(key: Key, fields: Fields, position: unknown): RawAction | nu
   return { action, order: asNumber(fields.get("order")) ?? 0 };
 }
 
-/** Listed paths in the order of the list, then the others by name. */
 function readParameters(fields: Fields, side: "in" | "out"): readonly Parameter[] {
   const texts = new Map(under(fields, `${side}/`));
-  const listed = new Set(asTextList(fields.get(side)) ?? []);
-  const paths = [...listed].filter((path) => texts.has(path));
-  for (const path of texts.keys()) if (!listed.has(path)) paths.push(path);
-  return paths.map((path) => ({ path, text: texts.get(path) ?? "" }));
+  return listed(texts.keys(), fields.get(side)).map((path) => ({
+    path,
+    text: texts.get(path) ?? "",
+  }));
+}
+
+/** Names in the order of a list, the others after them as they come. */
+function listed(names: Iterable<string>, order: unknown): readonly string[] {
+  const known = new Set(names);
+  const first = (asTextList(order) ?? []).filter((name) => known.has(name));
+  return [...new Set([...first, ...known])];
 }
 
 function readRelation(id: string, fields: Fields): Relation | null {
@@ -285,11 +291,11 @@ function readRelation(id: string, fields: Fields): Relation | null {
 }
 
 function readRemaps(fields: Fields): readonly Remap[] {
-  const remaps: Remap[] = [];
+  const targets = new Map<string, string>();
   for (const [key, value] of fields) {
     const target = asText(value);
-    if (!key.startsWith("remap/") || target === undefined) continue;
-    remaps.push({ source: key.slice("remap/".length), target });
+    if (key.startsWith("remap/") && target !== undefined) targets.set(key.slice(6), target);
   }
-  return remaps.sort((a, b) => byText(a.source, b.source));
+  const sources = listed([...targets.keys()].sort(byText), fields.get("remap"));
+  return sources.map((source) => ({ source, target: targets.get(source) ?? "" }));
 }

@@ -1,0 +1,570 @@
+import fc from "fast-check";
+import { expect, test } from "vitest";
+import * as Y from "yjs";
+import {
+  addAction,
+  addNote,
+  addParameter,
+  adoptGhost,
+  connect,
+  disconnect,
+  insertInto,
+  mirrorRelation,
+  moveActions,
+  moveRelation,
+  parametersFrom,
+  removeActions,
+  removeNotes,
+  removeParameter,
+  removeRelation,
+  rename,
+  renameParameter,
+  setEntry,
+  setExit,
+  setField,
+  setGraphDescription,
+  setGraphName,
+  setNote,
+  setParameter,
+  setRemap,
+  setRequired,
+  setResponse,
+  together,
+  undoOf,
+  unsetEntry,
+  unsetExit,
+} from "./edit";
+import { mapsOf, relationId } from "./layout";
+import { ENTRY, EXIT, fullName, type Graph, type Key, type Relation, spoken } from "./model";
+import { readGraph } from "./read";
+
+const graphOf = (doc: Y.Doc): Graph => readGraph(mapsOf(doc));
+const actionOf = (doc: Y.Doc, key: Key) => graphOf(doc).actions.find((a) => a.key === key);
+const relationOf = (doc: Y.Doc, id: string | null): Relation | undefined =>
+  graphOf(doc).relations.find((relation) => relationId(relation) === id);
+const says = (relation: Relation | undefined) =>
+  relation && spoken(relation.conditions).map((o) => `${o} -> ${relation.conditions[o]}`);
+const arrows = (doc: Y.Doc) =>
+  graphOf(doc)
+    .relations.map((relation) => {
+      const name = (key: Key) => actionOf(doc, key)?.name ?? key;
+      return `${name(relation.parent)}>${name(relation.child)}`;
+    })
+    .sort();
+
+function docWith(...names: string[]): [Y.Doc, ...Key[]] {
+  const doc = new Y.Doc();
+  return [doc, ...names.map((name) => addAction(doc, { name }))];
+}
+
+/** A colleague's copy. */
+function copyOf(doc: Y.Doc): Y.Doc {
+  const copy = new Y.Doc();
+  Y.applyUpdate(copy, Y.encodeStateAsUpdate(doc));
+  return copy;
+}
+
+function exchange(...docs: Y.Doc[]): void {
+  for (const from of docs) {
+    for (const to of docs) {
+      Y.applyUpdate(to, Y.encodeStateAsUpdate(from, Y.encodeStateVector(to)), "remote");
+    }
+  }
+}
+
+function updatesOf(doc: Y.Doc, work: () => void): number {
+  let count = 0;
+  const onUpdate = () => {
+    count += 1;
+  };
+  doc.on("update", onUpdate);
+  work();
+  doc.off("update", onUpdate);
+  return count;
+}
+
+// -- actions ----------------------------------------------------------------------------------
+
+test("an added action has what the library says of it, and the lowest free number", () => {
+  const [doc, first] = docWith("Scan", "Scan", "Grip") as [Y.Doc, Key];
+  removeActions(doc, [first]);
+  const key = addAction(doc, {
+    name: "Scan",
+    type: "async",
+    actor: "robot",
+    description: "Looks around",
+    inputs: parametersFrom({ pose: { x: { pvf_type: "number" } }, empty: {} }),
+    outputs: parametersFrom({ found: { pvf_type: "bool" } }),
+    position: [10, 20],
+  });
+  expect(actionOf(doc, key)).toMatchObject({
+    instanceId: 0,
+    type: "async",
+    actor: "robot",
+    description: "Looks around",
+    inputs: [
+      { path: "pose/x", text: '{"pvf_type":"number"}' },
+      { path: "empty", text: "{}" },
+    ],
+    outputs: [{ path: "found", text: '{"pvf_type":"bool"}' }],
+    position: [10, 20],
+  });
+  expect(graphOf(doc).actions.map(fullName)).toEqual(["Scan_1", "Grip_0", "Scan_0"]);
+});
+
+test("each edit is one update for the others, and one that changes nothing is none", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  expect(updatesOf(doc, () => connect(doc, a, b))).toBe(1);
+  expect(updatesOf(doc, () => connect(doc, a, b))).toBe(0);
+  expect(updatesOf(doc, () => setField(doc, a, "actor", "r"))).toBe(1);
+  expect(updatesOf(doc, () => setField(doc, a, "actor", "r"))).toBe(0);
+  expect(updatesOf(doc, () => moveActions(doc, [[a, [1, 2]]]))).toBe(1);
+  expect(updatesOf(doc, () => moveActions(doc, [[a, [1, 2]]]))).toBe(0);
+  const two = () =>
+    together(doc, () => {
+      setGraphName(doc, "g");
+      setGraphDescription(doc, "d");
+    });
+  expect(updatesOf(doc, two)).toBe(1);
+  expect(updatesOf(doc, () => removeActions(doc, [a, b]))).toBe(1);
+});
+
+test("removing an action leaves nothing of it", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  setEntry(doc, a);
+  connect(doc, a, b, "on_error");
+  setExit(doc, b);
+  moveActions(doc, [[a, [1, 2]]]);
+  setField(doc, a, "description", "gone soon");
+  removeActions(doc, [a, ENTRY]);
+  const left = Object.values(mapsOf(doc)).flatMap((map) => [...map.keys()]);
+  expect(left.filter((key) => key.includes(a))).toEqual([]);
+  expect(arrows(doc)).toEqual(["B>exit"]);
+});
+
+test("healing runs what would have followed the success of what was removed", () => {
+  const [doc, a, x, y, b, c] = docWith("A", "X", "Y", "B", "C") as [Y.Doc, ...Key[]] as [
+    Y.Doc,
+    Key,
+    Key,
+    Key,
+    Key,
+    Key,
+  ];
+  connect(doc, a, x, "on_false");
+  connect(doc, x, y);
+  connect(doc, y, b);
+  connect(doc, y, c, "on_error");
+  connect(doc, y, y, "on_false");
+  removeActions(doc, [x, y], { heal: true });
+  expect(arrows(doc)).toEqual(["A>B"]);
+  expect(says(graphOf(doc).relations[0])).toEqual(["on_false -> run"]);
+});
+
+test("a renamed action keeps its number unless the new name has it already", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  const second = addAction(doc, { name: "A" });
+  rename(doc, second, "C");
+  expect(fullName(actionOf(doc, second) as never)).toBe("C_1");
+  rename(doc, b, "A");
+  expect(fullName(actionOf(doc, b) as never)).toBe("A_1");
+  expect(fullName(actionOf(doc, a) as never)).toBe("A_0");
+  expect(rename(doc, "nobodynobody", "X")).toBe(false);
+});
+
+test("a number that another action has is shared out; a twin that is renumbered is none any more", () => {
+  const [doc, a] = docWith("A") as [Y.Doc, Key];
+  const twin = addAction(doc, { name: "A" });
+  doc.getMap("actions").set(`${twin}|instance_id`, 0);
+  doc.getMap("actions").set(`${twin}|twin`, true);
+  expect(graphOf(doc).actions.map(fullName)).toEqual(["A_0", "A_0"]);
+  setField(doc, twin, "instanceId", 4);
+  expect(actionOf(doc, twin)).toMatchObject({ instanceId: 4, twin: false });
+  setField(doc, twin, "instanceId", 0);
+  expect(
+    graphOf(doc)
+      .actions.map((action) => action.instanceId)
+      .sort(),
+  ).toEqual([0, 1]);
+  expect(actionOf(doc, a)).toBeDefined();
+});
+
+test("an imported value that did not fit gives way to the first edit of its field", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  const id = connect(doc, a, b) as string;
+  const actions = doc.getMap("actions");
+  const odd = ["name", "type", "actor", "description", "instance_id", "input_parameters", "effect"];
+  for (const field of odd) actions.set(`${a}|x/${field}`, "7");
+  const relations = doc.getMap("relations");
+  for (const field of ["parents/conditions", "parents/required", "children/remap", "parents/id"])
+    relations.set(`${id}|x/${field}`, "7");
+  relations.set(`${id}|x/parents/instance_id`, '"0"');
+  doc.getMap("meta").set("x/graph_name", "7");
+  rename(doc, a, "New");
+  setField(doc, a, "type", "async");
+  setField(doc, a, "actor", "robot");
+  setField(doc, a, "description", "d");
+  addParameter(doc, a, "in", "x", "1");
+  setResponse(doc, id, "on_true", "stop");
+  setRequired(doc, id, false);
+  setRemap(doc, id, "x", "y");
+  setGraphName(doc, "g");
+  setField(doc, a, "instanceId", 3);
+  expect(actionOf(doc, a)?.extra).toEqual([["effect", "7"]]);
+  expect(relationOf(doc, id)).toMatchObject({ parentsExtra: [["id", "7"]], childrenExtra: [] });
+  expect(graphOf(doc).extra).toEqual([]);
+});
+
+// -- relations --------------------------------------------------------------------------------
+
+test("a new arrow says what was drawn and nothing else", () => {
+  const [doc, a, b, c] = docWith("A", "B", "C") as [Y.Doc, Key, Key, Key];
+  const onFalse = connect(doc, a, b, "on_false");
+  const onTrue = connect(doc, a, c, "on_true");
+  expect(says(relationOf(doc, onFalse))).toEqual(["on_false -> run"]);
+  expect(says(relationOf(doc, onTrue))).toEqual(["on_true -> run"]);
+  expect(relationOf(doc, onTrue)).toMatchObject({ parentOrder: 1, childOrder: 0, required: true });
+});
+
+test("connecting two that are connected adds the outcome", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  const id = connect(doc, a, b, "on_true");
+  expect(connect(doc, a, b, "on_error")).toBe(id);
+  expect(says(relationOf(doc, id))).toEqual(["on_true -> run", "on_error -> run"]);
+});
+
+test("drawing clears leftovers of a relation that was there before", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  const id = connect(doc, a, b) as string;
+  const colleague = copyOf(doc);
+  removeRelation(doc, id);
+  setRequired(colleague, id, false);
+  setRemap(colleague, id, "x", "y");
+  exchange(doc, colleague);
+  expect(relationOf(doc, id)).toBeUndefined();
+  connect(doc, a, b, "on_false");
+  expect(relationOf(doc, id)).toMatchObject({ required: true, remap: [] });
+});
+
+test("both of two people who connect the same pair are heard", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  const colleague = copyOf(doc);
+  const id = connect(doc, a, b, "on_true");
+  connect(colleague, a, b, "on_error");
+  exchange(doc, colleague);
+  expect(says(relationOf(doc, id))).toEqual(["on_true -> run", "on_error -> run"]);
+  expect(graphOf(doc)).toEqual(graphOf(colleague));
+});
+
+test("nothing leads into the entry, out of the exit, from one to the other, or to nobody", () => {
+  const [doc, a] = docWith("A") as [Y.Doc, Key];
+  for (const [parent, child] of [
+    [a, ENTRY],
+    [EXIT, a],
+    [ENTRY, EXIT],
+    [a, "nobodynobody"],
+    ["nobodynobody", a],
+    ["x", a],
+  ] as const)
+    expect(connect(doc, parent, child)).toBeNull();
+  expect(graphOf(doc).relations).toEqual([]);
+});
+
+test("an entry says run and nothing else; an exit says after which outcomes", () => {
+  const [doc, a] = docWith("A") as [Y.Doc, Key];
+  const entry = setEntry(doc, a) as string;
+  expect(setResponse(doc, entry, "on_false", "run")).toBe(false);
+  const exit = setExit(doc, a, "on_false");
+  setExit(doc, a, "on_true");
+  expect(says(relationOf(doc, entry))).toEqual(["on_true -> run"]);
+  expect(says(relationOf(doc, exit))).toEqual(["on_true -> run", "on_false -> run"]);
+  expect(unsetEntry(doc, a) && unsetExit(doc, a)).toBe(true);
+  expect(unsetExit(doc, a)).toBe(false);
+  expect(graphOf(doc).relations).toEqual([]);
+});
+
+test("a relation that only ignores is still a relation", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  const id = connect(doc, a, b) as string;
+  setResponse(doc, id, "on_true", "ignore");
+  expect(says(relationOf(doc, id))).toEqual([]);
+});
+
+test("a one-sided relation stays so until an edit needs the other side, or it is mirrored", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  const id = connect(doc, a, b) as string;
+  const set = (side: string) => doc.getMap("relations").set(`${id}|only`, side);
+  set("children");
+  setRemap(doc, id, "x", "y");
+  expect(relationOf(doc, id)?.only).toBe("children");
+  setResponse(doc, id, "on_error", "stop");
+  expect(relationOf(doc, id)?.only).toBeNull();
+  set("parents");
+  setRemap(doc, id, "x", null);
+  expect(relationOf(doc, id)).toMatchObject({ only: null, remap: [] });
+  set("parents");
+  mirrorRelation(doc, id);
+  expect(relationOf(doc, id)?.only).toBeNull();
+});
+
+test("an arrow led elsewhere keeps what it says", () => {
+  const [doc, a, b, c] = docWith("A", "B", "C") as [Y.Doc, Key, Key, Key];
+  const id = connect(doc, a, b, "on_error", "stop") as string;
+  setRequired(doc, id, false);
+  setRemap(doc, id, "x", "y");
+  const moved = moveRelation(doc, id, { child: c });
+  expect(relationOf(doc, id)).toBeUndefined();
+  expect(relationOf(doc, moved)).toMatchObject({
+    required: false,
+    remap: [{ source: "x", target: "y" }],
+  });
+  expect(says(relationOf(doc, moved))).toEqual(["on_error -> stop"]);
+  connect(doc, a, b);
+  expect(moveRelation(doc, moved as string, { child: b })).toBeNull();
+  expect(arrows(doc)).toEqual(["A>B", "A>C"]);
+});
+
+test("an action put into an arrow takes over what it said, and its success leads on", () => {
+  const [doc, a, b, c, x] = docWith("A", "B", "C", "X") as [Y.Doc, Key, Key, Key, Key];
+  const id = connect(doc, a, b, "on_false") as string;
+  connect(doc, a, c);
+  expect(insertInto(doc, id, x)).toBe(true);
+  expect(arrows(doc)).toEqual(["A>C", "A>X", "X>B"]);
+  expect(says(relationOf(doc, `${a}>${x}`))).toEqual(["on_false -> run"]);
+  expect(relationOf(doc, `${a}>${x}`)?.parentOrder).toBe(0);
+  expect(says(relationOf(doc, `${x}>${b}`))).toEqual(["on_true -> run"]);
+});
+
+test("disconnecting removes every listing of a pair", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  connect(doc, a, b);
+  doc.getMap("relations").set(`${a}>${b};2|on_true`, "run");
+  expect(disconnect(doc, a, b)).toBe(true);
+  expect(graphOf(doc).relations).toEqual([]);
+});
+
+test("edits of what a colleague deleted do nothing and say so", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  const id = connect(doc, a, b) as string;
+  addParameter(doc, a, "in", "x", "1");
+  removeActions(doc, [a]);
+  const edits = () => [
+    rename(doc, a, "N"),
+    setField(doc, a, "type", "t"),
+    setParameter(doc, a, "in", "x", "2"),
+    addParameter(doc, a, "in", "y", "2"),
+    removeParameter(doc, a, "in", "x"),
+    setResponse(doc, id, "on_true", "stop"),
+    setRequired(doc, id, false),
+    setRemap(doc, id, "x", "y"),
+    removeRelation(doc, id),
+    insertInto(doc, id, b),
+    adoptGhost(doc, a),
+    setNote(doc, "n", "{}"),
+  ];
+  expect(updatesOf(doc, () => expect(new Set(edits())).toEqual(new Set([false])))).toBe(0);
+});
+
+// -- ghosts -----------------------------------------------------------------------------------
+
+function withGhost(): [Y.Doc, Key, Key] {
+  const [doc, a] = docWith("A") as [Y.Doc, Key];
+  const ghost = "GhostGhost00";
+  doc.getMap("actions").set(ghost, "Cook");
+  doc.getMap("actions").set(`${ghost}|missing`, true);
+  connect(doc, a, ghost, "on_error");
+  return [doc, a, ghost];
+}
+
+test("a ghost's arrows become those of the action that takes up its name, and stay with it", () => {
+  const [doc, , ghost] = withGhost();
+  const cook = addAction(doc, { name: "Cook" });
+  rename(doc, cook, "Bake");
+  expect(arrows(doc)).toEqual(["A>Bake"]);
+  expect(actionOf(doc, ghost)).toBeUndefined();
+  expect(actionOf(doc, cook)?.instanceId).toBe(0);
+});
+
+test("an arrow of a ghost that a colleague filled meanwhile can be edited as it is shown", () => {
+  const [doc, a, ghost] = withGhost();
+  doc.getMap("actions").set("CookCookCook", "Cook");
+  const [shown] = graphOf(doc).relations;
+  expect(shown).toMatchObject({ parent: a, child: "CookCookCook" });
+  expect(setResponse(doc, relationId(shown as Relation), "on_error", "stop")).toBe(true);
+  expect(says(graphOf(doc).relations[0])).toEqual(["on_error -> stop"]);
+  expect([...doc.getMap("actions").keys()].some((key) => key.startsWith(ghost))).toBe(false);
+});
+
+test("a ghost can be made an action", () => {
+  const [doc, , ghost] = withGhost();
+  adoptGhost(doc, ghost, { type: "async", inputs: [{ path: "x", text: "1" }] });
+  expect(actionOf(doc, ghost)).toMatchObject({ missing: false, type: "async" });
+  expect(arrows(doc)).toEqual(["A>Cook"]);
+});
+
+// -- parameters, notes ------------------------------------------------------------------------
+
+test("parameters keep their text and their order", () => {
+  const [doc, a] = docWith("A") as [Y.Doc, Key];
+  for (const path of ["z", "a", "m"]) addParameter(doc, a, "in", path, "1.0");
+  expect(setParameter(doc, a, "in", "a", '{"pvf_value": 5.0}')).toBe(true);
+  expect(setParameter(doc, a, "in", "a", "{no json")).toBe(false);
+  expect(addParameter(doc, a, "in", "a", "1")).toBe(false);
+  expect(renameParameter(doc, a, "in", "a", "z")).toBe(false);
+  expect(renameParameter(doc, a, "in", "a", "b")).toBe(true);
+  expect(removeParameter(doc, a, "in", "z")).toBe(true);
+  addParameter(doc, a, "in", "0", "2");
+  expect(actionOf(doc, a)?.inputs).toEqual([
+    { path: "b", text: '{"pvf_value": 5.0}' },
+    { path: "m", text: "1.0" },
+    { path: "0", text: "2" },
+  ]);
+});
+
+test("two people who fill in different parameters both keep theirs", () => {
+  const [doc, a] = docWith("A") as [Y.Doc, Key];
+  const colleague = copyOf(doc);
+  addParameter(doc, a, "in", "mine", "1");
+  addParameter(colleague, a, "in", "theirs", "2");
+  exchange(doc, colleague);
+  expect(
+    actionOf(doc, a)
+      ?.inputs.map((parameter) => parameter.path)
+      .sort(),
+  ).toEqual(["mine", "theirs"]);
+});
+
+test("notes are added, changed and removed", () => {
+  const doc = new Y.Doc();
+  const id = addNote(doc, '{"text":"a"}');
+  setNote(doc, id, '{"text":"b"}');
+  expect(graphOf(doc).notes).toEqual([[id, '{"text":"b"}']]);
+  removeNotes(doc, [id]);
+  expect(graphOf(doc).notes).toEqual([]);
+});
+
+// -- undo -------------------------------------------------------------------------------------
+
+test("an undone delete brings back everything, with what a colleague changed meanwhile", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  setField(doc, a, "description", "old");
+  connect(doc, a, b, "on_error");
+  setEntry(doc, a);
+  moveActions(doc, [[a, [1, 2]]]);
+  const undo = undoOf(doc);
+  const before = graphOf(doc);
+  const colleague = copyOf(doc);
+  removeActions(doc, [a]);
+  setField(colleague, a, "description", "new");
+  connect(colleague, a, b, "on_true");
+  exchange(doc, colleague);
+  expect(actionOf(colleague, a)).toBeUndefined();
+  undo.undo();
+  exchange(doc, colleague);
+  const after = graphOf(doc);
+  expect(actionOf(doc, a)).toEqual({ ...before.actions[0], description: "new" });
+  expect(says(relationOf(doc, `${a}>${b}`))).toEqual(["on_true -> run", "on_error -> run"]);
+  expect(arrows(doc)).toEqual(["A>B", "entry>A"]);
+  expect(graphOf(colleague)).toEqual(after);
+});
+
+test("undo takes back one edit at a time, and only one's own", () => {
+  const [doc, a] = docWith("A") as [Y.Doc, Key];
+  const colleague = copyOf(doc);
+  const undo = undoOf(doc);
+  setField(doc, a, "actor", "mine");
+  rename(doc, a, "B");
+  setField(colleague, a, "description", "theirs");
+  exchange(doc, colleague);
+  undo.undo();
+  expect(actionOf(doc, a)).toMatchObject({ name: "A", actor: "mine", description: "theirs" });
+  undo.undo();
+  expect(actionOf(doc, a)).toMatchObject({ name: "A", actor: "", description: "theirs" });
+  undo.redo();
+  expect(actionOf(doc, a)).toMatchObject({ actor: "mine" });
+  expect(undo.undoStack.length).toBe(1);
+});
+
+test("undoing an edit does not take back what a colleague wrote over it", () => {
+  const [doc, a] = docWith("A") as [Y.Doc, Key];
+  const undo = undoOf(doc);
+  setField(doc, a, "description", "mine");
+  const colleague = copyOf(doc);
+  setField(colleague, a, "description", "theirs");
+  exchange(doc, colleague);
+  undo.undo();
+  expect(actionOf(doc, a)?.description).toBe("theirs");
+});
+
+// -- people race ------------------------------------------------------------------------------
+
+type Step = readonly [person: number, edit: number, x: number, y: number];
+
+/** One of the edits, aimed at whatever the person sees. */
+function act(doc: Y.Doc, undo: Y.UndoManager, [, edit, x, y]: Step): void {
+  const { actions, relations } = graphOf(doc);
+  const key = (n: number) => actions[n % Math.max(1, actions.length)]?.key ?? "nobodynobody";
+  const relation = relations[x % Math.max(1, relations.length)];
+  const id = relation ? relationId(relation) : "";
+  const outcome = (["on_true", "on_false", "on_error", "on_stopped"] as const)[y % 4] ?? "on_true";
+  const edits: (() => unknown)[] = [
+    () => addAction(doc, { name: "ABC".charAt(x % 3) }),
+    () => connect(doc, key(x), key(y), outcome),
+    () => setEntry(doc, key(x)),
+    () => setExit(doc, key(x), outcome),
+    () => removeActions(doc, [key(x)], { heal: y % 2 === 0 }),
+    () => rename(doc, key(x), "ABC".charAt(y % 3)),
+    () => setField(doc, key(x), "instanceId", y % 3),
+    () => setField(doc, key(x), "description", `${y}`),
+    () => removeRelation(doc, id),
+    () => setResponse(doc, id, outcome, "stop"),
+    () => moveRelation(doc, id, { child: key(y) }),
+    () => insertInto(doc, id, key(y)),
+    () => addParameter(doc, key(x), "in", "ABC".charAt(y % 3), "1"),
+    () => moveActions(doc, [[key(x), [x, y]]]),
+    () => undo.undo(),
+    () => undo.redo(),
+  ];
+  edits[edit % edits.length]?.();
+}
+
+test("whatever people do at once, all see the same graph, with names that differ and ends that exist", () => {
+  const steps = fc.tuple(fc.nat(1), fc.nat(15), fc.nat(5), fc.nat(5));
+  fc.assert(
+    fc.property(fc.array(fc.array(steps, { maxLength: 8 }), { maxLength: 5 }), (rounds) => {
+      const [doc] = docWith("A", "B");
+      const people = [doc, copyOf(doc)] as const;
+      const undos = people.map(undoOf);
+      for (const round of rounds) {
+        for (const step of round) {
+          const [person] = step;
+          act(people[person as 0 | 1], undos[person] as Y.UndoManager, step);
+        }
+        exchange(...people);
+        const graph = graphOf(people[0]);
+        expect(graphOf(people[1])).toEqual(graph);
+        expect(new Set(graph.actions.map(fullName)).size).toBe(graph.actions.length);
+        const ends = new Set([ENTRY, EXIT, ...graph.actions.map((action) => action.key)]);
+        for (const { parent, child } of graph.relations)
+          expect(ends.has(parent) && ends.has(child)).toBe(true);
+      }
+    }),
+    { numRuns: 150 },
+  );
+});
+
+test("undoing everything brings back the beginning", () => {
+  const steps = fc.tuple(fc.constant(0), fc.nat(13), fc.nat(5), fc.nat(5));
+  fc.assert(
+    fc.property(fc.array(steps, { maxLength: 12 }), (script) => {
+      const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+      connect(doc, a, b);
+      const before = graphOf(doc);
+      const undo = undoOf(doc);
+      for (const step of script) act(doc, undo, step);
+      while (undo.canUndo()) undo.undo();
+      expect(graphOf(doc)).toEqual(before);
+    }),
+    { numRuns: 100 },
+  );
+});
