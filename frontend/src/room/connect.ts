@@ -262,8 +262,10 @@ class Connection implements Room {
       socket.onopen = socket.onmessage = socket.onclose = null;
       socket.close();
     }
-    const others = [...this.awareness.getStates().keys()].filter((id) => id !== this.doc.clientID);
+    const others = [...this.awareness.meta.keys()].filter((id) => id !== this.doc.clientID);
     removeAwarenessStates(this.awareness, others, this);
+    // Whoever is still there comes back with the clock that is known; only strangers may do that.
+    for (const id of others) this.awareness.meta.delete(id);
   }
 
   private readonly onOnline = (): void => {
@@ -282,10 +284,9 @@ class Connection implements Room {
     if (Date.now() - this.heardAt > limit) this.onClose(this.socket, 1006);
   };
 
-  private send(encoder: encoding.Encoder): boolean {
-    if (this.socket?.readyState !== OPEN) return false;
+  private send(encoder: encoding.Encoder): void {
+    if (this.socket?.readyState !== OPEN) return;
     this.socket.send(encoding.toUint8Array(encoder) as Uint8Array<ArrayBuffer>);
-    return true;
   }
 
   // -- what comes in --------------------------------------------------------------------------
@@ -330,7 +331,8 @@ class Connection implements Room {
         const encoder = encoding.createEncoder();
         encoding.writeVarUint(encoder, SYNC);
         sync.writeSyncStep2(encoder, this.doc, decoding.readVarUint8Array(decoder));
-        if (this.send(encoder)) this.outbox.sentAll();
+        this.outbox.sentAll();
+        this.send(encoder);
         break;
       }
       case sync.messageYjsSyncStep2:
@@ -359,7 +361,8 @@ class Connection implements Room {
       const encoder = encoding.createEncoder();
       encoding.writeVarUint(encoder, SYNC);
       sync.writeUpdate(encoder, update);
-      if (this.send(encoder)) this.outbox.sentAll();
+      this.outbox.sentAll();
+      this.send(encoder);
     }
     this.say({ unsaved: this.outbox.unsaved });
   };
