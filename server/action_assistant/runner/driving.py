@@ -54,6 +54,7 @@ _SILENT_S: Final = 3.0
 _APPEAR_S: Final = 3.0  # until a started graph must show in answers
 _UNCONFIRMED_S: Final = 2.0
 _REST_S: Final = 1.0  # a graph that never began is believed only after it was seen so for this long
+_TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
 _ONE_PRESS_S: Final = 1.0
 
 Clock = Callable[[], int]
@@ -235,7 +236,7 @@ class OpenRun:
     def _observe(self, seen: tuple[Seen, ...]) -> None:
         self.tell(Observed(self._wall(), seen))
         for item in seen:
-            if isinstance(item, Hazard) and item.effect != "goes on":
+            if isinstance(item, Hazard) and (item.effect != "goes on" or item.code in _TOLD):
                 place = f" at {item.node}" if item.node else ""
                 self._alarm(item.code, f"{item.code}{place}: {item.message or item.effect}")
 

@@ -33,6 +33,7 @@ from action_assistant.runner.seen import (
 )
 from action_assistant.umrf import semantics
 
+_GRAIN_MS: Final = 0.01  # clocks are not finer: what is due so soon is due now
 _SLICE: Final = 50  # engine steps between two turns of the event loop
 
 
@@ -60,13 +61,12 @@ class SimulatorLink:
         try:
             self._tell(self._engine.start(order.graph, self._now()))
         except semantics.EngineRefused as refused:
+            self._wake.set()
             raise EngineRefused(str(refused)) from refused
 
     async def stop(self, graph_name: str) -> None:
-        """Stop at this moment. As in the engine's node, a second stop waits for the first one and
-        then finds nothing to do."""
-        state = self._engine.states().get(graph_name)
-        if self._dead is None and state is not None and state.state != "STOPPING":
+        """Stop at this moment; the engine lets a second stop wait for the first one."""
+        if self._dead is None:
             self._tell(self._engine.stop(graph_name, self._now()))
 
     async def pause(self, graph_name: str) -> None:
@@ -101,12 +101,13 @@ class SimulatorLink:
         """Let the engine live until cancelled."""
         while True:
             due = self._engine.due
-            wait = math.inf if due is None else max(0.0, (due - self._now()) / 1000)
+            late = due is None or self._dead is not None
+            wait = math.inf if late or due is None else max(0.0, (due - self._now()) / 1000)
             with anyio.move_on_after(wait):
                 await self._wake.wait()
-            self._wake = anyio.Event()
             while not self._advance():
                 await anyio.lowlevel.checkpoint()
+            self._wake = anyio.Event()
 
     @contextmanager
     def listen(self, hear: Callable[[Report], None]) -> Iterator[None]:
@@ -133,12 +134,15 @@ class SimulatorLink:
         told: list[semantics.Trace] = []
         for _ in range(_SLICE):
             due = self._engine.due
-            if self._dead is not None or due is None or due > self._now():
+            if self._idle(due):
                 break
+            assert due is not None
             told += self._engine.advance(due)
         self._tell(told)
-        due = self._engine.due
-        return self._dead is not None or due is None or due > self._now()
+        return self._idle(self._engine.due)
+
+    def _idle(self, due: float | None) -> bool:
+        return self._dead is not None or due is None or due > self._now() + _GRAIN_MS
 
     def _tell(self, traces: Sequence[semantics.Trace]) -> None:
         self._wake.set()

@@ -1,0 +1,482 @@
+"""Starts at most once; stops until it is proven; takes up what a crash left. In virtual time."""
+
+import anyio
+import msgspec
+import pytest
+from runner.world import (
+    ANN,
+    BEN,
+    Robot,
+    World,
+    engine,
+    order,
+    sequence,
+    until,
+    virtual,
+)
+
+from action_assistant.errors import BadInput, Conflict, NotFound, Unavailable
+from action_assistant.runner.control import Control
+from action_assistant.runner.events import Proof, Published, Requested, StopSent
+from action_assistant.runner.links.port import Order
+from action_assistant.runner.runs import ENDED
+from action_assistant.umrf.model import Conditions
+
+
+async def ended(control: Control, run: str) -> str:
+    await until(lambda: run not in control.open, 3600)
+    return (await control.find(run)).state
+
+
+@virtual
+async def test_a_simulated_run_goes_through_its_actions_to_the_end() -> None:
+    world = World()
+    async with world.runner() as control:
+        started = await control.start(order(sequence(actions=3)), ANN)
+        assert await ended(control, started.run.id) == "finished"
+        run = await control.find(started.run.id)
+    assert (run.result, run.number, run.stopped_by) == ("on_true", 1, None)
+    assert [(a.aid, a.state, a.visits[0].result) for a in run.actions.values()] == [
+        ("aid000000000", "FINISHED", "true"),
+        ("aid000000001", "FINISHED", "true"),
+        ("aid000000002", "FINISHED", "true"),
+    ]
+    assert run.ended_at is not None
+    assert run.started_at is not None
+    assert 3.0 <= (run.ended_at - run.started_at) / 1e6 < 3.2
+
+
+@virtual
+async def test_what_was_shown_last_is_what_the_history_tells() -> None:
+    world = World()
+    async with world.runner() as control:
+        started = await control.start(order(sequence(), script={"Work_1": [{"never": True}]}), ANN)
+        await anyio.sleep(5)
+        control.stop_all(BEN)
+        await ended(control, started.run.id)
+    assert world.shown[-1][1] == world.ledger.history(started.run.id)
+    assert world.shown[-1][1].state == "stopped"
+
+
+@virtual
+async def test_the_run_is_stored_before_anything_is_sent() -> None:
+    robot = Robot(engine())
+    world = World({"David": robot})
+    async with world.runner() as control:
+        world.ledger.down = True
+        with pytest.raises(Unavailable, match="could not be recorded"):
+            await control.start(order(sequence(), engine="David"), ANN)
+        assert robot.starts == []
+        world.ledger.down = False
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        assert [type(each) for each in world.ledger.told(run.id)][:1] == [Requested]
+
+
+@virtual
+async def test_a_run_whose_record_was_in_doubt_is_told_as_refused() -> None:
+    world = World()
+    async with world.runner() as control:
+        world.ledger.forgetful = True
+        with pytest.raises(Unavailable):
+            await control.start(order(sequence()), ANN)
+        (stream,) = world.ledger.streams
+        world.ledger.forgetful = False
+        await anyio.sleep(3)
+        assert (await control.find(stream.removeprefix("run/"))).state == "refused"
+
+
+@pytest.mark.parametrize("askers", [2, 20])
+@virtual
+async def test_equal_requests_at_once_make_exactly_one_start(askers: int) -> None:
+    robot = Robot(engine())
+    world = World({"David": robot})
+    world.ledger.slow = 0.05
+    asked = order(sequence(), engine="David")
+    answers = []
+    async with world.runner() as control:
+
+        async def ask() -> None:
+            answers.append(await control.start(asked, ANN))
+
+        async with anyio.create_task_group() as tasks:
+            for _ in range(askers):
+                tasks.start_soon(ask)
+    assert len(robot.starts) == 1
+    assert len({each.run.id for each in answers}) == 1
+    assert [each.fresh for each in answers].count(True) == 1
+
+
+@virtual
+async def test_a_request_repeated_after_a_restart_is_the_same_run() -> None:
+    world = World()
+    asked = order(sequence(actions=1))
+    async with world.runner() as control:
+        first = await control.start(asked, ANN)
+        await ended(control, first.run.id)
+    async with world.runner() as control:
+        again = await control.start(asked, ANN)
+    assert (again.run.id, again.run.state, again.fresh) == (first.run.id, "finished", False)
+
+
+@virtual
+async def test_a_request_id_belongs_to_one_start_only() -> None:
+    world = World()
+    async with world.runner() as control:
+        await control.start(order(sequence("one"), request_id="same"), ANN)
+        with pytest.raises(Conflict, match="request_id"):
+            await control.start(order(sequence("two"), request_id="same"), ANN)
+
+
+@virtual
+async def test_a_robot_takes_one_run_and_the_loser_learns_whose_it_is() -> None:
+    robot = Robot(engine())
+    world = World({"David": robot})
+    outcomes = []
+    async with world.runner() as control:
+
+        async def ask(name: str) -> None:
+            try:
+                outcomes.append(await control.start(order(sequence(name), engine="David"), ANN))
+            except Conflict as conflict:
+                outcomes.append(conflict)
+
+        async with anyio.create_task_group() as tasks:
+            for i in range(10):
+                tasks.start_soon(ask, f"g{i}")
+    assert len(robot.starts) == 1
+    refused = [each for each in outcomes if isinstance(each, Conflict)]
+    assert len(refused) == 9
+    assert "taken by run 1" in refused[0].detail
+    assert "Ann" in refused[0].detail
+
+
+@virtual
+async def test_simulated_runs_do_not_exclude_each_other() -> None:
+    world = World()
+    async with world.runner() as control:
+        one = await control.start(order(sequence()), ANN)
+        two = await control.start(order(sequence()), BEN)
+        assert await ended(control, one.run.id) == await ended(control, two.run.id) == "finished"
+        assert (one.run.number, two.run.number) == (1, 2)
+
+
+@virtual
+async def test_an_engine_that_does_not_answer_is_not_started() -> None:
+    robot = Robot(engine())
+    robot.silent = True
+    world = World({"David": robot})
+    async with world.runner() as control:
+        with pytest.raises(Unavailable, match="does not answer"):
+            await control.start(order(sequence(), engine="David"), ANN)
+    assert robot.starts == []
+    assert world.ledger.streams == {}
+
+
+@virtual
+async def test_the_graph_on_the_wire_names_run_version_and_action() -> None:
+    robot = Robot(engine())
+    world = World({"David": robot})
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), engine="David", version="v7"), ANN)).run
+    sent = robot.starts[0].umrf
+    assert f'"run": "{run.id}"' in sent
+    assert '"version": "v7"' in sent
+    assert '"aid": "aid000000001"' in sent
+    assert robot.starts[0].targets == ("David",)
+
+
+@virtual
+async def test_a_robot_nobody_knows_and_one_without_a_link_are_refused() -> None:
+    world = World()
+    async with world.runner() as control:
+        with pytest.raises(BadInput, match="No robot"):
+            await control.start(order(sequence(), engine="Nobody"), ANN)
+
+
+@virtual
+async def test_what_the_engine_refuses_is_told_as_refused() -> None:
+    simulated = engine()
+    world = World({"David": Robot(simulated)})
+    async with world.runner() as control:
+        await simulated.start(Order(run="theirs", graph=sequence("busy"), umrf=""))
+        run = (await control.start(order(sequence("busy"), engine="David"), ANN)).run
+        assert run.state == "refused"
+        assert "already active" in run.detail
+
+
+# --- stop -------------------------------------------------------------------------------------
+
+
+@virtual
+async def test_stop_is_proven_by_a_get_that_was_asked_after_it() -> None:
+    world = World()
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), script={"*": [{"never": True}]}), ANN)).run
+        await anyio.sleep(1)
+        assert await control.stop(run.id, BEN, "s1") == [run.id]
+        assert await ended(control, run.id) == "stopped"
+    found = world.ledger.history(run.id)
+    assert (found.stopped_by, found.desired, found.result) == (BEN, "stopped", "on_stopped")
+    kinds = [type(each) for each in world.ledger.told(run.id)]
+    assert kinds.index(StopSent) < kinds.index(Proof)
+    assert found.proof_at is not None
+    assert found.actions["Work_0"].visits[-1].result == "stopped"
+
+
+@virtual
+async def test_stop_does_not_wait_for_the_journal() -> None:
+    robot = Robot(engine({"*": [{"never": True}]}))
+    world = World({"David": robot})
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await anyio.sleep(1)
+        world.ledger.down = True
+        began = anyio.current_time()
+        await control.stop(run.id, ANN)
+        await until(lambda: bool(robot.stops))
+        assert robot.stops[0][0] - began < 0.02
+        await until(lambda: control.open[run.id].run.state == "stopped")
+        assert not control.open[run.id].recorder.recorded
+        world.ledger.down = False
+        assert await ended(control, run.id) == "stopped"
+    assert world.ledger.history(run.id).state == "stopped"
+
+
+@virtual
+async def test_stop_is_repeated_until_one_arrives() -> None:
+    robot = Robot(engine({"*": [{"never": True}]}))
+    world = World({"David": robot})
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await anyio.sleep(1)
+        robot.loss = 0.8
+        await control.stop(run.id, ANN)
+        assert await ended(control, run.id) == "stopped"
+    assert robot.delivered >= 1
+    times = [when for when, _ in robot.stops]
+    assert all(b - a >= 0.05 for a, b in zip(times, times[1:], strict=False))
+
+
+@virtual
+async def test_a_stop_without_proof_is_loud_and_goes_on() -> None:
+    robot = Robot(engine({"*": [{"never": True}]}))
+    world = World({"David": robot})
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await anyio.sleep(1)
+        robot.silent = True
+        await control.stop(run.id, ANN)
+        await anyio.sleep(60)
+        now = control.open[run.id].run
+        assert (now.state, now.desired, now.proof_at) == ("unknown", "stopped", None)
+        assert any(each.code == "stop_unconfirmed" for each in now.alarms)
+        sent = len(robot.stops)
+        await anyio.sleep(5)
+        assert len(robot.stops) > sent
+        robot.silent = False
+        assert await ended(control, run.id) == "stopped"
+
+
+@virtual
+async def test_an_engine_that_holds_a_new_life_proves_nothing() -> None:
+    robot = Robot(engine({"*": [{"never": True}]}))
+    world = World({"David": robot})
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await anyio.sleep(1)
+        robot.engine = engine()
+        await control.stop(run.id, ANN)
+        assert await ended(control, run.id) == "lost"
+        assert any(each.code == "engine_restarted" for each in (await control.find(run.id)).alarms)
+
+
+@virtual
+async def test_stopping_everything_catches_a_start_that_is_being_stored() -> None:
+    robot = Robot(engine())
+    world = World({"David": robot})
+    world.ledger.slow = 1.0
+    async with world.runner() as control, anyio.create_task_group() as tasks:
+        answers = []
+
+        async def ask() -> None:
+            answers.append(await control.start(order(sequence(), engine="David"), ANN))
+
+        tasks.start_soon(ask)
+        await anyio.sleep(0.5)
+        assert control.stop_all(BEN) == []
+        await until(lambda: bool(answers))
+        assert robot.starts == []
+        assert answers[0].run.state == "stopped"
+        assert answers[0].run.stopped_by == BEN
+
+
+@virtual
+async def test_one_press_that_comes_by_two_ways_is_recorded_once() -> None:
+    world = World()
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), script={"*": [{"never": True}]}), ANN)).run
+        await anyio.sleep(1)
+        await control.stop(run.id, BEN, "press")
+        await control.stop(run.id, BEN, "")
+        await control.stop(run.id, BEN, "press")
+        await ended(control, run.id)
+    kinds = [each.kind for each in world.ledger.told(run.id)]
+    assert kinds.count("run.stop_requested.v1") == 1
+
+
+@virtual
+async def test_stop_of_a_run_that_is_over_does_nothing_and_of_no_run_is_an_error() -> None:
+    world = World()
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(actions=1)), ANN)).run
+        await ended(control, run.id)
+        assert await control.stop(run.id, ANN) == []
+        with pytest.raises(NotFound):
+            await control.stop("nothing", ANN)
+    assert world.ledger.history(run.id).state == "finished"
+
+
+@virtual
+async def test_an_action_that_ignores_stop_ends_in_error_not_in_stopped() -> None:
+    world = World()
+    async with world.runner() as control:
+        stubborn = {"*": [{"after_s": 100, "ignores_stop": True}]}
+        run = (await control.start(order(sequence(), script=stubborn), ANN)).run
+        await anyio.sleep(1)
+        await control.stop(run.id, ANN)
+        state = await ended(control, run.id)
+    found = world.ledger.history(run.id)
+    assert state == "error"
+    assert any(each.code == "stop_unconfirmed" for each in found.alarms)
+
+
+@virtual
+async def test_a_graph_that_can_go_nowhere_says_so_and_can_be_stopped() -> None:
+    """H8: the only arrow leads nowhere, so the graph stays RUNNING with nothing running."""
+    graph = sequence(actions=2)
+    stuck = tuple(
+        msgspec.structs.replace(each, conditions=Conditions(on_true="stop"))
+        if each.parent == graph.actions[0].key
+        else each
+        for each in graph.relations
+    )
+    world = World()
+    async with world.runner() as control:
+        asked = order(msgspec.structs.replace(graph, relations=stuck))
+        run = (await control.start(asked, ANN)).run
+        await anyio.sleep(10)
+        assert control.open[run.id].run.state == "running"
+        assert [each.code for each in control.open[run.id].run.alarms] == ["H8"]
+        await control.stop(run.id, ANN)
+        assert await ended(control, run.id) == "stopped"
+
+
+# --- pause ------------------------------------------------------------------------------------
+
+
+@virtual
+async def test_a_simulated_run_pauses_and_goes_on() -> None:
+    world = World()
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(actions=1)), ANN)).run
+        await anyio.sleep(0.5)
+        await control.pause(run.id, ANN)
+        await anyio.sleep(20)
+        assert control.open[run.id].run.state == "paused"
+        await control.resume(run.id, ANN)
+        assert await ended(control, run.id) == "finished"
+    found = world.ledger.history(run.id)
+    assert found.ended_at is not None
+    assert found.started_at is not None
+    assert (found.ended_at - found.started_at) / 1e6 > 20
+    assert len(found.actions["Work_0"].visits) == 1
+
+
+@virtual
+async def test_pausing_is_refused_where_it_is_not_safe() -> None:
+    world = World({"David": Robot(engine())})
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await until(lambda: control.open[run.id].run.state == "running")
+        with pytest.raises(Conflict, match="not safe"):
+            await control.pause(run.id, ANN)
+
+
+# --- restarts ---------------------------------------------------------------------------------
+
+
+@virtual
+async def test_after_a_restart_a_simulated_run_is_lost_and_never_finished() -> None:
+    world = World()
+    async with world.runner() as control:
+        run = (await control.start(order(sequence()), ANN)).run
+        await anyio.sleep(1.5)
+    async with world.runner() as control:
+        assert await ended(control, run.id) == "lost"
+        found = await control.find(run.id)
+    assert "Nothing shows how" in found.detail
+    assert found.actions["Work_0"].state == "FINISHED"
+    assert found.actions["Work_1"].visits[-1].until is None
+
+
+@virtual
+async def test_a_robot_that_goes_on_without_the_runner_is_taken_up_again() -> None:
+    robot = Robot(engine())
+    world = World({"David": robot})
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(robot.engine.run)
+        async with world.runner() as control:
+            run = (await control.start(order(sequence(actions=5), engine="David"), ANN)).run
+            await anyio.sleep(1.5)
+        await anyio.sleep(1)
+        async with world.runner() as control:
+            assert control.open[run.id].run.state == "running"
+            assert await ended(control, run.id) == "finished"
+        tasks.cancel_scope.cancel()
+    assert len(robot.starts) == 1
+
+
+@virtual
+async def test_a_pending_stop_goes_on_after_a_crash() -> None:
+    robot = Robot(engine({"*": [{"never": True}]}))
+    world = World({"David": robot})
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await anyio.sleep(1.5)
+        robot.loss = 1.0
+        await control.stop(run.id, BEN)
+        await anyio.sleep(1)
+    robot.loss, robot.delivered = 0.0, 0
+    async with world.runner() as control:
+        now = control.open[run.id].run
+        assert (now.desired, now.stopped_by) == ("stopped", BEN)
+        assert await ended(control, run.id) == "stopped"
+    assert robot.delivered >= 1
+
+
+@virtual
+async def test_a_run_on_a_robot_without_a_link_stays_unknown_and_its_stop_unconfirmed() -> None:
+    robot = Robot(engine({"*": [{"never": True}]}))
+    world = World({"David": robot})
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await anyio.sleep(1)
+    world.links = {}
+    async with world.runner() as control:
+        await control.stop(run.id, ANN)
+        await anyio.sleep(30)
+        now = control.open[run.id].run
+        assert (now.state, now.desired) == ("unknown", "stopped")
+        assert "no link" in now.alarms[-1].text
+        assert now.stops_sent == 0
+
+
+@virtual
+async def test_numbers_go_on_after_a_restart() -> None:
+    world = World()
+    for number in (1, 2, 3):
+        async with world.runner() as control:
+            run = (await control.start(order(sequence(actions=1)), ANN)).run
+            assert run.number == number
+            assert await ended(control, run.id) in ENDED
+            assert Published in [type(each) for each in world.ledger.told(run.id)]
