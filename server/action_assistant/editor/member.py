@@ -1,0 +1,123 @@
+"""One socket in a room: what waits to be sent to it, and when it is too slow (rule R5)."""
+
+import asyncio
+from collections import deque
+from collections.abc import Iterable
+from typing import Final
+
+from action_assistant.editor import wire
+from action_assistant.editor.presence import Seat
+from action_assistant.editor.wire import Entry
+from action_assistant.web.keys import Person
+
+WAITING_FRAMES: Final = 256
+WAITING_BYTES: Final = 1 << 20
+_UNHANDLED_EDITS: Final = 256  # that a socket may have sent ahead of the room
+
+
+class Member:
+    """Someone's socket. The room posts; whoever owns the socket takes and sends."""
+
+    def __init__(self, person: Person, *, edits: bool = True, acks: bool = False) -> None:
+        self.person: Final = person
+        self.seat: Final = Seat(person)
+        self.edits: Final = edits
+        self.acks: Final = acks
+        self.synced = False  # has been sent the document
+        self.refused = False  # nothing more is taken from it
+        self.handled = 0  # edits of this socket that the room has dealt with
+        self._heard = 0  # edits that the socket brought
+        self._frames: deque[bytes] = deque()
+        self._bytes = 0
+        self._entries: dict[int, Entry] = {}
+        self._ack: bytes | None = None
+        self._news = asyncio.Event()
+        self._room_again = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+        self._taken_at = self._loop.time()
+        self._closed: asyncio.Future[int] = self._loop.create_future()
+
+    def post(self, frame: bytes) -> None:
+        """Send a message some time soon; who has too much waiting is closed."""
+        if self.closed:
+            return
+        if len(self._frames) >= WAITING_FRAMES or self._bytes > WAITING_BYTES:
+            self.close(wire.TOO_SLOW)
+            return
+        self._frames.append(frame)
+        self._bytes += len(frame)
+        self._news.set()
+
+    def post_answer(self, frame: bytes) -> None:
+        """Send the document, however large: it was asked for."""
+        self._frames.append(frame)
+        self._news.set()
+
+    def post_presence(self, entries: Iterable[Entry]) -> None:
+        """Tell who is where; only the last word of each client waits."""
+        for entry in entries:
+            self._entries[entry.client] = entry
+            self._news.set()
+
+    def post_ack(self, seq: int) -> None:
+        """Say what is durable, and that everything up to `seq` was sent; the last word counts."""
+        if self.acks and self.synced:
+            self._ack = wire.acks(self.handled, seq)
+            self._news.set()
+
+    async def take(self) -> list[bytes]:
+        """What is to be sent next, in order; waits until there is something."""
+        await self._news.wait()
+        self._news.clear()
+        self._taken_at = self._loop.time()
+        frames = list(self._frames)
+        self._frames.clear()
+        self._bytes = 0
+        if self._entries:
+            frames.append(wire.presence(self._entries.values()))
+            self._entries = {}
+        if self._ack is not None:
+            frames.append(self._ack)
+            self._ack = None
+        return frames
+
+    def beat(self, silence: float) -> None:
+        """Say something if nothing was said for so many seconds (rule R10)."""
+        if self._loop.time() - self._taken_at >= silence:
+            self.post(wire.BEAT)
+
+    def heard_edit(self) -> None:
+        """The socket brought an edit."""
+        self._heard += 1
+
+    def edit_handled(self) -> None:
+        """The room has dealt with the next edit of this socket, for good."""
+        self.handled += 1
+        self._room_again.set()
+
+    async def until_heard(self) -> None:
+        """Wait while this socket is far ahead of the room."""
+        while self._heard - self.handled > _UNHANDLED_EDITS and not self.closed:
+            self._room_again.clear()
+            await self._room_again.wait()
+
+    def close(self, code: int) -> None:
+        """End this socket. The first reason counts."""
+        if not self._closed.done():
+            self._closed.set_result(code)
+            self._room_again.set()
+            self._news.set()
+
+    def refuse(self, code: int) -> None:
+        """End this socket for what it did; what it sent after that is not looked at."""
+        self.refused = True
+        self.close(code)
+
+    @property
+    def closed(self) -> bool:
+        """Whether somebody ended it."""
+        return self._closed.done()
+
+    async def ended(self) -> int:
+        """Wait for the end; the close code."""
+        return await asyncio.shield(self._closed)

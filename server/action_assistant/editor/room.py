@@ -1,0 +1,343 @@
+"""A room: one document, the people in it, and the one door through which edits enter.
+
+Rules R1 … R10 of DESIGN 3. Everything that concerns the document happens in one task, batch by
+batch: apply, append, commit, and only then tell anyone.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from typing import Any, Final, TypeAlias, TypeVar
+
+import msgspec
+from pycrdt import merge_updates
+
+from action_assistant.editor import wire
+from action_assistant.editor.member import Member
+from action_assistant.editor.presence import Attendance
+from action_assistant.editor.replica import UPDATED, Brought, Loaded, Panicked, Replica, load
+from action_assistant.editor.wire import Entry, Malformed
+from action_assistant.errors import BadInput, Refused, Unavailable
+from action_assistant.journal.events import Draft
+from action_assistant.journal.journal import Journal
+
+log: Final = logging.getLogger(__name__)
+
+T = TypeVar("T")
+
+SNAPSHOT_EVERY: Final = 1000  # events
+_BATCH: Final = 200  # items of one commit
+_MERGED: Final = 50  # updates merged at once; merging more costs their square
+_CLOSING: Final = "This graph is being closed; try again."
+
+
+class Offer(msgspec.Struct, frozen=True):
+    """An edit on its way in: from a socket, or from the server itself (`done` is told)."""
+
+    update: bytes
+    author: str
+    member: Member | None = None
+    done: "asyncio.Future[int] | None" = None
+
+
+class Ask(msgspec.Struct, frozen=True):
+    """A socket wants what it lacks."""
+
+    member: Member
+    state: bytes
+
+
+class Look(msgspec.Struct, frozen=True):
+    """Somebody wants to see the document at a moment when all of it is committed."""
+
+    see: Callable[[Replica, int], Any]
+    done: "asyncio.Future[Any]"
+
+
+Item: TypeAlias = Offer | Ask | Look
+
+
+class Room:
+    """The memory of one graph. `gone` is called when nobody may join any more."""
+
+    def __init__(
+        self, stream: str, journal: Journal, loaded: Loaded, gone: Callable[["Room"], None]
+    ) -> None:
+        self.stream: Final = stream
+        self.seq = loaded.seq
+        self.members: set[Member] = set()
+        self.attendance: Final = Attendance()
+        self._journal = journal
+        self._replica = loaded.replica
+        self._kept = loaded.kept
+        self._gone = gone
+        self._waiting: list[Item] = []
+        self._in_hand: list[Item] = []
+        self._ended = False
+        self._news = asyncio.Event()
+        self._quiet = asyncio.Event()
+        self._quiet.set()
+        self._task = asyncio.create_task(self._run(), name=f"room {stream}")
+
+    # --- people ---------------------------------------------------------------------------------
+
+    def join(self, member: Member) -> None:
+        """Let a socket in: it is asked what it has, and told who is there."""
+        self.members.add(member)
+        if member.edits:
+            # Not from a batch that is being committed: an older state only asks for more.
+            member.post(wire.question(self._replica.doc.get_state()))
+        member.post_presence(self.attendance.everyone())
+
+    def leave(self, member: Member) -> None:
+        """A socket is gone, and what it said about itself with it."""
+        self.members.discard(member)
+        self._tell_presence(self.attendance.leave(member.seat), member)
+
+    def hear(self, member: Member, message: wire.Message) -> None:
+        """Something that a socket says. Never blocks; the answer comes through the member."""
+        match message:
+            case wire.Edit(update):
+                member.heard_edit()
+                if len(update) > wire.UPDATE_LIMIT:
+                    member.refuse(wire.TOO_BIG)
+                    return
+                self._enter(Offer(update, member.person.id, member))
+            case wire.Question(state):
+                self._enter(Ask(member, state))
+            case wire.Presence(entries):
+                self._tell_presence(self.attendance.hear(member.seat, entries), member)
+            case wire.WhoIsThere():
+                member.post_presence(self.attendance.everyone())
+
+    def _tell_presence(self, entries: Sequence[Entry], speaker: Member) -> None:
+        if entries:
+            for member in self.members:
+                if member is not speaker:
+                    member.post_presence(entries)
+
+    # --- the door -------------------------------------------------------------------------------
+
+    async def submit(self, update: bytes, author: str) -> int:
+        """An edit of the server's own (rule R9); the seq up to which the log then goes.
+
+        Raises BadInput, Unavailable. Returns after the commit, also when nothing changed.
+        """
+        if self._ended:
+            raise Unavailable(_CLOSING)
+        done: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        self._enter(Offer(update, author, None, done))
+        return await done
+
+    async def look(self, see: Callable[[Replica, int], T]) -> T:
+        """What `see(document, seq)` finds when everything that entered before is committed.
+
+        `see` must not change the document nor keep it. Raises what `see` does, and Unavailable.
+        """
+        if self._ended:
+            raise Unavailable(_CLOSING)
+        done: asyncio.Future[T] = asyncio.get_running_loop().create_future()
+        self._enter(Look(see, done))
+        return await done
+
+    async def quiet(self) -> Replica:
+        """The document when nothing is on its way: what it holds until you await is committed."""
+        await self._quiet.wait()
+        if self._ended:
+            raise Unavailable(_CLOSING)
+        return self._replica
+
+    async def rest(self, needed: Callable[[], bool]) -> None:
+        """Keep a snapshot and be freed, unless somebody needs the room by then."""
+        await self._quiet.wait()
+        if not self._ended:
+            await self._keep_snapshot()
+        if needed() or self._waiting or self._ended:
+            return
+        self._gone(self)  # from here on whoever comes opens another room
+        await self.stop()
+
+    async def stop(self) -> None:
+        """Finish what has entered, then send everyone away."""
+        await self._quiet.wait()
+        self._task.cancel()
+        await asyncio.wait([self._task])
+
+    def _enter(self, item: Item) -> None:
+        self._waiting.append(item)
+        self._quiet.clear()
+        self._news.set()
+
+    async def _run(self) -> None:
+        """Batch after batch. Whatever goes wrong closes the room; its log opens the next one."""
+        reason: Refused = Unavailable(_CLOSING)
+        try:
+            while True:
+                await self._news.wait()
+                await self._handle()
+                if not self._waiting:
+                    self._news.clear()
+                    self._quiet.set()
+        except Refused as error:
+            log.error("%s: an edit could not be stored: %s", self.stream, error.detail)
+            reason = error
+        except Exception:
+            log.exception("%s: the room failed", self.stream)
+        finally:
+            self._end(reason)
+
+    async def _handle(self) -> None:
+        batch, self._waiting = self._waiting[:_BATCH], self._waiting[_BATCH:]
+        self._in_hand = batch
+        taken = self._take(batch)
+        if taken.news:
+            drafts = [Draft(UPDATED, offer.author, offer.update) for offer in taken.news]
+            self.seq = await self._journal.append(self.stream, drafts, expected=self.seq)
+        self._in_hand = []
+        self._tell(taken)
+        if taken.panicked:
+            await self._reload()
+        for ask in taken.asks:
+            self._answer(ask)
+        for look in taken.looks:
+            self._show(look)
+        if self.seq - self._kept >= SNAPSHOT_EVERY:
+            await self._keep_snapshot()
+        if not taken.news:
+            await asyncio.sleep(0)  # nothing was awaited; others want a turn
+
+    def _take(self, batch: Sequence[Item]) -> "Taken":
+        """Apply a batch. After a panic the rest of it waits for a sound document."""
+        taken = Taken()
+        for n, item in enumerate(batch):
+            if isinstance(item, Ask):
+                taken.asks.append(item)
+                continue
+            if isinstance(item, Look):
+                taken.looks.append(item)
+                continue
+            try:
+                brought = self._brought(item)
+            except Malformed as error:
+                _refuse(item, wire.MALFORMED, BadInput(f"The update cannot be read: {error}."))
+                continue
+            except Panicked:
+                log.warning("%s: refused an update that makes the library panic", self.stream)
+                _refuse(item, wire.MALFORMED, BadInput("The update cannot be read."))
+                taken.panicked = True
+                self._waiting = [*batch[n + 1 :], *self._waiting]
+                break
+            if brought is None:
+                continue
+            taken.handled.append(item)
+            if brought is not Brought.NOTHING:
+                taken.news.append(item)
+        return taken
+
+    def _brought(self, offer: Offer) -> Brought | None:
+        """Apply one edit; None when it was refused, or comes from a socket that was."""
+        member = offer.member
+        if member is not None and member.refused:
+            return None
+        if member is not None and not member.edits:
+            if not self._replica.adds_nothing(offer.update):
+                _refuse(offer, wire.FORBIDDEN, BadInput("Not allowed."))
+                return None
+            return Brought.NOTHING
+        return self._replica.take(offer.update)
+
+    # --- telling --------------------------------------------------------------------------------
+
+    def _tell(self, taken: "Taken") -> None:
+        """What is committed: to the others as news, to those who sent it as an acknowledgement."""
+        frames = [wire.change(update) for update in _merged([o.update for o in taken.news])]
+        own = {offer.member for offer in taken.news}
+        for member in self.members:
+            if member.synced and (own != {member}):
+                for frame in frames:
+                    member.post(frame)
+        heard = {offer.member for offer in taken.handled}
+        for offer in taken.handled:
+            if offer.member is not None:
+                offer.member.edit_handled()
+            if offer.done is not None and not offer.done.done():
+                offer.done.set_result(self.seq)
+        for member in self.members:
+            if taken.news or member in heard:
+                member.post_ack(self.seq)
+
+    def _answer(self, ask: Ask) -> None:
+        """Sync step 2: what the client lacks, also of what waits for an earlier update."""
+        try:
+            lacking = self._replica.lacking(ask.state)
+        except Malformed:
+            ask.member.refuse(wire.MALFORMED)
+            return
+        ask.member.post_answer(wire.answer(lacking))
+        ask.member.synced = True
+        ask.member.post_ack(self.seq)
+
+    def _show(self, look: Look) -> None:
+        if look.done.done():  # nobody waits any more
+            return
+        try:
+            look.done.set_result(look.see(self._replica, self.seq))
+        except Exception as error:  # noqa: BLE001 - the looker's own
+            look.done.set_exception(error)
+
+    # --- memory ---------------------------------------------------------------------------------
+
+    async def _reload(self) -> None:
+        self._replica.close()
+        loaded = await load(self._journal, self.stream)
+        self._replica, self.seq, self._kept = loaded.replica, loaded.seq, loaded.kept
+
+    async def _keep_snapshot(self) -> None:
+        """Cache the document. Not while something waits: no state that it gives out has that."""
+        if self._kept == self.seq or self._replica.waiting:
+            return
+        seq, state = self.seq, self._replica.doc.get_update()
+        try:
+            await self._journal.keep_snapshot(self.stream, seq, state)
+        except Refused as error:
+            log.warning("%s: no snapshot: %s", self.stream, error.detail)
+        self._kept = seq
+
+    def _end(self, reason: Refused) -> None:
+        """Nobody is told anything that is not stored; everyone may come again."""
+        self._ended = True
+        for item in [*self._in_hand, *self._waiting]:
+            if not isinstance(item, Ask) and item.done is not None and not item.done.done():
+                item.done.set_exception(reason)
+        self._waiting = []
+        self._quiet.set()
+        for member in self.members:
+            member.close(wire.RESTARTING)
+        self._replica.close()
+        self._gone(self)
+
+
+class Taken:
+    """What became of a batch."""
+
+    def __init__(self) -> None:
+        self.news: list[Offer] = []
+        self.handled: list[Offer] = []
+        self.asks: list[Ask] = []
+        self.looks: list[Look] = []
+        self.panicked = False
+
+
+def _refuse(offer: Offer, code: int, reason: Refused) -> None:
+    if offer.member is not None:
+        offer.member.refuse(code)
+    if offer.done is not None and not offer.done.done():
+        offer.done.set_exception(reason)
+
+
+def _merged(updates: list[bytes]) -> list[bytes]:
+    """The same changes in few updates."""
+    if len(updates) < 2:
+        return updates
+    groups = [updates[n : n + _MERGED] for n in range(0, len(updates), _MERGED)]
+    return [merge_updates(*group) for group in groups]

@@ -1,0 +1,112 @@
+"""A Yjs client without a network: a real document, and hands that carry its messages."""
+
+from typing import Any
+
+from pycrdt import Doc, Map
+
+from action_assistant.editor import wire
+from action_assistant.editor.member import Member
+from action_assistant.editor.room import Room
+from action_assistant.web.keys import Person
+
+
+class Client:
+    """Speaks the protocol as the page does, when and how far the test says."""
+
+    def __init__(self, name: str = "ada", *, client_id: int | None = None) -> None:
+        self.person = Person(name, name.title())
+        self.doc: Doc[Any] = Doc() if client_id is None else Doc(client_id=client_id)
+        self.map = self.doc.get("things", type=Map)
+        self.out: list[bytes] = []
+        self.member: Member | None = None
+        self.room: Room | None = None
+        self.seq = 0
+        self.durable = 0
+        self.sent = 0
+        self.others: dict[int, bytes] = {}
+        self._remote = False
+        self._subscription = self.doc.observe(self._changed)
+
+    def _changed(self, event: Any) -> None:
+        if not self._remote and event.update != wire.NOTHING_NEW:
+            self.out.append(wire.change(event.update))
+
+    def join(self, room: Room, *, edits: bool = True) -> None:
+        """Connect; what was not delivered before is lost and travels with step 2."""
+        self.leave()
+        self.member = Member(self.person, edits=edits, acks=True)
+        self.room = room
+        self.out = [wire.question(self.doc.get_state())]
+        self.durable = self.sent = 0
+        room.join(self.member)
+
+    def leave(self) -> None:
+        """Lose the connection and everything on its way."""
+        if self.room is not None and self.member is not None:
+            self.room.leave(self.member)
+            self.member.close(1000)
+        self.room = self.member = None
+        self.out = []
+
+    def speak(self, count: int | None = None) -> None:
+        """Deliver the next messages to the room."""
+        while self.out and count != 0:
+            self.deliver(self.out.pop(0))
+            count = None if count is None else count - 1
+
+    def deliver(self, frame: bytes) -> None:
+        """Deliver one message to the room."""
+        assert self.room is not None
+        assert self.member is not None
+        message = wire.parse(frame)
+        assert message is not None
+        self.sent += isinstance(message, wire.Edit)
+        self.room.hear(self.member, message)
+
+    async def listen(self) -> bool:
+        """Take in what the room has for us; whether there was anything."""
+        if self.member is None or not self.member._news.is_set():
+            return False
+        frames = await self.member.take()
+        for frame in frames:
+            self.take(frame)
+        return bool(frames)
+
+    def take(self, frame: bytes) -> None:
+        """One message of the room's."""
+        if frame[0] == wire.ACKS:
+            reader = wire.Reader(frame[1:])
+            self.durable, self.seq = reader.number(), reader.number()
+            assert self.durable <= self.sent
+            return
+        match wire.parse(frame):
+            case wire.Question(state):
+                self.out.append(wire.answer(self.doc.get_update(state)))
+            case wire.Edit(update):
+                self._remote = True
+                self.doc.apply_update(update)
+                self._remote = False
+            case wire.Presence(entries):
+                for entry in entries:
+                    self.others[entry.client] = entry.state
+                    if entry.state == b"null":
+                        del self.others[entry.client]
+
+    @property
+    def things(self) -> dict[str, Any]:
+        """What the document shows."""
+        shown: dict[str, Any] = self.map.to_py() or {}
+        return shown
+
+
+async def settle(*clients: Client) -> None:
+    """Carry messages until nobody has anything to say."""
+    busy = True
+    while busy:
+        busy = False
+        for client in clients:
+            if client.room is not None:
+                busy = bool(client.out) or busy
+                client.speak()
+                await client.room.quiet()
+                busy = await client.listen() or busy
