@@ -28,6 +28,20 @@ test("an arrow says each thing that it does, with the outcomes that lead there",
   expect(words()).toEqual(["Does nothing, however Scan ends."]);
 });
 
+test("an arrow that one side does not know says what comes of that", () => {
+  const doc = new Y.Doc();
+  const [a, b] = [addAction(doc, { name: "A" }), addAction(doc, { name: "B" })];
+  const id = connect(doc, a, b) as string;
+  const words = (only: string) => {
+    doc.getMap("relations").set(`${id}|only`, only);
+    return startWords(graphOf(doc), b).join(" ");
+  };
+  expect(words("children")).toContain("the engine breaks down when A ends");
+  expect(words("parents")).toContain("this never runs");
+  setRequired(doc, id, false); // makes it known to both again
+  expect(words("parents")).toContain("nothing comes of it");
+});
+
 test("a join says whom it waits for", () => {
   const doc = new Y.Doc();
   const [a, b, c] = ["A", "B", "C"].map((name) => addAction(doc, { name })) as [

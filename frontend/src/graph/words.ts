@@ -39,6 +39,7 @@ export function nameOf(graph: Graph, key: Key): string {
 export function relationWords(graph: Graph, relation: Relation): readonly string[] {
   if (relation.parent === ENTRY) return ["Runs when the graph starts."];
   const parent = nameOf(graph, relation.parent);
+  if (relation.only !== null && relation.child !== EXIT) return [oneSidedWords(relation, parent)];
   const toEnd = relation.child === EXIT;
   const sentences = groups(relation).map(({ response, outcomes }) => {
     const when = `${parent} ${any(outcomes.map((outcome) => ENDINGS[outcome]))}`;
@@ -51,7 +52,7 @@ export function relationWords(graph: Graph, relation: Relation): readonly string
 /** When an action runs, or the graph ends: all its arrows, and how they wait for each other. */
 export function startWords(graph: Graph, key: Key): readonly string[] {
   const relations = graph.relations
-    .filter((relation) => relation.child === key && relation.only !== "parents")
+    .filter((relation) => relation.child === key)
     .sort((a, b) => a.childOrder - b.childOrder);
   if (relations.length === 0) {
     return [
@@ -63,6 +64,16 @@ export function startWords(graph: Graph, key: Key): readonly string[] {
     ...relations.flatMap((relation) => relationWords(graph, relation)),
     ...(wait === null ? [] : [wait]),
   ];
+}
+
+/** A file that lists a relation on one side only (hazards H2 and H2b). */
+function oneSidedWords(relation: Relation, parent: string): string {
+  if (relation.only === "children") {
+    return `Only ${parent} knows of this arrow: the engine breaks down when ${parent} ends.`;
+  }
+  return relation.required
+    ? `${parent} does not know of this arrow, yet is waited for: this never runs.`
+    : `${parent} does not know of this arrow: nothing comes of it.`;
 }
 
 function groups(relation: Relation): { response: Response; outcomes: Precondition[] }[] {
