@@ -236,7 +236,11 @@ class Core:
     def _run(self, graph: Running, node: Node) -> None:
         if node.state == "RUNNING":
             return
-        if node.active or node.busy_until > self.now:
+        if node.subgraph is None and not node.loaded and node.state != "UNINITIALIZED":
+            if not node.failed_to_load:
+                self._soon(partial(self._run_unloaded, graph, node))
+                return
+        elif node.active or node.busy_until > self.now:
             message = (
                 f"“run” reaches {node.full_name}, whose thread still lives: the engine aborts."
             )
@@ -251,16 +255,18 @@ class Core:
         elif self._load(graph, node):
             self._begin(graph, node)
 
+    def _run_unloaded(self, graph: Running, node: Node) -> None:
+        if not node.active:
+            self._state(graph, node, "RUNNING")
+        message = "The file carried a state, so the action was never loaded: the engine aborts."
+        self._crash(graph, "H1", message, node)
+
     def _load(self, graph: Running, node: Node) -> bool:
         if node.loaded:
             return True
-        if node.state != "UNINITIALIZED":
-            self._state(graph, node, "RUNNING")
-            message = "The file carried a state, so the action was never loaded: the engine aborts."
-            self._crash(graph, "H1", message, node)
-            return False
         if node.call.init_error:
             node.calls += 1
+            node.failed_to_load = True
             self._state(graph, node, "ERROR")
             self._state(graph, node, "ERROR")
             self._result(graph, node, "on_error")

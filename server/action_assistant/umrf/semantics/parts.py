@@ -63,7 +63,7 @@ class Node:
 
     __slots__ = (
         "actor", "again", "behaviours", "busy_until", "call", "calls", "children", "due_ms",
-        "full_name", "inputs", "instance_id", "key", "links", "loaded", "name", "outputs", "pending",
+        "failed_to_load", "full_name", "inputs", "instance_id", "key", "links", "loaded", "name", "outputs", "pending",
         "rest_ms", "returning", "started_ms", "state", "sub", "subgraph", "token", "type",
         "waiting_links",
     )  # fmt: skip
@@ -83,6 +83,7 @@ class Node:
         self.outputs: dict[str, Slot] = slots_of(action.outputs)
         self.state = "UNINITIALIZED"
         self.loaded = False
+        self.failed_to_load = False
         self.calls = 0
         self.call = behaviours[0]
         self.token = 0

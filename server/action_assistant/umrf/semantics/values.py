@@ -1,6 +1,6 @@
 """Parameters at run time: who holds which value, and what reaches a child (SPEC 2.7)."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import msgspec
@@ -95,25 +95,32 @@ def fill_outputs(outputs: dict[str, Slot], given: dict[str, Any] | None) -> None
 def hand_over(outputs: dict[str, Slot], remap: Sequence[Remap], inputs: dict[str, Slot]) -> None:
     """Moves a parent's outputs into the child's inputs of the same name after renaming.
 
-    Raises `RemapUnknown`. Renaming happens inside a sorted tree whose order is not restored, so
-    that other outputs may not be found any more, as in the engine.
+    Raises `RemapUnknown`.
+    """
+    for name, place in renamed(outputs, remap, inputs).items():
+        source = outputs[place]
+        inputs[name].receive(source.type, source.value)
+
+
+def renamed(
+    outputs: Mapping[str, Slot], remap: Sequence[Remap], inputs: Mapping[str, Slot]
+) -> dict[str, str]:
+    """Which output reaches which input: input name → output name. Raises `RemapUnknown`.
+
+    The engine renames inside a sorted tree whose order is not restored, so that other outputs may
+    not be found any more.
     """
     if not remap:
-        for name, slot in outputs.items():
-            if target := inputs.get(name):
-                target.receive(slot.type, slot.value)
-        return
-    tree = _Tree(sorted(outputs))
+        return {name: name for name in inputs if name in outputs}
+    own = sorted(outputs)
+    tree = _Tree(list(own))
     for rename in remap:
         place = tree.find(rename.source)
         if place is None:
             raise RemapUnknown(rename.source)
         tree.names[place] = rename.target
-    source = [outputs[name] for name in sorted(outputs)]
-    for name, target in inputs.items():
-        place = tree.find(name)
-        if place is not None:
-            target.receive(source[place].type, source[place].value)
+    places = {name: tree.find(name) for name in inputs}
+    return {name: own[place] for name, place in places.items() if place is not None}
 
 
 def plain(value: Json) -> Any:

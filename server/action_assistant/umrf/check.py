@@ -1,0 +1,80 @@
+"""What is wrong with a graph, in words that say what would happen (SPEC 3)."""
+
+from collections.abc import Collection, Mapping
+from typing import Final
+
+from action_assistant.umrf.checks.flow import check_flow
+from action_assistant.umrf.checks.places import Subject
+from action_assistant.umrf.checks.structure import check_structure
+from action_assistant.umrf.checks.values import check_values
+from action_assistant.umrf.codec import Reading
+from action_assistant.umrf.facts import PINNED, EngineFacts
+from action_assistant.umrf.model import Graph, Problem, Signature, Where
+
+#: Codes of what makes the engine's parser refuse a text.
+REFUSED: Final = frozenset(
+    {
+        "action-illegal", "condition-illegal", "dialect-old", "entry-exit-missing",
+        "graph-name-missing", "name-empty", "parameter-illegal", "relation-unnamed", "remap-illegal",
+        "runtime-illegal", "state-illegal", "type-empty", "type-missing", "value-type",
+    }
+)  # fmt: skip
+#: Codes that block every engine and cannot be overridden.
+STRUCTURAL: Final[frozenset[str]] = REFUSED | {"ghost", "H6", "instance-id"}
+
+
+def check(
+    graph: Graph, library: Mapping[str, Signature] | None = None, facts: EngineFacts = PINNED
+) -> list[Problem]:
+    """Every problem of a graph, errors first. Never raises."""
+    subject = Subject(graph, facts)
+    check_structure(subject)
+    check_flow(subject)
+    check_values(subject, library)
+    _check_actors(subject)
+    return sorted(subject.problems, key=lambda problem: problem.severity)
+
+
+def check_reading(
+    reading: Reading, library: Mapping[str, Signature] | None = None, facts: EngineFacts = PINNED
+) -> list[Problem]:
+    """Every problem of a file as it stands: of its text, of the run states that it carries, and of
+    the graph in it."""
+    problems = [*reading.problems, *_carried_states(reading), *check(reading.graph, library, facts)]
+    return sorted(problems, key=lambda problem: problem.severity)
+
+
+def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ()) -> list[Problem]:
+    """The errors that forbid a start; structural ones whatever is overridden."""
+    return [
+        problem
+        for problem in problems
+        if problem.severity == "error"
+        and (problem.code in STRUCTURAL or problem.code not in overridden)
+    ]
+
+
+def _carried_states(reading: Reading) -> list[Problem]:
+    places = Subject(reading.graph, PINNED).paths
+    names = {action.key: action.full_name for action in reading.graph.actions}
+    return [
+        Problem(
+            code="H1",
+            severity="error",
+            where=Where(path=f"{places.get(key, '')}/state", aid=key),
+            message=f"The file says that {names[key]} is {state}: started as it stands, the engine "
+            "aborts with every running graph, or the action never runs.",
+            fix="drop-states",
+        )
+        for key, state in reading.states.items()
+    ]
+
+
+def _check_actors(subject: Subject) -> None:
+    actors = sorted({action.actor for action in subject.real if action.actor})
+    if len(actors) > 1 and not subject.facts.synchronises:
+        message = (
+            f"The actions belong to {len(actors)} actors ({', '.join(actors)}). This engine cannot "
+            "synchronise with others: it refuses the graph."
+        )
+        subject.report("actors", "error", message)

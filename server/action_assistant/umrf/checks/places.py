@@ -1,0 +1,122 @@
+"""Where things of a graph stand in its canonical file, and how problems name them."""
+
+from collections.abc import Iterator
+
+from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.jsontext import pointer
+from action_assistant.umrf.model import (
+    ENTRY,
+    EXIT,
+    Action,
+    Graph,
+    Key,
+    Problem,
+    Relation,
+    Severity,
+    Where,
+)
+from action_assistant.umrf.writing import name_order
+
+
+class Subject:
+    """A graph under examination, indexed, with the problems found so far."""
+
+    def __init__(self, graph: Graph, facts: EngineFacts) -> None:
+        self.graph = graph
+        self.facts = facts
+        self.problems: list[Problem] = []
+        self.actions: dict[Key, Action] = {action.key: action for action in graph.actions}
+        self.real = [action for action in graph.actions if not action.missing]
+        self.paths: dict[Key, str] = {
+            action.key: pointer("actions", index) for index, action in enumerate(self.real)
+        }
+        known = {ENTRY, EXIT, *self.actions}
+        self.relations = [r for r in graph.relations if r.parent in known and r.child in known]
+        by_child = sorted(self.relations, key=lambda r: (r.child_order, name_order(r)))
+        by_parent = sorted(self.relations, key=lambda r: (r.parent_order, name_order(r)))
+        self.parents: dict[Key, list[Relation]] = {}
+        self.children: dict[Key, list[Relation]] = {}
+        self.parent_paths: dict[int, str] = {}
+        self.child_paths: dict[int, str] = {}
+        for r in by_child:
+            if r.only != "children" and r.parent != ENTRY:
+                self._place(r, self.parents.setdefault(r.child, []), r.child, self.parent_paths)
+        for r in by_parent:
+            if r.only != "parents" and r.child != EXIT:
+                self._place(r, self.children.setdefault(r.parent, []), r.parent, self.child_paths)
+        #: Relations that the engine follows: both sides list each other, both ends exist.
+        self.sound = [r for r in by_parent if self._is_sound(r)]
+        self.incoming: dict[Key, list[Relation]] = {}
+        self.outgoing: dict[Key, list[Relation]] = {}
+        for r in self.sound:
+            self.incoming.setdefault(r.child, []).append(r)
+            self.outgoing.setdefault(r.parent, []).append(r)
+
+    def _place(
+        self, relation: Relation, listed: list[Relation], owner: Key, paths: dict[int, str]
+    ) -> None:
+        field = "parents" if paths is self.parent_paths else "children"
+        match owner:
+            case "entry":
+                start = "/graph_entry"
+            case "exit":
+                start = "/graph_exit"
+            case _:
+                start = f"{self.paths.get(owner, '')}/{field}"
+        paths[id(relation)] = f"{start}/{len(listed)}"
+        listed.append(relation)
+
+    def _is_sound(self, relation: Relation) -> bool:
+        ends = [self.actions.get(key) for key in (relation.parent, relation.child)]
+        return relation.only is None and not any(end and end.missing for end in ends)
+
+    def name(self, key: Key) -> str:
+        """How people call one end of a relation."""
+        match key:
+            case "entry":
+                return "the entry"
+            case "exit":
+                return "the exit"
+            case _:
+                return self.actions[key].full_name
+
+    def report(
+        self,
+        code: str,
+        severity: Severity,
+        message: str,
+        *,
+        action: Action | None = None,
+        relation: Relation | None = None,
+        member: str = "",
+        fix: str | None = None,
+    ) -> None:
+        """Adds a problem of the graph, of an action or of a relation; `member` goes below it."""
+        where = Where(path=member)
+        if action is not None:
+            where = Where(path=self.paths.get(action.key, "") + member, aid=action.key)
+        elif relation is not None:
+            where = self._where(relation, member)
+        self.problems.append(
+            Problem(code=code, severity=severity, where=where, message=message, fix=fix)
+        )
+
+    def _where(self, relation: Relation, member: str) -> Where:
+        path = self.parent_paths.get(id(relation)) or self.child_paths.get(id(relation), "")
+        if member.startswith("/remap"):
+            path = self.child_paths.get(id(relation), path)
+        listing = f";{relation.listing}" if relation.listing else ""
+        owner = relation.child if relation.child in self.paths else relation.parent
+        aid = owner if owner in self.paths else None
+        key = f"{relation.parent}>{relation.child}{listing}"
+        return Where(path=path + member, aid=aid, relation=key)
+
+
+def sorted_by_name(names: set[str]) -> Iterator[str]:
+    """Names in quotes, in order."""
+    return (f"“{name}”" for name in sorted(names))
+
+
+def joined(names: set[str]) -> str:
+    """Names for a sentence."""
+    return ", ".join(sorted_by_name(names))

@@ -1,0 +1,165 @@
+"""Parameters: who provides them, what renamings break, what a library says (SPEC 2.7, H2, H7, H8)."""
+
+from collections.abc import Mapping
+
+from action_assistant.umrf.checks.places import Subject, joined
+from action_assistant.umrf.model import ENTRY, EXIT, Action, Key, Relation, Severity, Signature
+from action_assistant.umrf.parameters import flat_name
+from action_assistant.umrf.semantics.values import RemapUnknown, Slot, renamed, slots_of
+
+
+def check_values(subject: Subject, library: Mapping[str, Signature] | None) -> None:
+    """Reports all of it."""
+    inputs = {action.key: slots_of(action.inputs) for action in subject.real}
+    outputs = {action.key: slots_of(action.outputs) for action in subject.real}
+    for relation in subject.sound:
+        _check_remap(subject, relation, inputs, outputs)
+    for action in subject.real:
+        _check_inputs(subject, action, inputs, outputs, library)
+        _check_static(subject, action, inputs[action.key])
+        if library is not None:
+            _check_signature(subject, action, library, inputs[action.key], outputs[action.key])
+
+
+_Slots = dict[str, Slot]
+
+
+def _check_remap(
+    subject: Subject,
+    relation: Relation,
+    inputs: Mapping[Key, _Slots],
+    outputs: Mapping[Key, _Slots],
+) -> None:
+    if not relation.remap or relation.child == EXIT:
+        return
+    if relation.parent == ENTRY:
+        own: _Slots = {}
+    else:
+        own = outputs[relation.parent]
+    targets = inputs[relation.child]
+    sources = {remap.source for remap in relation.remap}
+    unknown = sources - set(own)
+    parent, child = subject.name(relation.parent), subject.name(relation.child)
+    if unknown and relation.parent != ENTRY:
+        message = (
+            f"{parent} has no output {joined(unknown)} to rename: when it ends, the engine aborts "
+            "with every running graph."
+        )
+        subject.report("H2", "error", message, relation=relation, member="/remap")
+        return
+    useless = {remap.target for remap in relation.remap} - set(targets)
+    if useless:
+        message = f"{child} has no input {joined(useless)}; what is renamed to it is lost."
+        subject.report("remap-target", "warning", message, relation=relation, member="/remap")
+    if relation.parent == ENTRY:
+        return
+    meant = {name: name for name in own} | {r.source: r.target for r in relation.remap}
+    lost = set(meant.values()) & set(targets) - set(renamed(own, relation.remap, targets))
+    if lost:
+        message = (
+            f"This renaming changes the alphabetical order of {parent}'s outputs, in which the "
+            f"engine then cannot find {joined(lost)} any more: {child} does not get it."
+        )
+        needed = any(targets[n].required and not targets[n].has_value() for n in lost)
+        severity: Severity = "error" if needed else "warning"
+        subject.report("remap-order", severity, message, relation=relation, member="/remap")
+
+
+def _check_inputs(
+    subject: Subject,
+    action: Action,
+    inputs: Mapping[Key, _Slots],
+    outputs: Mapping[Key, _Slots],
+    library: Mapping[str, Signature] | None,
+) -> None:
+    """Required inputs for which there is no value."""
+    known = (library or {}).get(action.name)
+    for name, slot in inputs[action.key].items():
+        if not slot.required or slot.has_value() or (known and name in known.optional):
+            continue
+        incoming = [r for r in subject.incoming.get(action.key, []) if r.parent != ENTRY]
+        wrong: set[str] = set()
+        given = False
+        for relation in incoming:
+            own = outputs[relation.parent]
+            try:
+                place = renamed(own, relation.remap, {name: slot}).get(name)
+            except RemapUnknown:
+                continue
+            if place is None:
+                continue
+            if own[place].type == slot.type:
+                given = slot.updatable
+            else:
+                wrong.add(f"{relation.parent}: {own[place].type}")
+        starts = any(r.parent == ENTRY for r in subject.incoming.get(action.key, []))
+        member = f"/input_parameters/{path_of(action, name)}"
+        if starts:
+            message = (
+                f"{action.full_name} is an entry and its input “{name}” has no value: the engine "
+                "silently never starts the graph, and says nothing. (As a sub-graph it may get one.)"
+            )
+            subject.report("H7", "error", message, action=action, member=member)
+        elif not given and subject.incoming.get(action.key):
+            kinds = " The type of what a parent hands over differs." if wrong else ""
+            message = (
+                f"Nobody gives {action.full_name} its input “{name}”: it never runs and the graph "
+                f"stays RUNNING for ever.{kinds}"
+            )
+            subject.report("H8", "error", message, action=action, member=member)
+
+
+def _check_static(subject: Subject, action: Action, inputs: _Slots) -> None:
+    for name, slot in inputs.items():
+        if slot.has_value() and slot.allowed and slot.value not in slot.allowed:
+            message = (
+                f"The value of “{name}” is none of the allowed ones; the engine does not notice."
+            )
+            member = f"/input_parameters/{path_of(action, name)}/pvf_value"
+            subject.report("parameter-allowed", "warning", message, action=action, member=member)
+
+
+def _check_signature(
+    subject: Subject,
+    action: Action,
+    library: Mapping[str, Signature],
+    inputs: _Slots,
+    outputs: _Slots,
+) -> None:
+    known = library.get(action.name)
+    if known is None:
+        message = f"No library knows the action “{action.name}”; the engine refuses the graph unless it does."
+        subject.report("unknown-action", "warning", message, action=action, member="/name")
+        return
+    for side, ours, theirs in (("input", inputs, known.inputs), ("output", outputs, known.outputs)):
+        surplus, lacking = set(ours) - set(theirs), set(theirs) - set(ours)
+        if surplus or lacking:
+            what = "".join(
+                f" {verb} {joined(names)}."
+                for verb, names in (("It does not know", surplus), ("It wants", lacking))
+                if names
+            )
+            message = (
+                f"The {side}s of {action.full_name} are not those of its action, so the engine cannot "
+                f"resolve the graph.{what}"
+            )
+            subject.report(
+                "signature", "error", message, action=action, member=f"/{side}_parameters",
+                fix="signature",
+            )  # fmt: skip
+        for name in sorted(set(ours) & set(theirs)):
+            if ours[name].type != theirs[name]:
+                message = (
+                    f"“{name}” is a {ours[name].type} here and a {theirs[name]} in the action: "
+                    "the action ends in ERROR."
+                )
+                member = f"/{side}_parameters/{path_of(action, name)}"
+                subject.report("parameter-type", "error", message, action=action, member=member)
+
+
+def path_of(action: Action, name: str) -> str:
+    """The path of a parameter by its flat name."""
+    for parameter in (*action.inputs, *action.outputs):
+        if flat_name(parameter.path) == name:
+            return parameter.path
+    return name
