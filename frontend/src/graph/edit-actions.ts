@@ -17,7 +17,7 @@ import {
   PRECONDITIONS,
   type Relation,
 } from "./model";
-import { after, erase, graphOf, hasAction, put, settleGhosts, together } from "./pen";
+import { after, erase, graphOf, hasAction, numbersOf, put, settleGhosts, together } from "./pen";
 
 /** An action to be added, usually one of the library. */
 export interface NewAction {
@@ -35,7 +35,7 @@ export interface NewAction {
 export function addAction(doc: Y.Doc, action: NewAction): Key {
   return together(doc, () => {
     const key = newAid();
-    const instanceId = freeNumber(graphOf(doc).actions, action.name);
+    const instanceId = freeNumber(numbersOf(doc), action.name);
     put(
       doc,
       "actions",
@@ -125,7 +125,7 @@ export function rename(doc: Y.Doc, key: Key, name: string): boolean {
   if (!hasAction(doc, key)) return false;
   together(doc, () => {
     settleGhosts(doc);
-    const { actions } = graphOf(doc);
+    const actions = numbersOf(doc);
     const action = actions.find((candidate) => candidate.key === key);
     if (action === undefined || action.name === name) return;
     const clash = actions.some(

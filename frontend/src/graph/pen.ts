@@ -2,7 +2,7 @@
 
 import * as Y from "yjs";
 import { isAid } from "./ids";
-import { endsOf, mapsOf, type Root, rootOf, splitKey } from "./layout";
+import { endsOf, mapsFrom, mapsOf, type Root, rootOf, splitKey } from "./layout";
 import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS, type Relation } from "./model";
 import { readGraph, readTakenUp } from "./read";
 import { asNumber, asResponse } from "./values";
@@ -55,6 +55,17 @@ export const hasEnd = (doc: Y.Doc, key: Key): boolean =>
   key === ENTRY || key === EXIT || hasAction(doc, key);
 
 export const graphOf = (doc: Y.Doc): Graph => readGraph(mapsOf(doc));
+
+const NUMBERING = new Set(["", "instance_id", "missing", "twin"]);
+
+/** The actions with their names and numbers only, which is much less to read. */
+export function numbersOf(doc: Y.Doc): Graph["actions"] {
+  const actions = new Map<string, unknown>();
+  for (const [key, value] of rootOf(doc, "actions").entries()) {
+    if (NUMBERING.has(splitKey(key).rest)) actions.set(key, value);
+  }
+  return readGraph({ ...mapsFrom({}), actions }).actions;
+}
 
 /** The number after the greatest one under the keys that fit. */
 export function after(doc: Y.Doc, root: Root, field: string, fits: (head: string) => boolean) {
