@@ -17,6 +17,8 @@ export default defineConfig({
   build: {
     outDir: "dist",
     target: "es2022",
+    // Fonts inlined as data: would be refused by the Content-Security-Policy.
+    assetsInlineLimit: 0,
     rolldownOptions: { output: { codeSplitting: { groups: vendors } } },
   },
   server: {

@@ -13,6 +13,7 @@ import {
   type Precondition,
   RESPONSES,
   type Relation,
+  type Remap,
   type Response,
 } from "../../graph/model";
 
@@ -72,6 +73,10 @@ const plain = {
   childrenExtra: [],
 } as const;
 
+function remaps(value: unknown): Remap[] {
+  return list(value).map((item) => ({ source: text(item.from), target: text(item.to) }));
+}
+
 /** What `actions` of a UMRF object and its ends say. */
 export function fromUmrf(umrf: unknown): Graph {
   const root = object(umrf);
@@ -101,6 +106,14 @@ export function fromUmrf(umrf: unknown): Graph {
   raw.forEach((fields, i) => {
     const child = actions[i]?.key;
     if (child) takeParents(child, fields.parents);
+  });
+  raw.forEach((fields, i) => {
+    const parent = actions[i]?.key;
+    for (const child of list(fields.children)) {
+      const id = `${parent}>${keyOf(child)};0`;
+      const known = relations.get(id);
+      if (known) relations.set(id, { ...known, remap: remaps(child.remap) });
+    }
   });
   takeParents(EXIT, root.graph_exit);
   const gui = object(object(root.gui_attributes).action_assistant);

@@ -1,0 +1,50 @@
+/** The page: theme, data, session, routes. */
+import { MantineProvider } from "@mantine/core";
+import { Notifications } from "@mantine/notifications";
+import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
+import { Route, Switch } from "wouter";
+import { Gate } from "../account/gate";
+import { Refusal } from "../api/http";
+import { LiveProvider } from "../api/use-live";
+import { StopNotice } from "../runs/stop-notice";
+import { actionCarrier } from "../ui/carry";
+import { CarriedGhost } from "../ui/placing";
+import { theme, variables } from "../ui/theme";
+import { DropFiles } from "./drop-files";
+import { GraphScreen } from "./graph-screen";
+import { Lost } from "./lost";
+import { HomeScreen, RunScreen, RunsScreen } from "./screens";
+
+const client = new QueryClient({
+  defaultOptions: {
+    queries: {
+      retry: (count, error) => !(error instanceof Refusal) && count < 3,
+      refetchOnWindowFocus: true,
+    },
+  },
+});
+
+export function App() {
+  return (
+    <MantineProvider theme={theme} cssVariablesResolver={variables} defaultColorScheme="auto">
+      <Notifications position="bottom-right" zIndex={350} />
+      <QueryClientProvider client={client}>
+        <Gate>
+          <LiveProvider>
+            <DropFiles>
+              <Switch>
+                <Route path="/" component={HomeScreen} />
+                <Route path="/graphs/:id">{({ id }) => <GraphScreen key={id} id={id} />}</Route>
+                <Route path="/runs" component={RunsScreen} />
+                <Route path="/runs/:id">{({ id }) => <RunScreen key={id} id={id} />}</Route>
+                <Route component={Lost} />
+              </Switch>
+              <StopNotice />
+              <CarriedGhost carrier={actionCarrier} />
+            </DropFiles>
+          </LiveProvider>
+        </Gate>
+      </QueryClientProvider>
+    </MantineProvider>
+  );
+}

@@ -1,0 +1,60 @@
+/** Takes files that are dropped anywhere on the page. */
+import { IconFileImport } from "@tabler/icons-react";
+import { type ReactNode, useEffect, useRef, useState } from "react";
+import style from "./drop-files.module.css";
+import { useNewGraphs } from "./files";
+
+function hasFiles(event: DragEvent): boolean {
+  return [...(event.dataTransfer?.types ?? [])].includes("Files");
+}
+
+export function DropFiles({ children }: { children: ReactNode }) {
+  const { take } = useNewGraphs();
+  const [over, setOver] = useState(false);
+  const depth = useRef(0);
+  useEffect(() => {
+    const enter = (event: DragEvent) => {
+      if (!hasFiles(event)) return;
+      depth.current += 1;
+      setOver(true);
+    };
+    const leave = (event: DragEvent) => {
+      if (!hasFiles(event)) return;
+      depth.current = Math.max(0, depth.current - 1);
+      if (depth.current === 0) setOver(false);
+    };
+    const allow = (event: DragEvent) => {
+      if (hasFiles(event)) event.preventDefault();
+    };
+    const drop = (event: DragEvent) => {
+      if (!hasFiles(event)) return;
+      event.preventDefault();
+      depth.current = 0;
+      setOver(false);
+      void take([...(event.dataTransfer?.files ?? [])]);
+    };
+    const pairs = [
+      ["dragenter", enter],
+      ["dragleave", leave],
+      ["dragover", allow],
+      ["drop", drop],
+    ] as const;
+    for (const [name, listener] of pairs) window.addEventListener(name, listener);
+    return () => {
+      for (const [name, listener] of pairs) window.removeEventListener(name, listener);
+    };
+  }, [take]);
+  return (
+    <>
+      {children}
+      {over && (
+        <div className={style.over} aria-hidden>
+          <div className={style.card}>
+            <IconFileImport size={28} />
+            Drop to import as a graph
+          </div>
+        </div>
+      )}
+    </>
+  );
+}

@@ -1,0 +1,37 @@
+/** The screens around the features: home, runs, one run. */
+import { RunPage } from "../history/run-page";
+import { RunsPage } from "../history/runs-page";
+import { Home } from "../library/home";
+import { useNewGraphs } from "./files";
+import { Bar, Frame } from "./frame";
+import { useTitle } from "./title";
+
+export function HomeScreen() {
+  const { create, choose } = useNewGraphs();
+  useTitle("Graphs");
+  return (
+    <Frame>
+      <Bar crumbs={[{ label: "Graphs" }]} />
+      <Home onNew={create} onImport={choose} />
+    </Frame>
+  );
+}
+
+export function RunsScreen() {
+  useTitle("Runs");
+  return (
+    <Frame>
+      <Bar history crumbs={[{ label: "Graphs", to: "/" }, { label: "Runs" }]} />
+      <RunsPage />
+    </Frame>
+  );
+}
+
+export function RunScreen({ id }: { id: string }) {
+  useTitle("Run");
+  return (
+    <Frame>
+      <RunPage id={id} bar={(parts) => <Bar history {...parts} />} />
+    </Frame>
+  );
+}

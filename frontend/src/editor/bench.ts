@@ -1,0 +1,84 @@
+/** What a deed works on: the open graph, what is selected, and the view of it. */
+import { createContext, use } from "react";
+import type * as Y from "yjs";
+import type { NewAction } from "../graph/edit";
+import { relationId } from "../graph/layout";
+import {
+  type Action,
+  ENTRY,
+  EXIT,
+  type Graph,
+  type Key,
+  type Position,
+  type Precondition,
+  type Relation,
+} from "../graph/model";
+
+/** Where the search for an action opens, and what it is tied to once chosen. */
+export interface AddRequest {
+  /** On the screen, px. */
+  readonly screen: Position;
+  /** On the canvas. */
+  readonly at: Position;
+  readonly from: { readonly key: Key; readonly outcome: Precondition } | null;
+}
+
+export type Panel = "details" | "json" | "problems";
+export type Tool = "pan" | "select";
+
+/** What the canvas can do with its view. */
+export interface View {
+  fit(): void;
+  zoomIn(): void;
+  zoomOut(): void;
+  show(keys: readonly Key[]): void;
+  /** The middle of what is seen, on the canvas. */
+  middle(): Position;
+  screenOf(at: Position): Position;
+}
+
+export interface Bench {
+  readonly doc: Y.Doc;
+  readonly undo: Y.UndoManager;
+  readonly graph: Graph;
+  readonly canUndo: boolean;
+  readonly canRedo: boolean;
+  /** Keys of actions and ends, ids of relations. */
+  readonly selection: ReadonlySet<string>;
+  readonly tool: Tool;
+  readonly view: View;
+  select(ids: Iterable<string>): void;
+  setTool(tool: Tool): void;
+  setPanel(panel: Panel): void;
+  openAdd(request?: AddRequest): void;
+  /** Where everything stands, also what has no place of its own. */
+  places(): ReadonlyMap<Key, Position>;
+  sizes(): ReadonlyMap<Key, { readonly width: number; readonly height: number }>;
+  download(): void;
+}
+
+export const BenchContext = createContext<Bench | null>(null);
+
+export function useBench(): Bench {
+  const bench = use(BenchContext);
+  if (bench === null) throw new Error("useBench needs an editor around it");
+  return bench;
+}
+
+export function selectedActions(bench: Bench): Action[] {
+  return bench.graph.actions.filter((action) => bench.selection.has(action.key));
+}
+
+export function selectedRelations(bench: Bench): Relation[] {
+  return bench.graph.relations.filter((relation) => bench.selection.has(relationId(relation)));
+}
+
+/** How a person calls an end of a relation. */
+export function endName(graph: Graph, key: Key): string {
+  if (key === ENTRY) return "Entry";
+  if (key === EXIT) return "Exit";
+  const action = graph.actions.find((candidate) => candidate.key === key);
+  return action ? `${action.name} ${action.instanceId}` : "something deleted";
+}
+
+export type { NewAction };

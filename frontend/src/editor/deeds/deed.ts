@@ -1,0 +1,58 @@
+/** A deed: something a person can do, as a value. Toolbar, menu, keys and help are made of these. */
+import type { Icon } from "@tabler/icons-react";
+import type { Bench } from "../bench";
+
+export interface Deed {
+  readonly name: string;
+  readonly label: string;
+  /** `Mod` is Ctrl, and ⌘ on a Mac. The first is shown; all work. */
+  readonly shortcuts: readonly string[];
+  readonly icon: Icon;
+  enabled(bench: Bench): boolean;
+  run(bench: Bench): void;
+}
+
+const onMac = typeof navigator !== "undefined" && /Mac|iP(hone|ad)/.test(navigator.platform);
+
+interface Pressed {
+  readonly key: string;
+  readonly ctrlKey: boolean;
+  readonly metaKey: boolean;
+  readonly shiftKey: boolean;
+  readonly altKey: boolean;
+}
+
+/** Whether a key press is this shortcut. */
+export function isPressed(shortcut: string, event: Pressed, mac = onMac): boolean {
+  const parts = shortcut.split("+");
+  const key = parts.pop() ?? "";
+  const mod = mac ? event.metaKey : event.ctrlKey;
+  const other = mac ? event.ctrlKey : event.metaKey;
+  const letter =
+    key.length === 1 ? event.key.toLowerCase() === key.toLowerCase() : event.key === key;
+  // Signs such as "+" or "?" carry their own Shift on some keyboards.
+  const sign = key.length === 1 && !/[a-z0-9]/i.test(key);
+  const shift = sign || event.shiftKey === parts.includes("Shift");
+  return letter && mod === parts.includes("Mod") && !other && !event.altKey && shift;
+}
+
+const signs: Record<string, string> = {
+  Delete: "Del",
+  Backspace: "⌫",
+  Plus: "+",
+  ArrowUp: "↑",
+};
+
+/** The shortcut as it is printed on keys. */
+export function keysOf(shortcut: string, mac = onMac): string[] {
+  return shortcut.split("+").map((part) => {
+    if (part === "Mod") return mac ? "⌘" : "Ctrl";
+    if (part === "Shift" && mac) return "⇧";
+    return signs[part] ?? (part.length === 1 ? part.toUpperCase() : part);
+  });
+}
+
+/** The deed that a key press asks for. */
+export function deedFor(deeds: readonly Deed[], event: Pressed): Deed | null {
+  return deeds.find((deed) => deed.shortcuts.some((key) => isPressed(key, event))) ?? null;
+}

@@ -1,0 +1,134 @@
+/** The arrows of an action as lines of text, and drawing one by keyboard. */
+import { ActionIcon, Button, Select, Tooltip } from "@mantine/core";
+import { IconPlus, IconX } from "@tabler/icons-react";
+import { useState } from "react";
+import { connect, removeRelation, setEntry, unsetEntry } from "../../graph/edit";
+import { relationId } from "../../graph/layout";
+import { type Action, ENTRY, EXIT, type Precondition, type Relation } from "../../graph/model";
+import { answersOf } from "../../ui/canvas/elements";
+import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
+import { type Bench, endName, useBench } from "../bench";
+import style from "./details.module.css";
+
+function Line({ relation, bench }: { relation: Relation; bench: Bench }) {
+  const id = relationId(relation);
+  const answers = answersOf(relation);
+  return (
+    <li className={style.arrow}>
+      <button type="button" className={style.arrowText} onClick={() => bench.select([id])}>
+        {answers.map((answer) => (
+          <span key={answer.response}>
+            {answer.outcomes.map((outcome) => (
+              <span
+                key={outcome}
+                className={style.outcome}
+                style={{ color: outcomeColor[outcome] }}
+              >
+                <OutcomeSign outcome={outcome} size={11} /> {outcomeWord[outcome]}
+              </span>
+            ))}
+            <span className={style.quiet}> → {answer.response} </span>
+          </span>
+        ))}
+        {answers.length === 0 && <span className={style.quiet}>ignored → </span>}
+        <b>{endName(bench.graph, relation.child)}</b>
+      </button>
+      <Tooltip label="Delete this arrow">
+        <ActionIcon
+          size="sm"
+          aria-label={`Delete the arrow to ${endName(bench.graph, relation.child)}`}
+          onClick={() => removeRelation(bench.doc, id)}
+        >
+          <IconX size={13} />
+        </ActionIcon>
+      </Tooltip>
+    </li>
+  );
+}
+
+function Connect({ action, onDone }: { action: Action; onDone: () => void }) {
+  const bench = useBench();
+  const [outcome, setOutcome] = useState<Precondition>("on_true");
+  const targets = [
+    { value: EXIT, label: "Exit: the graph ends" },
+    ...bench.graph.actions
+      .filter((other) => other.key !== action.key)
+      .map((other) => ({ value: other.key, label: `${other.name} ${other.instanceId}` })),
+  ];
+  return (
+    <div className={style.connect}>
+      <Select
+        aria-label="When it is"
+        data={OUTCOMES.map((value) => ({ value, label: outcomeWord[value] }))}
+        value={outcome}
+        leftSection={
+          <span style={{ color: outcomeColor[outcome], display: "flex" }}>
+            <OutcomeSign outcome={outcome} />
+          </span>
+        }
+        onChange={(next) => setOutcome((next ?? "on_true") as Precondition)}
+        w={124}
+      />
+      <Select
+        aria-label="Run"
+        placeholder="run …"
+        searchable
+        autoFocus
+        data={targets}
+        value={null}
+        onChange={(next) => {
+          if (next !== null) connect(bench.doc, action.key, next, outcome);
+          onDone();
+        }}
+        flex={1}
+      />
+    </div>
+  );
+}
+
+export function Arrows({ action }: { action: Action }) {
+  const bench = useBench();
+  const [connecting, setConnecting] = useState(false);
+  const out = bench.graph.relations
+    .filter((relation) => relation.parent === action.key)
+    .sort((a, b) => a.parentOrder - b.parentOrder);
+  const first = bench.graph.relations.some(
+    (relation) => relation.parent === ENTRY && relation.child === action.key,
+  );
+  return (
+    <section className={style.section}>
+      <div className={style.heading}>
+        <h3>What follows</h3>
+        <Button
+          size="compact-xs"
+          variant="subtle"
+          leftSection={<IconPlus size={12} />}
+          onClick={() => setConnecting(true)}
+        >
+          Connect
+        </Button>
+      </div>
+      <ul className={style.arrows}>
+        {out.map((relation) => (
+          <Line key={relationId(relation)} relation={relation} bench={bench} />
+        ))}
+      </ul>
+      {out.length === 0 && !connecting && (
+        <p className={style.hint}>
+          Nothing follows. Drag from one of the four outcomes under the card, or press Connect.
+        </p>
+      )}
+      {connecting && <Connect action={action} onDone={() => setConnecting(false)} />}
+      <label className={style.check}>
+        <input
+          type="checkbox"
+          checked={first}
+          onChange={() =>
+            first ? unsetEntry(bench.doc, action.key) : setEntry(bench.doc, action.key)
+          }
+        />
+        The graph starts with this action
+      </label>
+    </section>
+  );
+}

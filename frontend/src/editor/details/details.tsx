@@ -1,0 +1,84 @@
+/** The panel on the right: properties of what is selected, JSON, problems. */
+import { Tabs } from "@mantine/core";
+import type { Problems } from "../../api/graphs";
+import { relationId } from "../../graph/layout";
+import { type Bench, type Panel, selectedActions, selectedRelations, useBench } from "../bench";
+import { ActionForm } from "./action-form";
+import style from "./details.module.css";
+import { GraphForm } from "./graph-form";
+import { JsonView } from "./json-view";
+import { ProblemList } from "./problems";
+import { RelationForm } from "./relation-form";
+
+interface Props {
+  id: string;
+  seq: number;
+  panel: Panel;
+  problems: Problems | undefined;
+}
+
+function title(bench: Bench): string {
+  const actions = selectedActions(bench);
+  const relations = selectedRelations(bench);
+  const [action] = actions;
+  if (actions.length + relations.length > 1) return `${actions.length + relations.length} selected`;
+  if (action) return `${action.name} ${action.instanceId}`;
+  return relations.length === 1 ? "Arrow" : "Graph";
+}
+
+function Properties() {
+  const bench = useBench();
+  const actions = selectedActions(bench);
+  const relations = selectedRelations(bench);
+  const [action] = actions;
+  const [relation] = relations;
+  if (actions.length + relations.length > 1) {
+    return (
+      <p className={style.hint}>
+        {actions.length} actions and {relations.length} arrows are selected. Drag moves them
+        together, <b>Del</b> deletes them, <b>Ctrl D</b> duplicates the actions.
+      </p>
+    );
+  }
+  if (action) return <ActionForm key={action.key} action={action} />;
+  if (relation) return <RelationForm key={relationId(relation)} relation={relation} />;
+  return <GraphForm />;
+}
+
+export function Details({ id, seq, panel, problems }: Props) {
+  const bench = useBench();
+  const count = problems?.problems.length ?? 0;
+  const errors = problems?.problems.some((problem) => problem.severity === "error") ?? false;
+  return (
+    <Tabs
+      value={panel}
+      onChange={(next) => bench.setPanel((next ?? "details") as Panel)}
+      className={style.tabs ?? ""}
+      keepMounted={false}
+    >
+      <Tabs.List>
+        <Tabs.Tab value="details" className={style.first ?? ""}>
+          {title(bench)}
+        </Tabs.Tab>
+        <Tabs.Tab value="json">JSON</Tabs.Tab>
+        <Tabs.Tab value="problems">
+          Problems{" "}
+          {count > 0 && (
+            <span className={style.count} data-worst={errors ? "error" : "warning"}>
+              {count}
+            </span>
+          )}
+        </Tabs.Tab>
+      </Tabs.List>
+      <Tabs.Panel value="details" className={style.panel ?? ""}>
+        <Properties />
+      </Tabs.Panel>
+      <Tabs.Panel value="json" className={style.panel ?? ""} data-fill>
+        <JsonView graph={id} seq={seq} />
+      </Tabs.Panel>
+      <Tabs.Panel value="problems" className={style.panel ?? ""}>
+        <ProblemList problems={problems} seq={seq} />
+      </Tabs.Panel>
+    </Tabs>
+  );
+}

@@ -1,0 +1,48 @@
+/** The properties of the graph itself, and how to begin. */
+import { Kbd } from "@mantine/core";
+import { setGraphDescription, setGraphName } from "../../graph/edit";
+import { useBench } from "../bench";
+import { DraftInput } from "../draft-input";
+import style from "./details.module.css";
+
+export function GraphForm() {
+  const { doc, graph } = useBench();
+  const arrows = graph.relations.length;
+  return (
+    <div className={style.form}>
+      <DraftInput
+        label="Graph"
+        value={graph.name}
+        check={(draft) => (draft.trim() === "" ? "A graph has a name." : null)}
+        onCommit={(name) => setGraphName(doc, name.trim())}
+      />
+      <DraftInput
+        label="Description"
+        lines
+        value={graph.description}
+        placeholder="What it is for"
+        onCommit={(text) => setGraphDescription(doc, text)}
+      />
+      <p className={style.hint}>
+        {graph.actions.length === 1 ? "1 action" : `${graph.actions.length} actions`},{" "}
+        {arrows === 1 ? "1 arrow" : `${arrows} arrows`}
+      </p>
+      <section className={style.section}>
+        <div className={style.heading}>
+          <h3>Drawing</h3>
+        </div>
+        <ul className={style.tips}>
+          <li>
+            <Kbd>A</Kbd> or double-click: type the name of an action
+          </li>
+          <li>Drag from an outcome under a card to what shall follow it</li>
+          <li>Drop on empty canvas to add the next action there</li>
+          <li>
+            <Kbd>Del</Kbd> deletes, <Kbd>Ctrl</Kbd> <Kbd>Z</Kbd> takes back what you did
+          </li>
+          <li>Select a card or an arrow to see what it says</li>
+        </ul>
+      </section>
+    </div>
+  );
+}

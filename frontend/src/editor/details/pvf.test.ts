@@ -1,0 +1,48 @@
+import fc from "fast-check";
+import { expect, test } from "vitest";
+import { complaint, fieldOf, shown, typed, withValue } from "./pvf";
+
+test("a number keeps the spelling in which it was typed", () => {
+  const text = withValue('{"pvf_type": "number"}', "5.0");
+  expect(text).toBe('{"pvf_type": "number", "pvf_value": 5.0}');
+  expect(shown(fieldOf(text))).toBe("5.0");
+});
+
+test("what is no number is explained and not written", () => {
+  const field = fieldOf('{"pvf_type": "number", "pvf_value": 30}');
+  expect(complaint(field, "abc")).toBe("“abc” is no number.");
+  expect(complaint(field, "-.5")).toBeNull();
+  expect(typed("number", "-.5")).toEqual({ ok: "-0.5" });
+});
+
+test("only allowed values are taken", () => {
+  const field = fieldOf('{"pvf_type": "string", "pvf_allowed_values": ["red", "blue"]}');
+  expect(complaint(field, "green")).toContain("Allowed");
+  expect(complaint(field, "red")).toBeNull();
+});
+
+test("lists have a line for each item", () => {
+  expect(typed("numbers", "1\n 2.5\n")).toEqual({ ok: "[1, 2.5]" });
+  expect(shown(fieldOf('{"pvf_type":"strings","pvf_value":["a b","c"]}'))).toBe("a b\nc");
+  expect(typed("bools", "true\nmaybe")).toEqual({ wrong: "“maybe” is neither true nor false." });
+});
+
+test("an empty number has no value, an empty string has one", () => {
+  expect(typed("number", " ")).toEqual({ ok: null });
+  expect(typed("string", "")).toEqual({ ok: '""' });
+});
+
+test("a parameter of a foreign type is left alone", () => {
+  const field = fieldOf('{"pvf_type": "map::Pose"}');
+  expect([field.type, field.native, field.value]).toEqual(["map::Pose", null, null]);
+});
+
+test("any text that is typed comes back as it was", () => {
+  fc.assert(
+    fc.property(fc.string(), (draft) => {
+      const result = typed("string", draft);
+      if (!("ok" in result) || result.ok === null) throw new Error("a string is always fine");
+      expect(shown(fieldOf(withValue('{"pvf_type": "string"}', result.ok)))).toBe(draft);
+    }),
+  );
+});

@@ -1,0 +1,93 @@
+/** A field with a draft of its own: what is typed is written when it fits and the typing pauses. */
+import { Textarea, TextInput, type TextInputProps } from "@mantine/core";
+import { useCallback, useEffect, useRef, useState } from "react";
+
+const PAUSE = 700; // ms
+
+interface Props {
+  label: React.ReactNode;
+  value: string;
+  /** What is wrong with a draft; null when it fits. */
+  check?: (draft: string) => string | null;
+  onCommit: (value: string) => void;
+  lines?: boolean;
+  placeholder?: string;
+  description?: string;
+  mono?: boolean;
+  rightSection?: TextInputProps["rightSection"];
+  disabled?: boolean;
+  autoFocus?: boolean;
+  inputMode?: "decimal" | "text";
+}
+
+/** Invalid drafts stay where they are and are explained; the last valid value stays written. */
+export function DraftInput(props: Props) {
+  const { value, check, onCommit, lines = false, mono = false } = props;
+  const [draft, setDraft] = useState<string | null>(null);
+  const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
+  const latest = useRef({ draft, value, check, onCommit });
+  latest.current = { draft, value, check, onCommit };
+
+  const commit = useCallback(() => {
+    clearTimeout(timer.current);
+    const now = latest.current;
+    if (now.draft === null || now.check?.(now.draft)) return;
+    if (now.draft !== now.value) now.onCommit(now.draft);
+  }, []);
+  useEffect(() => commit, [commit]);
+
+  const shown = draft ?? value;
+  const wrong = draft === null ? null : (check?.(draft) ?? null);
+  const kept = value === "" ? "" : ` The last valid value, ${value}, is kept.`;
+  const change = (text: string) => {
+    setDraft(text);
+    clearTimeout(timer.current);
+    timer.current = setTimeout(commit, PAUSE);
+  };
+  const leave = () => {
+    commit();
+    if (latest.current.draft !== null && !latest.current.check?.(latest.current.draft))
+      setDraft(null);
+  };
+  const shared = {
+    label: props.label,
+    value: shown,
+    error: wrong === null ? undefined : wrong + kept,
+    onBlur: leave,
+    ...(props.placeholder === undefined ? {} : { placeholder: props.placeholder }),
+    ...(props.description === undefined ? {} : { description: props.description }),
+    ...(props.disabled === undefined ? {} : { disabled: props.disabled }),
+    ...(props.autoFocus ? { "data-autofocus": true, autoFocus: true } : {}),
+    styles: mono ? { input: { fontFamily: "var(--mono)", fontSize: "12px" } } : {},
+    spellCheck: false,
+  };
+  const onEscape = (event: React.KeyboardEvent) => {
+    if (event.key !== "Escape") return;
+    clearTimeout(timer.current);
+    setDraft(null);
+  };
+  if (lines) {
+    return (
+      <Textarea
+        {...shared}
+        autosize
+        minRows={2}
+        maxRows={10}
+        onChange={(event) => change(event.currentTarget.value)}
+        onKeyDown={onEscape}
+      />
+    );
+  }
+  return (
+    <TextInput
+      {...shared}
+      {...(props.inputMode ? { inputMode: props.inputMode } : {})}
+      rightSection={props.rightSection}
+      onChange={(event) => change(event.currentTarget.value)}
+      onKeyDown={(event) => {
+        onEscape(event);
+        if (event.key === "Enter") leave();
+      }}
+    />
+  );
+}

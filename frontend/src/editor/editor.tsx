@@ -1,0 +1,232 @@
+/** The editor of one graph: list, canvas, details and run strip, arranged for the screen at hand. */
+import { ActionIcon, SegmentedControl } from "@mantine/core";
+import { useMediaQuery } from "@mantine/hooks";
+import { IconLayoutSidebar, IconLayoutSidebarRight } from "@tabler/icons-react";
+import { type ReactNode, useCallback, useMemo, useState } from "react";
+import { type Problems, useProblems } from "../api/graphs";
+import type { Progress } from "../api/progress";
+import type { NewAction } from "../graph/edit";
+import { addAction } from "../graph/edit";
+import type { Graph, Key } from "../graph/model";
+import { useLink } from "../room/use-room";
+import { CARD } from "../ui/canvas/arrange";
+import type { ProblemCount } from "../ui/canvas/elements";
+import type { Crumb } from "../ui/top-bar";
+import { type Bench, BenchContext, type Panel } from "./bench";
+import { useShortcuts } from "./deeds/keys";
+import { Details } from "./details/details";
+import style from "./editor.module.css";
+import { Outline } from "./outline";
+import { People } from "./people";
+import { QuickAdd } from "./quick-add";
+import { SavedWord } from "./saved-word";
+import { Stage } from "./stage";
+import { useEditor } from "./use-bench";
+
+/** What the page around the editor may want to know. */
+export interface Shown {
+  graph: Graph;
+  seq: number;
+  /** Why this moment cannot be started; null when it can. */
+  obstacle: string | null;
+  selected: string | null;
+  pick: (aid: string) => void;
+  compact: boolean;
+}
+
+export interface BarParts {
+  crumbs: readonly Crumb[];
+  status?: ReactNode;
+  actions?: ReactNode;
+}
+
+interface Props {
+  id: string;
+  me: string;
+  known: readonly NewAction[];
+  progress: ReadonlyMap<Key, Progress>;
+  bar: (parts: BarParts) => ReactNode;
+  list: (place: (template: NewAction) => void) => ReactNode;
+  strip: (shown: Shown) => ReactNode;
+  start: (shown: Shown) => ReactNode;
+  status: (shown: Shown) => ReactNode;
+  corner: ReactNode;
+}
+
+type Pane = "canvas" | "outline" | "details" | "run";
+
+const PANES = [
+  { value: "canvas", label: "Canvas" },
+  { value: "outline", label: "Outline" },
+  { value: "details", label: "Details" },
+  { value: "run", label: "Run" },
+];
+
+function countsOf(problems: Problems | undefined): Map<Key, ProblemCount> {
+  const counts = new Map<Key, { error: number; warning: number }>();
+  for (const { severity, where } of problems?.problems ?? []) {
+    const key = where.aid ?? where.relation?.split(">")[1]?.split(";")[0];
+    if (!key) continue;
+    const count = counts.get(key) ?? { error: 0, warning: 0 };
+    count[severity] += 1;
+    counts.set(key, count);
+  }
+  return counts;
+}
+
+function obstacleOf(
+  bench: Bench,
+  link: ReturnType<typeof useLink>,
+  problems: Problems | undefined,
+) {
+  if (link.state !== "live") return "not connected to the editor";
+  if (link.unsaved > 0) return "saving";
+  if (bench.graph.actions.length === 0) return "nothing to run yet";
+  const errors = problems?.problems.filter((problem) => problem.severity === "error").length ?? 0;
+  if (errors > 0 && problems?.seq === link.seq) {
+    return errors === 1 ? "1 problem must be solved" : `${errors} problems must be solved`;
+  }
+  return null;
+}
+
+/** Where an action goes that was tapped in the list: under what is selected, else into the middle. */
+function placeFor(bench: Bench): [number, number] {
+  const [selected] = bench.graph.actions.filter((action) => bench.selection.has(action.key));
+  const at = selected && bench.places().get(selected.key);
+  const taken = [...bench.places().values()];
+  let [x, y] = at ? [at[0], at[1] + 180] : bench.view.middle();
+  if (!at) x -= CARD.width / 2;
+  while (taken.some(([tx, ty]) => Math.abs(tx - x) < 90 && Math.abs(ty - y) < 70)) {
+    x += 60;
+    y += 40;
+  }
+  return [Math.round(x), Math.round(y)];
+}
+
+export function Editor(props: Props) {
+  const { id, known, progress } = props;
+  const wide = useMediaQuery("(min-width: 1101px)", true, { getInitialValueInEffect: false });
+  const phone = useMediaQuery("(max-width: 600px)", false, { getInitialValueInEffect: false });
+  const [left, setLeft] = useState(false);
+  const [right, setRight] = useState(false);
+  const [pane, setPane] = useState<Pane>("canvas");
+  const onPanel = useCallback((_: Panel) => {
+    setRight(true);
+    setPane((now) => (now === "outline" ? "details" : now));
+  }, []);
+  const { bench, panel, adding, sight, closeAdd } = useEditor(id, onPanel);
+  const link = useLink();
+  const problems = useProblems(id, link.seq).data;
+  const counts = useMemo(() => countsOf(problems), [problems]);
+  useShortcuts(bench);
+
+  const place = (template: NewAction) => {
+    bench.select([addAction(bench.doc, { ...template, position: placeFor(bench) })]);
+    setLeft(false);
+  };
+  const [selected = null] = bench.graph.actions
+    .filter((action) => bench.selection.has(action.key))
+    .map((action) => action.key);
+  const shown: Shown = {
+    graph: bench.graph,
+    seq: link.seq,
+    obstacle: obstacleOf(bench, link, problems),
+    selected,
+    pick: (aid) => {
+      bench.select([aid]);
+      bench.view.show([aid]);
+    },
+    compact: !wide,
+  };
+  const stage = (
+    <Stage
+      sight={sight}
+      progress={progress}
+      problems={counts}
+      compact={!wide}
+      corner={phone ? null : props.corner}
+    />
+  );
+  const details = <Details id={id} seq={link.seq} panel={panel} problems={problems} />;
+  const strip = props.strip(shown);
+  return (
+    <BenchContext value={bench}>
+      {props.bar({
+        crumbs: [{ label: "Graphs", to: "/" }, { label: bench.graph.name || "Untitled" }],
+        status: (
+          <>
+            <SavedWord />
+            {!phone && props.status(shown)}
+          </>
+        ),
+        actions: (
+          <>
+            {!wide && !phone && (
+              <>
+                <ActionIcon
+                  size={34}
+                  aria-label="Graphs and actions"
+                  aria-pressed={left}
+                  onClick={() => setLeft((was) => !was)}
+                >
+                  <IconLayoutSidebar size={18} />
+                </ActionIcon>
+                <ActionIcon
+                  size={34}
+                  aria-label="Details"
+                  aria-pressed={right}
+                  onClick={() => setRight((was) => !was)}
+                >
+                  <IconLayoutSidebarRight size={18} />
+                </ActionIcon>
+              </>
+            )}
+            <People me={props.me} />
+            {!phone && props.start(shown)}
+          </>
+        ),
+      })}
+      {phone ? (
+        <main className={style.phone}>
+          <SegmentedControl
+            className={style.segments ?? ""}
+            fullWidth
+            data={PANES}
+            value={pane}
+            onChange={(next) => setPane(next as Pane)}
+          />
+          <div className={style.pane}>
+            {pane === "canvas" && stage}
+            {pane === "outline" && <Outline progress={progress} />}
+            {pane === "details" && <div className={style.sheet}>{details}</div>}
+            {pane === "run" && (
+              <div className={style.sheet}>
+                <div className={style.start}>{props.start(shown)}</div>
+                {props.status(shown)}
+                {strip}
+              </div>
+            )}
+          </div>
+        </main>
+      ) : (
+        <main className={style.editor} data-wide={wide || undefined}>
+          <aside className={style.left} data-open={wide || left || undefined} aria-label="Library">
+            {props.list(place)}
+          </aside>
+          <section className={style.canvas} aria-label="Graph">
+            {stage}
+          </section>
+          <div className={style.strip}>{strip}</div>
+          <aside
+            className={style.right}
+            data-open={wide || right || undefined}
+            aria-label="Details"
+          >
+            {details}
+          </aside>
+        </main>
+      )}
+      {adding && <QuickAdd bench={bench} request={adding} known={known} onClose={closeAdd} />}
+    </BenchContext>
+  );
+}

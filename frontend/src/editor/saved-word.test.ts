@@ -1,0 +1,12 @@
+import { expect, test } from "vitest";
+import { savedWords } from "./saved-word";
+
+test("saved is said only when nothing waits and the room is live", () => {
+  expect(savedWords({ state: "live", unsaved: 0, seq: 4 }).words).toBe("Saved");
+  expect(savedWords({ state: "live", unsaved: 3, seq: 4 }).words).toBe("Saving 3");
+  expect(savedWords({ state: "offline", unsaved: 2, seq: 4 }).words).toBe("Offline with 2 changes");
+  expect(savedWords({ state: "connecting", unsaved: 0, seq: 0 }).words).toBe("Opening");
+  expect(savedWords({ state: "refused", why: "no-such-graph", unsaved: 1, seq: 4 }).words).toBe(
+    "This graph is gone · 1 change not saved",
+  );
+});

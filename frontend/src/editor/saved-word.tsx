@@ -1,0 +1,59 @@
+/** Whether what is on screen is safe, in words. */
+import { IconAlertTriangle, IconCheck, IconCloudOff, IconRefresh } from "@tabler/icons-react";
+import type { Link, Why } from "../room/connect";
+import { useLink, useRoom } from "../room/use-room";
+import style from "./saved-word.module.css";
+
+const whys: Record<Why, string> = {
+  "session-ended": "Signed out",
+  forbidden: "View only",
+  "no-such-graph": "This graph is gone",
+  "other-epoch": "Reload needed: this graph was restored elsewhere",
+  "not-accepted": "The server refused a change",
+  restarting: "The editor restarts",
+  "too-slow": "Connection too slow",
+};
+
+export interface Saved {
+  tone: "good" | "busy" | "off" | "bad";
+  words: string;
+}
+
+function changes(n: number): string {
+  return n === 1 ? "1 change" : `${n} changes`;
+}
+
+export function savedWords(link: Link): Saved {
+  if (link.state === "refused") {
+    const why = link.why ? whys[link.why] : "Refused";
+    const kept = link.unsaved > 0 ? ` · ${changes(link.unsaved)} not saved` : "";
+    return { tone: "bad", words: why + kept };
+  }
+  if (link.state === "live") {
+    return link.unsaved === 0
+      ? { tone: "good", words: "Saved" }
+      : { tone: "busy", words: `Saving ${link.unsaved}` };
+  }
+  if (link.seq === 0) return { tone: "busy", words: "Opening" };
+  if (link.unsaved === 0) return { tone: "off", words: "Offline" };
+  return { tone: "off", words: `Offline with ${changes(link.unsaved)}` };
+}
+
+const signs = { good: IconCheck, busy: IconRefresh, off: IconCloudOff, bad: IconAlertTriangle };
+
+export function SavedWord() {
+  const link = useLink();
+  const { room } = useRoom();
+  const { tone, words } = savedWords(link);
+  const Sign = signs[tone];
+  return (
+    <span className={style.saved} data-tone={tone} role="status" title={`Moment ${link.seq}`}>
+      <Sign size={13} stroke={2.6} aria-hidden /> {words}
+      {link.state === "refused" && (
+        <button type="button" className={style.again} onClick={() => room.reconnect()}>
+          Try again
+        </button>
+      )}
+    </span>
+  );
+}

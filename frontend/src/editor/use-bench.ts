@@ -1,0 +1,102 @@
+/** The state of an open editor, and the bench that deeds work on. */
+import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
+import { useGraph, useRoom, useUndo } from "../room/use-room";
+import type { AddRequest, Bench, Panel, Tool, View } from "./bench";
+
+const NONE: ReadonlySet<string> = new Set();
+
+const BLIND: View = {
+  fit: () => {},
+  zoomIn: () => {},
+  zoomOut: () => {},
+  show: () => {},
+  middle: () => [0, 0],
+  screenOf: () => [0, 0],
+};
+
+/** What only the canvas knows; filled in by it while it is shown. */
+export interface Sight {
+  view: View;
+  places: Bench["places"];
+  sizes: Bench["sizes"];
+}
+
+export interface EditorState {
+  readonly bench: Bench;
+  readonly panel: Panel;
+  readonly adding: AddRequest | null;
+  readonly sight: RefObject<Sight>;
+  closeAdd(): void;
+}
+
+function download(id: string, name: string): void {
+  const link = document.createElement("a");
+  link.href = `/api/graphs/${id}/umrf`;
+  link.download = `${name || "graph"}.umrf.graph.json`;
+  link.click();
+}
+
+export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorState {
+  const { doc, undo, presence } = useRoom();
+  const graph = useGraph();
+  const { canUndo, canRedo } = useUndo();
+  const [selection, setSelection] = useState(NONE);
+  const [tool, setTool] = useState<Tool>("pan");
+  const [panel, setPanelNow] = useState<Panel>("details");
+  const [adding, setAdding] = useState<AddRequest | null>(null);
+  const sight = useRef<Sight>({ view: BLIND, places: () => new Map(), sizes: () => new Map() });
+
+  const select = useCallback(
+    (ids: Iterable<string>) => {
+      const next = new Set(ids);
+      setSelection(next);
+      presence.tell({ selection: [...next] });
+    },
+    [presence],
+  );
+  const setPanel = useCallback(
+    (next: Panel) => {
+      setPanelNow(next);
+      onPanel(next);
+    },
+    [onPanel],
+  );
+  const openAdd = useCallback((request?: AddRequest) => {
+    if (request) {
+      setAdding(request);
+      return;
+    }
+    const at = sight.current.view.middle();
+    setAdding({ screen: sight.current.view.screenOf(at), at, from: null });
+  }, []);
+  const closeAdd = useCallback(() => setAdding(null), []);
+
+  const bench = useMemo<Bench>(
+    () => ({
+      doc,
+      undo,
+      graph,
+      canUndo,
+      canRedo,
+      selection,
+      tool,
+      select,
+      setTool,
+      setPanel,
+      openAdd,
+      view: {
+        fit: () => sight.current.view.fit(),
+        zoomIn: () => sight.current.view.zoomIn(),
+        zoomOut: () => sight.current.view.zoomOut(),
+        show: (keys) => sight.current.view.show(keys),
+        middle: () => sight.current.view.middle(),
+        screenOf: (at) => sight.current.view.screenOf(at),
+      },
+      places: () => sight.current.places(),
+      sizes: () => sight.current.sizes(),
+      download: () => download(id, graph.name),
+    }),
+    [doc, undo, graph, canUndo, canRedo, selection, tool, select, setPanel, openAdd, id],
+  );
+  return { bench, panel, adding, sight, closeAdd };
+}

@@ -1,0 +1,150 @@
+/** The graph as what the canvas draws: places, drags of oneself and of others, sizes, selection. */
+import {
+  type EdgeChange,
+  type NodeChange,
+  type ReactFlowInstance,
+  useReactFlow,
+} from "@xyflow/react";
+import { useCallback, useEffect, useMemo, useRef, useState } from "react";
+import type { Progress } from "../api/progress";
+import { moveActions } from "../graph/edit";
+import type { Graph, Key, Position } from "../graph/model";
+import type { Person } from "../room/presence";
+import { usePeople, useRoom } from "../room/use-room";
+import { type Places, placesOf } from "../ui/canvas/arrange";
+import {
+  type Arrow,
+  type CanvasNode,
+  edgesOf,
+  keep,
+  nodesOf,
+  type ProblemCount,
+} from "../ui/canvas/elements";
+
+export interface Size {
+  readonly width: number;
+  readonly height: number;
+}
+
+interface Given {
+  graph: Graph;
+  selection: ReadonlySet<string>;
+  select: (ids: Iterable<string>) => void;
+  progress: ReadonlyMap<Key, Progress>;
+  problems: ReadonlyMap<Key, ProblemCount>;
+}
+
+/** Where everything stands while people drag it. */
+export function dragged(places: Places, people: readonly Person[], own: Places | null): Places {
+  const drags = people.flatMap((person) => person.presence.drag ?? []);
+  if (drags.length === 0 && own === null) return places;
+  const moved: Places = new Map(places);
+  for (const { ids, dx, dy } of drags) {
+    for (const id of ids) {
+      const at = places.get(id);
+      if (at) moved.set(id, [at[0] + dx, at[1] + dy]);
+    }
+  }
+  for (const [key, at] of own ?? []) moved.set(key, at);
+  return moved;
+}
+
+const round = (n: number) => Math.round(n);
+
+/** The selection after React Flow's changes. Arrows of one relation are selected together. */
+export function selectionAfter(
+  before: ReadonlySet<string>,
+  changes: readonly (NodeChange | EdgeChange)[],
+): ReadonlySet<string> {
+  const next = new Set(before);
+  const chosen: string[] = [];
+  for (const change of changes) {
+    if (change.type !== "select") continue;
+    const id = change.id.split("|")[0] ?? change.id;
+    if (change.selected) chosen.push(id);
+    else next.delete(id);
+  }
+  for (const id of chosen) next.add(id);
+  const same = next.size === before.size && [...next].every((id) => before.has(id));
+  return same ? before : next;
+}
+
+export function useCanvas({ graph, selection, select, progress, problems }: Given) {
+  const { doc, presence } = useRoom();
+  const people = usePeople();
+  const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
+  const [sizes, setSizes] = useState<ReadonlyMap<Key, Size>>(new Map());
+  const [drag, setDrag] = useState<Places | null>(null);
+  const rest = useMemo(() => placesOf(graph, sizes), [graph, sizes]);
+  const places = useMemo(() => dragged(rest, people, drag), [rest, people, drag]);
+  const chosen = useRef(selection);
+  chosen.current = selection;
+
+  const drawn = useRef<{ nodes: CanvasNode[]; edges: Arrow[] }>({ nodes: [], edges: [] });
+  const options = { places, selected: selection, progress, problems, measured: sizes };
+  const nodes = keep(drawn.current.nodes, nodesOf(graph, options));
+  const edges = keep(drawn.current.edges, edgesOf(graph, options));
+  useEffect(() => {
+    drawn.current = { nodes, edges };
+  }, [nodes, edges]);
+
+  const onNodesChange = useCallback(
+    (changes: NodeChange<CanvasNode>[]) => {
+      const sized = changes.filter((change) => change.type === "dimensions");
+      if (sized.length > 0) {
+        setSizes((before) => {
+          const next = new Map(before);
+          for (const { id, dimensions } of sized) if (dimensions) next.set(id, dimensions);
+          return next;
+        });
+      }
+      const moves = changes.filter((change) => change.type === "position" && change.dragging);
+      if (moves.length > 0) {
+        setDrag((before) => {
+          const next: Places = new Map(before);
+          for (const move of moves) {
+            if (move.type !== "position" || !move.position) continue;
+            next.set(move.id, [round(move.position.x), round(move.position.y)]);
+          }
+          return next;
+        });
+      }
+      const after = selectionAfter(chosen.current, changes);
+      if (after !== chosen.current) {
+        chosen.current = after;
+        select(after);
+      }
+    },
+    [select],
+  );
+
+  const onEdgesChange = useCallback(
+    (changes: EdgeChange<Arrow>[]) => {
+      const after = selectionAfter(chosen.current, changes);
+      if (after !== chosen.current) {
+        chosen.current = after;
+        select(after);
+      }
+    },
+    [select],
+  );
+
+  const begun = useRef<Position | null>(null);
+  const onDrag = (_: unknown, node: CanvasNode, all: CanvasNode[]) => {
+    const at: Position = [node.position.x, node.position.y];
+    begun.current ??= rest.get(node.id) ?? at;
+    const [dx, dy] = [round(at[0] - begun.current[0]), round(at[1] - begun.current[1])];
+    presence.tell({ drag: { ids: all.map(({ id }) => id), dx, dy } });
+  };
+  const onDragStop = (_: unknown, __: CanvasNode, all: CanvasNode[]) => {
+    const moved = all.map(
+      (node) => [node.id, [round(node.position.x), round(node.position.y)]] as const,
+    );
+    if (begun.current !== null) moveActions(doc, moved);
+    begun.current = null;
+    setDrag(null);
+    presence.tell({ drag: undefined });
+  };
+
+  return { flow, nodes, edges, places, sizes, onNodesChange, onEdgesChange, onDrag, onDragStop };
+}
