@@ -43,11 +43,15 @@ class _Writer:
         self.children: dict[Key, list[Relation]] = {}
         ordered = sorted(graph.relations, key=name_order)
         for relation in sorted(ordered, key=attrgetter("child_order")):
-            if relation.only != "children":
+            if relation.only != "children" and self._exists(relation.parent):
                 self.parents.setdefault(relation.child, []).append(relation)
         for relation in sorted(ordered, key=attrgetter("parent_order")):
-            if relation.only != "parents":
+            if relation.only != "parents" and self._exists(relation.child):
                 self.children.setdefault(relation.parent, []).append(relation)
+
+    def _exists(self, key: Key) -> bool:
+        """Whether a relation's other end can be named in a file."""
+        return key in self.actions
 
     def graph(self) -> dict[str, Json]:
         graph = self.source
@@ -56,8 +60,8 @@ class _Writer:
             fields["graph_description"] = graph.description
         entries = self.children.get(ENTRY, [])
         exits = self.parents.get(EXIT, [])
-        fields["graph_entry"] = [self._child(r) for r in entries if r.child in self.actions]
-        fields["graph_exit"] = [self._parent(r) for r in exits if r.parent in self.actions]
+        fields["graph_entry"] = [self._child(r) for r in entries]
+        fields["graph_exit"] = [self._parent(r) for r in exits]
         fields["actions"] = [self._action(a) for a in graph.actions if not a.missing]
         ours = self._graph_attributes()
         return _with_extra(fields, graph.extra, {"action_assistant": ours} if ours else {})
@@ -89,9 +93,9 @@ class _Writer:
         if action.outputs:
             fields["output_parameters"] = nest(action.outputs)
         if parents := self.parents.get(action.key):
-            fields["parents"] = [self._parent(r) for r in parents if r.parent in self.actions]
+            fields["parents"] = [self._parent(r) for r in parents]
         if children := self.children.get(action.key):
-            fields["children"] = [self._child(r) for r in children if r.child in self.actions]
+            fields["children"] = [self._child(r) for r in children]
         return _with_extra(fields, action.extra, self._action_attributes(action))
 
     def _action_attributes(self, action: Action) -> dict[str, Json]:
