@@ -1,8 +1,17 @@
 """Starts at most once; stops until it is proven; takes up what a crash left. In virtual time."""
 
+import itertools
+
 import anyio
 import msgspec
 import pytest
+
+from action_assistant.errors import BadInput, Conflict, NotFound, Unavailable
+from action_assistant.runner.control import Control
+from action_assistant.runner.events import Proof, Published, Requested, StopSent
+from action_assistant.runner.links.port import Order
+from action_assistant.runner.runs import ENDED
+from action_assistant.umrf.model import Conditions
 from runner.world import (
     ANN,
     BEN,
@@ -14,13 +23,6 @@ from runner.world import (
     until,
     virtual,
 )
-
-from action_assistant.errors import BadInput, Conflict, NotFound, Unavailable
-from action_assistant.runner.control import Control
-from action_assistant.runner.events import Proof, Published, Requested, StopSent
-from action_assistant.runner.links.port import Order
-from action_assistant.runner.runs import ENDED
-from action_assistant.umrf.model import Conditions
 
 
 async def ended(control: Control, run: str) -> str:
@@ -254,7 +256,7 @@ async def test_stop_is_repeated_until_one_arrives() -> None:
         assert await ended(control, run.id) == "stopped"
     assert robot.delivered >= 1
     times = [when for when, _ in robot.stops]
-    assert all(b - a >= 0.05 for a, b in zip(times, times[1:], strict=False))
+    assert all(b - a >= 0.05 for a, b in itertools.pairwise(times))
 
 
 @virtual

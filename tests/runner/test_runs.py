@@ -198,11 +198,30 @@ def test_events_of_a_later_version_are_passed_over() -> None:
 
 NAMES = st.sampled_from(["Go_0", "Grip_0", "Other_1"])
 STATES = st.sampled_from(
-    "UNINITIALIZED INITIALIZED RUNNING FINISHED STOPPING ERROR PAUSE_REQUESTED PAUSED".split()
+    [
+        "UNINITIALIZED",
+        "INITIALIZED",
+        "RUNNING",
+        "FINISHED",
+        "STOPPING",
+        "ERROR",
+        "PAUSE_REQUESTED",
+        "PAUSED",
+    ]
 )
 GRAPHS = st.sampled_from(["patrol", "patrol__Sub__0"])
 GRAPH_STATES = st.sampled_from(
-    "UNINITIALIZED RUNNING PAUSED STOPPING STOPPED FINISHED HALTED ERROR CLEARING".split()
+    [
+        "UNINITIALIZED",
+        "RUNNING",
+        "PAUSED",
+        "STOPPING",
+        "STOPPED",
+        "FINISHED",
+        "HALTED",
+        "ERROR",
+        "CLEARING",
+    ]
 )
 TIMES = st.integers(0, 10_000)
 SEEN = st.one_of(

@@ -3,6 +3,7 @@
 import asyncio
 import functools
 import inspect
+import itertools
 import random
 import selectors
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
@@ -10,6 +11,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import anyio
+import anyio.lowlevel
 import msgspec
 from sqlalchemy import Row, Select, StaticPool, create_engine
 
@@ -21,7 +23,7 @@ from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.events import Author, RunEvent, decode
-from action_assistant.runner.links.port import Answer, Link, NoAnswer, Order, Report
+from action_assistant.runner.links.port import Answer, Link, Order, Report
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run, replay
@@ -150,7 +152,7 @@ class MemoryLedger:
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
         """As the journal's."""
-        await anyio.sleep(0)
+        await anyio.lowlevel.checkpoint()
         with self._engine.connect() as connection:
             return list(connection.execute(statement).all())
 
@@ -249,7 +251,7 @@ class World:
         self.shown.append((anyio.current_time(), opened.run))
 
 
-def order(graph: Graph, **changes: Any) -> StartRequest:
+def order(graph: Graph, /, **changes: Any) -> StartRequest:
     """A start of a graph."""
     text = codec.write(graph, codec.Stamp("g1", "v1", None))
     fields: dict[str, Any] = {
@@ -277,13 +279,22 @@ def sequence(name: str = "patrol", actions: int = 3) -> Graph:
         Relation(
             parent=parent, child=child, conditions=ENTRY_CONDITIONS if parent == ENTRY else GO_ON
         )
-        for parent, child in zip(keys, keys[1:], strict=False)
+        for parent, child in itertools.pairwise(keys)
     )
     return Graph(name=name, actions=nodes, relations=relations)
+
+
+def carousel(name: str = "carousel") -> Graph:
+    """`Work_0` and `Work_1` take turns, for ever."""
+    line = sequence(name, 2)
+    first, second = (action.key for action in line.actions)
+    back = Relation(parent=second, child=first, conditions=GO_ON, required=False)
+    kept = tuple(each for each in line.relations if each.child != EXIT)
+    return msgspec.structs.replace(line, relations=(*kept, back))
 
 
 async def until(true: Callable[[], bool], patience: float = 60.0) -> None:
     """Wait for something that must happen."""
     with anyio.fail_after(patience):
-        while not true():
+        while not true():  # noqa: ASYNC110 - what it waits for has many sources
             await anyio.sleep(0.01)

@@ -29,8 +29,8 @@ _ALIVE_S: Final = 15.0  # between two signs of life of an event stream
 _Asking = Request[Any, Any, Any]
 
 
-class House(msgspec.Struct):
-    """What the routes work on; there from the moment that the process is up."""
+class House:
+    """What the routes work on; filled when the process is up, before the first request."""
 
     control: Control
     hub: Hub

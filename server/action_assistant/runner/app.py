@@ -26,25 +26,27 @@ def wall_clock() -> int:
 
 
 @asynccontextmanager
-async def open_house(settings: RunnerSettings) -> AsyncIterator[House]:
+async def open_house(settings: RunnerSettings, house: House | None = None) -> AsyncIterator[House]:
     """Everything the routes need, working. Raises CannotStart."""
+    house = house or House()
     url = f"sqlite:///{settings.data / 'runner.db'}"
     journal = await Journal.open(url, branch="runner", fold=archive.fold)
     try:
         async with Control.opened(journal, Robots(), wall=wall_clock) as control:
-            yield House(control, Hub(control, wall_clock), journal)
+            house.control, house.hub = control, Hub(control, wall_clock)
+            house.journal = journal
+            yield house
     finally:
         await journal.close()
 
 
 def create_app(settings: RunnerSettings) -> ASGIApp:
     """The runner as an ASGI application."""
-    house = House.__new__(House)
+    house = House()
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_house(settings) as opened:
-            house.control, house.hub, house.journal = opened.control, opened.hub, opened.journal
+        async with open_house(settings, house):
             yield
 
     async def ready() -> Readiness:

@@ -278,8 +278,10 @@ class Control:
     async def pause(self, run: str, author: Author) -> Run:
         """Pause a run. Raises NotFound, Conflict."""
         opened = await self._movable(run)
-        if opened.run.state != "running":
-            raise Conflict(f"Only a running run can be paused; this one is {opened.run.state}.")
+        if opened.run.state != "running" or opened.run.desired != "running":
+            raise Conflict(
+                f"Only a running run can be paused; this one is {_condition(opened.run)}."
+            )
         if not opened.pauses:
             raise Conflict(f"Pausing is not safe on {opened.run.engine}; use Stop.")
         try:
@@ -292,7 +294,7 @@ class Control:
         """Let a paused run go on. Raises NotFound, Conflict."""
         opened = await self._movable(run)
         if opened.run.desired != "paused":
-            raise Conflict(f"Only a paused run can go on; this one is {opened.run.state}.")
+            raise Conflict(f"Only a paused run can go on; this one is {_condition(opened.run)}.")
         try:
             await opened.resume(author)
         except NotSent as why:
@@ -385,3 +387,7 @@ class Control:
         if run.simulated:
             opened.tell(Ended(self._wall(), "lost", None, _LOST))
         self._tasks.start_soon(self._drive, opened, None)
+
+
+def _condition(run: Run) -> str:
+    return "being paused" if (run.state, run.desired) == ("running", "paused") else run.state

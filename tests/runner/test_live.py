@@ -1,0 +1,220 @@
+"""The live socket: everybody sees the same, and a Stop goes before everything."""
+
+import json
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from socket import SHUT_RDWR
+from typing import Any
+
+import anyio
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection
+
+from action_assistant.runner.live import Hub, Outbox
+from runner.process import RunnerProcess, over, started
+from runner.world import ANN, World, carousel, order, sequence, virtual, wall
+
+ENDLESS = {"*": [{"never": True}]}
+BUSY = {"*": [{"after_s": 0.0}]}
+
+
+def messages(socket: ClientConnection) -> Iterator[dict[str, Any]]:
+    for text in socket:
+        yield json.loads(text)
+
+
+def test_a_page_is_greeted_with_what_goes_on(process: RunnerProcess) -> None:
+    with process.client() as client:
+        run = started(client, order(sequence(), script=ENDLESS))
+        with process.live() as socket:
+            hello = next(messages(socket))
+        assert hello["type"] == "hello"
+        assert hello["engines"][0]["name"] == "simulator"
+        assert run["id"] in [each["id"] for each in hello["runs"]]
+
+
+def test_a_page_sees_each_action_light_up_and_the_end(process: RunnerProcess) -> None:
+    with process.client() as client, process.live() as socket:
+        run = started(client, order(sequence(actions=2), script={"*": [{"after_s": 0.3}]}))
+        seen = []
+        for message in messages(socket):
+            if message["type"] == "run" and message["run"]["id"] == run["id"]:
+                seen.append([each["state"] for each in message["run"]["actions"].values()])
+                if message["run"]["ended_at"] is not None:
+                    break
+        assert ["RUNNING", "UNINITIALIZED"] in seen
+        assert ["FINISHED", "RUNNING"] in seen
+        assert seen[-1] == ["FINISHED", "FINISHED"]
+        assert message["run"] == {
+            key: value
+            for key, value in client.get(f"/api/runs/{run['id']}").json().items()
+            if key not in {"umrf", "override"}
+        }
+
+
+def test_the_link_beats(process: RunnerProcess) -> None:
+    with process.live() as socket:
+        assert any(each["type"] == "beat" for each in (next(messages(socket)) for _ in range(50)))
+
+
+def test_stop_by_the_socket_is_answered_and_done(process: RunnerProcess) -> None:
+    with process.client() as client, process.live() as socket:
+        run = started(client, order(sequence(), script=ENDLESS))
+        socket.send(json.dumps({"type": "stop", "run": run["id"], "stop_id": "s1"}))
+        answer = next(each for each in messages(socket) if each["type"] == "stopping")
+        assert answer == {"type": "stopping", "stop_id": "s1", "runs": [run["id"]]}
+        assert over(client, run["id"])["state"] == "stopped"
+
+
+def test_stop_all_by_the_socket(process: RunnerProcess) -> None:
+    with process.client() as client, process.live() as socket:
+        run = started(client, order(sequence(), script=ENDLESS))
+        socket.send(json.dumps({"type": "stop", "run": "all", "stop_id": "s2"}))
+        answer = next(each for each in messages(socket) if each["type"] == "stopping")
+        assert run["id"] in answer["runs"]
+
+
+def test_nonsense_is_answered_and_does_no_harm(process: RunnerProcess) -> None:
+    with process.live() as socket:
+        for text in ["", "{", "[]", '{"type":"start"}', '{"type":"stop"}', "x" * 20_000]:
+            socket.send(text)
+            assert next(each for each in messages(socket) if each["type"] == "refused")
+        socket.send(json.dumps({"type": "stop", "run": "nothing", "stop_id": "s3"}))
+        answer = next(each for each in messages(socket) if each["type"] == "refused")
+        assert answer == {
+            "type": "refused",
+            "stop_id": "s3",
+            "detail": "There is no such run.",
+        }
+
+
+@contextmanager
+def ten_tabs(process: RunnerProcess) -> Iterator[None]:
+    """Five that read and five that do not."""
+
+    def read(socket: ClientConnection) -> None:
+        try:
+            for _ in socket:
+                pass
+        except ConnectionClosed:
+            pass
+
+    with ExitStack() as tabs:
+        sockets = [tabs.enter_context(process.live()) for _ in range(10)]
+        threads = [threading.Thread(target=read, args=(each,)) for each in sockets[:5]]
+        for thread in threads:
+            thread.start()
+        yield
+        for socket in sockets:
+            socket.socket.shutdown(SHUT_RDWR)
+        for thread in threads:
+            thread.join()
+
+
+def test_ten_tabs_and_busy_runs_do_not_delay_a_stop(own_process: RunnerProcess) -> None:
+    """Measured in beats of the runner itself: a machine that is slow is slow for both."""
+    process = own_process
+    with process.client() as client:
+        for i in range(6):
+            started(client, order(carousel(f"busy{i}"), script=BUSY))
+        started(client, order(sequence("long", 300), script={"*": [{"after_s": 0.01}]}))
+        victim = started(client, order(sequence("victim"), script=ENDLESS))
+        with ten_tabs(process), process.live() as socket:
+            time.sleep(1)
+            socket.send(json.dumps({"type": "stop", "run": victim["id"], "stop_id": "now"}))
+            kinds = []
+            for message in messages(socket):
+                run = message.get("run", {})
+                kinds.append(message["type"])
+                if run.get("id") == victim["id"] and run["state"] == "stopped":
+                    break
+        assert "stopping" in kinds
+        assert kinds[: kinds.index("stopping")].count("beat") <= 1
+        assert kinds.count("beat") <= 3
+        client.post("/api/stop")
+
+
+@virtual
+async def test_a_page_that_does_not_read_is_owed_one_state_of_each_run() -> None:
+    world = World()
+    async with world.runner() as control:
+        hub = Hub(control, wall)
+        box = Outbox(hub, lambda: True)
+        hub.boxes.add(box)
+        run = (await control.start(order(carousel(), script=BUSY), ANN)).run
+        await anyio.sleep(30)
+        assert control.open[run.id].revision > 1_000
+        sent: list[dict[str, Any]] = []
+
+        async def send(text: str) -> None:
+            sent.append(json.loads(text))
+
+        with anyio.move_on_after(0.04):
+            await box.deliver(send)
+        states = [each for each in sent if each["type"] == "run"]
+        assert len(states) == 1
+        assert states[0]["run"]["actions"]["Work_0"]["older"] > 100
+
+
+@virtual
+async def test_states_of_one_run_come_at_most_twenty_times_a_second() -> None:
+    world = World()
+    async with world.runner() as control:
+        hub = Hub(control, wall)
+        box = Outbox(hub, lambda: True)
+        hub.boxes.add(box)
+        await control.start(order(carousel(), script=BUSY), ANN)
+        sent: list[str] = []
+
+        async def send(text: str) -> None:
+            sent.append(text)
+
+        with anyio.move_on_after(10):
+            await box.deliver(send)
+        states = [each for each in sent if each.startswith('{"type":"run"')]
+        assert 150 <= len(states) <= 201
+
+
+@virtual
+async def test_the_answer_to_a_stop_goes_before_everything_that_waits() -> None:
+    world = World()
+    async with world.runner() as control:
+        hub = Hub(control, wall)
+        box = Outbox(hub, lambda: True)
+        hub.boxes.add(box)
+        for i in range(20):
+            await control.start(order(carousel(f"busy{i}"), script=BUSY), ANN)
+        await anyio.sleep(5)
+        box.post(await hub.follow('{"type":"stop","run":"all","stop_id":"s"}', ANN))
+        first: list[str] = []
+
+        async def send(text: str) -> None:
+            first.append(text)
+            await anyio.sleep(0.1)
+
+        with anyio.move_on_after(0.05):
+            await box.deliver(send)
+        assert json.loads(first[0])["type"] == "stopping"
+
+
+@virtual
+async def test_an_expired_session_is_shown_nothing_more_but_its_stop_is_followed() -> None:
+    world = World()
+    async with world.runner() as control:
+        hub = Hub(control, wall)
+        box = Outbox(hub, lambda: False)
+        hub.boxes.add(box)
+        run = (await control.start(order(sequence(), script=ENDLESS), ANN)).run
+        box.post(await hub.follow(f'{{"type":"stop","run":"{run.id}","stop_id":"s"}}', ANN))
+        sent: list[str] = []
+
+        async def send(text: str) -> None:
+            sent.append(json.loads(text)["type"])
+
+        with anyio.move_on_after(3.5):
+            await box.deliver(send)
+        assert sent[0] == "stopping"
+        assert set(sent) == {"stopping", "beat"}
+        assert run.id not in control.open

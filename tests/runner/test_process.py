@@ -1,0 +1,67 @@
+"""The runner as a process: what it never loads, and what a kill leaves behind."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from runner.process import RunnerProcess, over, started
+from runner.world import order, sequence
+
+FORBIDDEN = ("pycrdt", "action_assistant.editor")
+
+
+def test_the_runner_loads_neither_the_editor_nor_a_crdt() -> None:
+    code = "import sys, action_assistant.runner.app; print('\\n'.join(sys.modules))"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert [name for name in loaded if name.startswith(FORBIDDEN)] == []
+    assert "action_assistant.runner.control" in loaded
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="needs /proc")
+def test_a_runner_that_has_worked_has_no_crdt_in_its_memory(own_process: RunnerProcess) -> None:
+    with own_process.client() as client:
+        run = started(client, order(sequence(), script={"*": [{"after_s": 0.01}]}))
+        assert over(client, run["id"])["state"] == "finished"
+    assert "pycrdt" not in Path(f"/proc/{own_process.pid}/maps").read_text()
+
+
+def test_its_arguments_never_say_editor(own_process: RunnerProcess) -> None:
+    command = Path(f"/proc/{own_process.pid}/cmdline")
+    if not command.exists():
+        pytest.skip("needs /proc")
+    arguments = command.read_bytes().replace(os.fsencode(own_process.data), b"")
+    assert b"editor" not in arguments
+
+
+def test_after_kill_9_a_run_is_told_truthfully(own_process: RunnerProcess) -> None:
+    with own_process.client() as client:
+        done = started(client, order(sequence(actions=1), script={"*": [{"after_s": 0.02}]}))
+        before = over(client, done["id"])
+        run = started(client, order(sequence(actions=3), script={"Work_1": [{"never": True}]}))
+        while client.get(f"/api/runs/{run['id']}").json()["actions"]["Work_1"]["visits"] == []:
+            time.sleep(0.05)
+        time.sleep(0.2)
+    own_process.kill()
+    own_process.start()
+    with own_process.client() as client:
+        found = over(client, run["id"])
+        assert found["state"] == "lost"
+        assert found["actions"]["Work_0"]["visits"][0]["result"] == "true"
+        assert found["actions"]["Work_1"]["visits"][0]["until"] is None
+        assert client.get(f"/api/runs/{done['id']}").json() == before
+        assert [each["state"] for each in client.get("/api/runs").json()] == ["lost", "finished"]
+        assert started(client, order(sequence()))["number"] == 3
+
+
+def test_nobody_without_credentials_gets_in(process: RunnerProcess) -> None:
+    with process.client() as client:
+        del client.headers["authorization"]
+        assert client.get("/api/runs").status_code == 401
+        assert client.post("/api/stop").status_code == 401
+        assert client.get("/healthz").status_code == 200
