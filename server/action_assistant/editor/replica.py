@@ -10,11 +10,11 @@ import anyio.lowlevel
 import msgspec
 from pycrdt import Doc, get_update, merge_updates
 
+from action_assistant.editor.happenings import UPDATED
 from action_assistant.editor.wire import NOTHING_NEW, Malformed, Reader
 from action_assistant.journal.events import Event
 from action_assistant.journal.journal import Journal
 
-UPDATED: Final = "graph.updated.v1"
 _SLICE: Final = 500  # events that are applied before others get a turn
 
 

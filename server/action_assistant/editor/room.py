@@ -13,9 +13,10 @@ import msgspec
 from pycrdt import merge_updates
 
 from action_assistant.editor import wire
+from action_assistant.editor.happenings import UPDATED
 from action_assistant.editor.member import Member
 from action_assistant.editor.presence import Attendance
-from action_assistant.editor.replica import UPDATED, Brought, Loaded, Panicked, Replica, load
+from action_assistant.editor.replica import Brought, Loaded, Panicked, Replica, load
 from action_assistant.editor.wire import Entry, Malformed
 from action_assistant.errors import BadInput, Refused, Unavailable
 from action_assistant.journal.events import Draft

@@ -141,6 +141,14 @@ class Journal:
 
         return await self._write(again)
 
+    async def health(self) -> str | None:
+        """Why nothing can be stored at the moment; None when it can. Writes nothing."""
+        try:
+            await self._write(lambda _: None)
+        except Unavailable as error:
+            return error.detail
+        return None
+
     async def close(self) -> None:
         """Finish what was appended, then let go of the file. Followers end."""
         if self._closed:

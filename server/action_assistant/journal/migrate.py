@@ -1,5 +1,6 @@
 """Bringing a database to the revision that this program knows."""
 
+import logging
 import sqlite3
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
@@ -18,6 +19,9 @@ from action_assistant.journal import tables
 Branch: TypeAlias = Literal["editor", "runner"]
 
 BRANCHES: Final[dict[str, MetaData]] = {"editor": tables.EDITOR, "runner": tables.RUNNER}
+log: Final = logging.getLogger(__name__)
+logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in one line
+
 _WAIT: Final = 10.0  # seconds until a database that somebody else writes to is called busy
 
 
@@ -99,4 +103,6 @@ def _upgrade(connection: Connection, branch: Branch, revision: str, path: Path) 
         raise CannotStart(f"The database {path} is not the {branch}'s.")
     command.upgrade(config, f"{branch}@{revision}")
     (now,) = MigrationContext.configure(connection).get_current_heads()
+    if {now} != current:
+        log.info("%s: the tables are those of %s now", path, now)
     return now

@@ -1,0 +1,191 @@
+"""Routes of graphs: the catalogue, what a graph is or was, what is wrong with it, its past."""
+
+from typing import Annotated, Any
+
+import msgspec
+from litestar import Request, Response, delete, get, patch, post
+from litestar.params import Parameter
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.editor import edits
+from action_assistant.editor import happenings as h
+from action_assistant.editor.catalogue import GraphView, Reading
+from action_assistant.editor.diff import Difference, difference
+from action_assistant.editor.history import Entry
+from action_assistant.editor.house import Door
+from action_assistant.umrf import codec
+from action_assistant.umrf.model import Problem
+from action_assistant.web.access import person_of
+
+Asking = Request[Any, Any, Any]
+Seq = Annotated[int, Parameter(ge=1)]
+
+
+class MadeGraph(GraphView, frozen=True, omit_defaults=True):
+    """A new graph; `reading` is there when it was read from a file."""
+
+    reading: Reading | None = None
+
+
+class Describing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What to call a graph from now on; what is left out stays."""
+
+    name: str | None = None
+    description: str | None = None
+
+
+class Problems(msgspec.Struct, frozen=True):
+    """What is wrong with a graph after its change `seq`."""
+
+    seq: int
+    problems: tuple[Problem, ...]
+
+
+class Restoring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The change after which the graph was as it shall be again."""
+
+    seq: int
+
+
+def routes(door: Door) -> list[ControllerRouterHandler]:
+    """Everything under `/api/graphs` except versions and rooms."""
+    return [*_catalogue(door), *_contents(door), *_past(door)]
+
+
+def _catalogue(door: Door) -> list[ControllerRouterHandler]:
+    @get("/api/graphs", summary="All graphs, the last changed first", operation_id="listGraphs")
+    async def list_graphs(deleted: bool = False) -> list[GraphView]:
+        return await door.house.catalogue.all(deleted=deleted)
+
+    @post(
+        "/api/graphs",
+        summary="Make a graph of a UMRF file of any dialect, or an empty one of {name}",
+        operation_id="createGraph",
+    )
+    async def create_graph(request: Asking) -> Response[MadeGraph]:
+        house, person = door.house, person_of(request)
+        await house.people.seen(person)
+        made, reading = await house.catalogue.create(await request.body(), person.id)
+        body = MadeGraph(**msgspec.structs.asdict(made), reading=reading)
+        return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
+
+    @get("/api/graphs/{graph_id:str}", summary="One graph", operation_id="getGraph")
+    async def get_graph(graph_id: str) -> GraphView:
+        return await door.house.catalogue.get(graph_id)
+
+    @patch(
+        "/api/graphs/{graph_id:str}",
+        summary="Change the name or description of a graph",
+        operation_id="describeGraph",
+    )
+    async def describe_graph(graph_id: str, data: Describing, request: Asking) -> GraphView:
+        house, person = door.house, person_of(request)
+        await house.people.seen(person)
+        return await house.catalogue.describe(
+            graph_id, person.id, name=data.name, description=data.description
+        )
+
+    @delete(
+        "/api/graphs/{graph_id:str}",
+        summary="Delete a graph; it can be recovered",
+        operation_id="deleteGraph",
+    )
+    async def delete_graph(graph_id: str, request: Asking) -> None:
+        house, person = door.house, person_of(request)
+        await house.people.seen(person)
+        await house.catalogue.delete(graph_id, person.id)
+
+    @post(
+        "/api/graphs/{graph_id:str}/recover",
+        status_code=200,
+        summary="Bring a deleted graph back",
+        operation_id="recoverGraph",
+    )
+    async def recover_graph(graph_id: str, request: Asking) -> GraphView:
+        house, person = door.house, person_of(request)
+        await house.people.seen(person)
+        return await house.catalogue.recover(graph_id, person.id)
+
+    return [list_graphs, create_graph, get_graph, describe_graph, delete_graph, recover_graph]
+
+
+def _contents(door: Door) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/graphs/{graph_id:str}/umrf",
+        summary="A graph as UMRF, now or after its change `at`",
+        operation_id="getUmrf",
+    )
+    async def get_umrf(graph_id: str, at: Seq | None = None) -> Response[bytes]:
+        house = door.house
+        await house.catalogue.require(graph_id)
+        moment = await house.sights.moment(graph_id, at)
+        text = codec.write(moment.graph)
+        return Response(
+            text.encode(), media_type="application/json", headers={"x-seq": str(moment.seq)}
+        )
+
+    @get(
+        "/api/graphs/{graph_id:str}/problems",
+        summary="What is wrong with a graph, now or after its change `seq`",
+        operation_id="getProblems",
+    )
+    async def get_problems(graph_id: str, seq: Seq | None = None) -> Problems:
+        house = door.house
+        await house.catalogue.require(graph_id)
+        moment = await house.sights.moment(graph_id, seq)
+        return Problems(moment.seq, tuple(house.sights.problems(graph_id, moment)))
+
+    return [get_umrf, get_problems]
+
+
+def _past(door: Door) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/graphs/{graph_id:str}/history",
+        summary="What was done to a graph, newest first",
+        operation_id="getHistory",
+    )
+    async def get_history(
+        graph_id: str,
+        limit: Annotated[int, Parameter(ge=1, le=1000)] = 100,
+        before: Seq | None = None,
+    ) -> list[Entry]:
+        house = door.house
+        await house.catalogue.require(graph_id)
+        return await house.history.of(graph_id, limit=limit, before=before)
+
+    @get(
+        "/api/graphs/{graph_id:str}/diff",
+        summary="What differs between two changes of a graph; `to` is now when left out",
+        operation_id="getDifference",
+    )
+    async def get_difference(
+        graph_id: str,
+        before: Annotated[int, Parameter(query="from", ge=1)],
+        after: Annotated[int | None, Parameter(query="to", ge=1)] = None,
+    ) -> Difference:
+        house = door.house
+        await house.catalogue.require(graph_id)
+        then = await house.sights.at(graph_id, before)
+        later = await house.sights.moment(graph_id, after)
+        return difference((then.seq, then.graph), (later.seq, later.graph))
+
+    @post(
+        "/api/graphs/{graph_id:str}/restore",
+        status_code=200,
+        summary="Make a graph what it was after an earlier change, as an edit that can be undone",
+        operation_id="restoreGraph",
+    )
+    async def restore_graph(graph_id: str, data: Restoring, request: Asking) -> GraphView:
+        house, person = door.house, person_of(request)
+        await house.catalogue.require(graph_id)
+        await house.people.seen(person)
+        then = await house.sights.at(graph_id, data.seq)
+        async with house.rooms.enter(h.graph_stream(graph_id)) as room:
+            before = room.seq
+            seq = await edits.restore(room, person.id, then.maps)
+        if seq > before:
+            deed = h.draft(h.RESTORED, person.id, h.Restored(data.seq, seq))
+            await house.journal.append(h.about_stream(graph_id), [deed])
+        return await house.catalogue.get(graph_id)
+
+    return [get_history, get_difference, restore_graph]

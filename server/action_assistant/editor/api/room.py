@@ -1,0 +1,116 @@
+"""The socket of a room (DESIGN 3)."""
+
+import logging
+from typing import Any, Final
+
+import anyio
+from litestar import WebSocket, websocket
+from litestar.exceptions import WebSocketDisconnect
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.editor import happenings as h
+from action_assistant.editor import wire
+from action_assistant.editor.house import Door
+from action_assistant.editor.member import Member
+from action_assistant.editor.room import Room
+from action_assistant.errors import Refused
+from action_assistant.web.access import person_of
+from action_assistant.web.problems import PROBLEM_JSON, problem_of
+
+log: Final = logging.getLogger(__name__)
+
+Socket = WebSocket[Any, Any, Any]
+
+_NORMAL: Final = 1000
+_GOODBYE: Final = 1.0  # seconds that a close frame gets
+
+
+def routes(door: Door) -> list[ControllerRouterHandler]:
+    """The route; `y-websocket` appends the name of its room, which is always `room`."""
+
+    @websocket("/api/graphs/{graph_id:str}/room")
+    async def room(socket: Socket, graph_id: str) -> None:
+        house, person = door.house, person_of(socket)
+        try:
+            await house.catalogue.require(graph_id)
+            await house.people.seen(person)
+            async with house.rooms.enter(h.graph_stream(graph_id)) as found:
+                await socket.accept()
+                await _converse(socket, found, Member(person, acks=_wants_acks(socket)))
+        except Refused as refused:
+            await _refuse(socket, refused)
+
+    return [room]
+
+
+def _wants_acks(socket: Socket) -> bool:
+    return bool(socket.query_params.get("acks") == "1")
+
+
+async def _converse(socket: Socket, room: Room, member: Member) -> None:
+    """Until one side ends it."""
+    room.join(member)
+    try:
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(_listen, socket, room, member)
+            tasks.start_soon(_speak, socket, member)
+            code = await member.ended()
+            tasks.cancel_scope.cancel()
+    finally:
+        room.leave(member)
+    if code != _NORMAL:
+        with anyio.move_on_after(_GOODBYE):
+            await socket.close(code, wire.REASONS.get(code))
+
+
+async def _listen(socket: Socket, room: Room, member: Member) -> None:
+    """What the client says. Ends the member when the client goes, or says what cannot be read."""
+    while True:
+        event: Any = await socket.receive()
+        if event["type"] == "websocket.disconnect":
+            member.close(_NORMAL)
+            return
+        data = event.get("bytes")
+        if data is None:
+            member.refuse(wire.UNREADABLE)
+            return
+        try:
+            message = wire.parse(data)
+        except wire.Malformed as error:
+            log.info("%s sent %s", member.person.id, error)
+            member.refuse(wire.MALFORMED)
+            return
+        if message is not None:
+            room.hear(member, message)
+            await member.until_heard()
+
+
+async def _speak(socket: Socket, member: Member) -> None:
+    """What the client is told."""
+    try:
+        while not member.closed:
+            for frame in await member.take():
+                await socket.send_bytes(frame)
+    except (WebSocketDisconnect, OSError, RuntimeError):
+        member.close(_NORMAL)
+
+
+async def _refuse(socket: Socket, refused: Refused) -> None:
+    """Answer the request for an upgrade with a plain refusal."""
+    if socket.connection_state != "init":
+        await socket.close(wire.RESTARTING, wire.REASONS[wire.RESTARTING])
+        return
+    await socket.receive()  # websocket.connect
+    body = problem_of(refused)
+    fields = [
+        (b"content-type", PROBLEM_JSON.encode()),
+        (b"content-length", str(len(body)).encode()),
+    ]
+    start: Any = {
+        "type": "websocket.http.response.start",
+        "status": refused.status,
+        "headers": fields,
+    }
+    end: Any = {"type": "websocket.http.response.body", "body": body, "more_body": False}
+    await socket.send(start)
+    await socket.send(end)

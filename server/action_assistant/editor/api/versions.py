@@ -1,0 +1,63 @@
+"""Routes of versions."""
+
+from typing import Any
+
+import msgspec
+from litestar import Request, Response, get, post
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.editor.house import Door
+from action_assistant.editor.versions import VersionView
+from action_assistant.web.access import person_of
+
+
+class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which moment of the graph to publish, and under what label. Left out: as it is now."""
+
+    label: str = ""
+    seq: int | None = None
+
+
+def routes(door: Door) -> list[ControllerRouterHandler]:
+    """Everything about versions."""
+
+    @get(
+        "/api/graphs/{graph_id:str}/versions",
+        summary="The versions of a graph, newest first, without their UMRF",
+        operation_id="listVersions",
+    )
+    async def list_versions(graph_id: str) -> list[VersionView]:
+        house = door.house
+        await house.catalogue.require(graph_id)
+        return await house.versions.of(graph_id)
+
+    @post(
+        "/api/graphs/{graph_id:str}/versions",
+        summary="Publish a graph as it is, or as it was after its change `seq`",
+        operation_id="publishVersion",
+    )
+    async def publish_version(
+        graph_id: str, request: Request[Any, Any, Any], data: Publishing | None = None
+    ) -> Response[VersionView]:
+        house, person = door.house, person_of(request)
+        await house.catalogue.require(graph_id)
+        await house.people.seen(person)
+        wanted = data or Publishing()
+        version, new = await house.versions.publish(
+            graph_id, person, label=wanted.label, seq=wanted.seq
+        )
+        return Response(
+            version,
+            status_code=201 if new else 200,
+            headers={"location": f"/api/versions/{version.id}"},
+        )
+
+    @get(
+        "/api/versions/{version_id:str}",
+        summary="One version with its UMRF",
+        operation_id="getVersion",
+    )
+    async def get_version(version_id: str) -> VersionView:
+        return await door.house.versions.get(version_id)
+
+    return [list_versions, publish_version, get_version]

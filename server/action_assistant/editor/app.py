@@ -1,0 +1,100 @@
+"""The editor as an application."""
+
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Final
+
+import anyio
+from litestar import Litestar
+from litestar.types import ASGIApp
+
+from action_assistant import places
+from action_assistant.editor import happenings as h
+from action_assistant.editor.api import about, graphs, room, versions
+from action_assistant.editor.house import Door, House
+from action_assistant.editor.people import People
+from action_assistant.errors import BadInput
+from action_assistant.journal.journal import Journal
+from action_assistant.settings import EditorSettings
+from action_assistant.web.addresses import Addresses
+from action_assistant.web.asgi import Readiness, application
+from action_assistant.web.keys import Keys
+from action_assistant.web.sessions import session_routes
+
+log: Final = logging.getLogger(__name__)
+
+
+@asynccontextmanager
+async def open_house(settings: EditorSettings) -> AsyncIterator[House]:
+    """The editor without its HTTP side. Raises CannotStart."""
+    journal = await Journal.open(settings.database, branch="editor", fold=h.fold)
+    try:
+        house = House(settings, journal, await People.known(journal))
+    except BaseException:
+        await journal.close()
+        raise
+    try:
+        if await journal.position() == 0:
+            await _greet(house, places.examples())
+        yield house
+    finally:
+        await house.close()
+
+
+def create_app(settings: EditorSettings) -> ASGIApp:
+    """The whole editor process. Raises CannotStart when its lifespan begins."""
+    keys = Keys.of(settings.data)
+    door = Door()
+
+    @asynccontextmanager
+    async def lifespan(_: Litestar) -> AsyncIterator[None]:
+        async with open_house(settings) as house:
+            door.open(house)
+            yield
+
+    async def ready() -> Readiness:
+        return await _readiness(door.house)
+
+    return application(
+        [
+            *session_routes(keys, settings.port),
+            *about.routes(door),
+            *graphs.routes(door),
+            *versions.routes(door),
+            *room.routes(door),
+        ],
+        title="TeMoto Action Assistant: editor",
+        keys=keys,
+        addresses=Addresses(host=settings.host, page_port=settings.port, hosts=settings.hosts),
+        page_port=settings.port,
+        lifespan=[lifespan],
+        ready=ready,
+        measures=lambda: _measures(door.house),
+        page=places.page(),
+        runner_port=settings.runner_port,
+    )
+
+
+async def _greet(house: House, folder: Path) -> None:
+    """Fill an empty catalogue with the graphs that come with the program."""
+    files = [path async for path in anyio.Path(folder).glob("*.umrf.graph.json")]
+    for path in sorted(files, reverse=True):  # the last one made stands first in the list
+        try:
+            await house.catalogue.bring(await path.read_bytes(), h.EXAMPLES)
+        except BadInput as error:
+            log.error("the example %s cannot be read: %s", path.name, error.detail)
+
+
+async def _readiness(house: House) -> Readiness:
+    problem = await house.journal.health()
+    return Readiness(problem is None, () if problem is None else (problem,))
+
+
+def _measures(house: House) -> dict[str, float]:
+    rooms = house.rooms.open_rooms()
+    return {
+        "action_assistant_rooms": len(rooms),
+        "action_assistant_sockets": sum(len(room.members) for room in rooms),
+    }

@@ -1,0 +1,125 @@
+"""What differs between two graphs, action by action and arrow by arrow."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Relation
+
+Change: TypeAlias = Literal["added", "removed", "changed"]
+
+
+class Field(msgspec.Struct, frozen=True):
+    """A field that says something else now. None where it said nothing."""
+
+    field: str
+    before: Any
+    after: Any
+
+
+class ActionChange(msgspec.Struct, frozen=True):
+    """An action that came, went or changed. `name` is its full name, the newer one."""
+
+    change: Change
+    aid: str
+    name: str
+    fields: tuple[Field, ...] = ()
+
+
+class RelationChange(msgspec.Struct, frozen=True):
+    """An arrow that came, went or changed, between actions by full name, or `entry` and `exit`."""
+
+    change: Change
+    parent: str
+    child: str
+    fields: tuple[Field, ...] = ()
+
+
+class Difference(msgspec.Struct, frozen=True):
+    """From `before` to `after`, both changes of the same graph's document."""
+
+    before: int
+    after: int
+    fields: tuple[Field, ...]
+    actions: tuple[ActionChange, ...]
+    relations: tuple[RelationChange, ...]
+
+
+def difference(before: tuple[int, Graph], after: tuple[int, Graph]) -> Difference:
+    """Compare two moments of a graph."""
+    (old_seq, old), (new_seq, new) = before, after
+    return Difference(
+        old_seq,
+        new_seq,
+        tuple(_fields(_graph_says(old), _graph_says(new))),
+        tuple(_actions(old, new)),
+        tuple(_relations(old, new)),
+    )
+
+
+def _actions(old: Graph, new: Graph) -> Iterable[ActionChange]:
+    was = {action.key: action for action in old.actions}
+    now = {action.key: action for action in new.actions}
+    for key in was.keys() | now.keys():
+        a, b = was.get(key), now.get(key)
+        fields = tuple(_fields(_action_says(a), _action_says(b))) if a and b else ()
+        shown = b or a
+        if shown is not None and (fields or not (a and b)):
+            yield ActionChange(_change(a, b), key, shown.full_name, fields)
+
+
+def _relations(old: Graph, new: Graph) -> Iterable[RelationChange]:
+    was, now = _by_ends(old), _by_ends(new)
+    names = _names(old) | _names(new)
+    for ends in sorted(was.keys() | now.keys()):
+        a, b = was.get(ends), now.get(ends)
+        fields = tuple(_fields(_relation_says(a), _relation_says(b))) if a and b else ()
+        if fields or not (a and b):
+            parent, child, _ = ends
+            yield RelationChange(
+                _change(a, b), names.get(parent, parent), names.get(child, child), fields
+            )
+
+
+def _change(a: object, b: object) -> Change:
+    if a is None:
+        return "added"
+    return "removed" if b is None else "changed"
+
+
+def _fields(was: Mapping[str, Any], now: Mapping[str, Any]) -> Iterable[Field]:
+    for name in sorted(was.keys() | now.keys()):
+        if was.get(name) != now.get(name):
+            yield Field(name, was.get(name), now.get(name))
+
+
+def _names(graph: Graph) -> dict[str, str]:
+    return {ENTRY: ENTRY, EXIT: EXIT} | {a.key: a.full_name for a in graph.actions}
+
+
+def _by_ends(graph: Graph) -> dict[tuple[str, str, int], Relation]:
+    return {(r.parent, r.child, r.listing): r for r in graph.relations}
+
+
+def _graph_says(graph: Graph) -> dict[str, Any]:
+    return {"name": graph.name, "description": graph.description} | dict(graph.extra)
+
+
+def _action_says(action: Action) -> dict[str, Any]:
+    says: dict[str, Any] = {
+        "name": action.full_name,
+        "type": action.type,
+        "actor": action.actor,
+        "description": action.description,
+        "position": action.position,
+    }
+    says |= {f"in/{p.path}": p.text for p in action.inputs}
+    says |= {f"out/{p.path}": p.text for p in action.outputs}
+    return says | dict(action.extra)
+
+
+def _relation_says(relation: Relation) -> dict[str, Any]:
+    conditions: dict[str, Any] = msgspec.structs.asdict(relation.conditions)
+    remaps = {f"remap/{remap.source}": remap.target for remap in relation.remap}
+    return conditions | {"required": relation.required} | remaps

@@ -1,0 +1,156 @@
+"""What happens to graphs, versions and people: kinds, bodies, and the tables they fold into.
+
+The stream `graph/ID` holds the document and nothing else, so that its `seq` counts changes of the
+document. Everything else about a graph is in `about/ID`; names of people are in `people`.
+"""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any, Final
+
+import msgspec
+from sqlalchemy import Executable, delete, insert, update
+
+from action_assistant.journal import tables
+from action_assistant.journal.events import Draft, Event
+
+UPDATED: Final = "graph.updated.v1"  # the body is the Yjs update as it came
+CREATED: Final = "graph.created.v1"
+IMPORTED: Final = "graph.imported.v1"  # the body is the file as it came
+DESCRIBED: Final = "graph.described.v1"
+RESTORED: Final = "graph.restored.v1"
+DELETED: Final = "graph.deleted.v1"
+RECOVERED: Final = "graph.recovered.v1"
+PUBLISHED: Final = "version.published.v1"
+NAMED: Final = "person.named.v1"
+
+PEOPLE: Final = "people"
+#: Not people: what this program does by itself, and the graphs that come with it.
+SERVER: Final = "server"
+EXAMPLES: Final = "examples"
+
+
+class Created(msgspec.Struct, frozen=True):
+    """A graph came to be. `dialect` and `notes` speak of the file it was read from."""
+
+    name: str
+    description: str
+    dialect: str | None = None
+    notes: tuple[str, ...] = ()
+
+
+class Described(msgspec.Struct, frozen=True):
+    """What the document of a graph calls itself, noticed at `seq`."""
+
+    name: str
+    description: str
+    seq: int
+
+
+class Restored(msgspec.Struct, frozen=True):
+    """The graph was made again what it had been at `restored`; the edit has the number `seq`."""
+
+    restored: int
+    seq: int
+
+
+class Published(msgspec.Struct, frozen=True):
+    """A version: what a graph was at `seq`, as UMRF that never changes."""
+
+    id: str
+    label: str
+    digest: str
+    seq: int
+    author_name: str
+    umrf: msgspec.Raw
+
+
+class Named(msgspec.Struct, frozen=True):
+    """Somebody, the event's author, goes by this name."""
+
+    name: str
+
+
+def graph_stream(graph: str) -> str:
+    """The stream of a graph's document."""
+    return f"graph/{graph}"
+
+
+def about_stream(graph: str) -> str:
+    """The stream of everything else about a graph."""
+    return f"about/{graph}"
+
+
+def graph_of(stream: str) -> str | None:
+    """The graph that a stream tells of."""
+    head, _, graph = stream.partition("/")
+    return graph if head in {"graph", "about"} else None
+
+
+def draft(kind: str, author: str, body: msgspec.Struct | None = None) -> Draft:
+    """An event with a JSON body."""
+    return Draft(kind, author, msgspec.json.encode(body) if body is not None else b"")
+
+
+def when(at: int) -> datetime:
+    """Microseconds since 1970 as a time."""
+    return datetime.fromtimestamp(at / 1_000_000, UTC)
+
+
+def fold(event: Event) -> Sequence[Executable]:
+    """What an event means for the tables."""
+    if event.kind == UPDATED:
+        return ()
+    stream, _, name = event.stream.partition("/")
+    if stream == "about":
+        return _about(event, name)
+    if event.kind == NAMED:
+        named = msgspec.json.decode(event.body, type=Named)
+        row = {"id": event.author, "name": named.name, "seen_at": event.at}
+        return [
+            delete(tables.person).where(tables.person.c.id == event.author),
+            insert(tables.person).values(row),
+        ]
+    return ()
+
+
+def _about(event: Event, graph: str) -> Sequence[Executable]:
+    this = update(tables.graph).where(tables.graph.c.id == graph)
+    match event.kind:
+        case "graph.created.v1":
+            created = msgspec.json.decode(event.body, type=Created)
+            row: dict[str, Any] = {
+                "id": graph,
+                "name": created.name,
+                "description": created.description,
+                "made_at": event.at,
+                "made_by": event.author,
+            }
+            return [insert(tables.graph).values(row)]
+        case "graph.described.v1":
+            now = msgspec.json.decode(event.body, type=Described)
+            return [this.values(name=now.name, description=now.description)]
+        case "graph.deleted.v1":
+            return [this.values(deleted_at=event.at)]
+        case "graph.recovered.v1":
+            return [this.values(deleted_at=None)]
+        case "version.published.v1":
+            return [insert(tables.version).values(_version(event, graph))]
+        case _:
+            return ()
+
+
+def _version(event: Event, graph: str) -> dict[str, Any]:
+    version = msgspec.json.decode(event.body, type=Published)
+    return {
+        "id": version.id,
+        "graph": graph,
+        "label": version.label,
+        "digest": version.digest,
+        "seq": version.seq,
+        "author_id": event.author,
+        "author_name": version.author_name,
+        "at": event.at,
+        "stream": event.stream,
+        "event_seq": event.seq,
+    }

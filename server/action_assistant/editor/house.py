@@ -1,0 +1,47 @@
+"""What one editor process is made of."""
+
+from action_assistant.editor.catalogue import Catalogue
+from action_assistant.editor.history import History
+from action_assistant.editor.people import People
+from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.sights import Sights
+from action_assistant.editor.versions import Versions
+from action_assistant.journal.journal import Journal
+from action_assistant.settings import EditorSettings
+
+
+class House:
+    """The parts, put together around a journal that is open."""
+
+    def __init__(self, settings: EditorSettings, journal: Journal, people: People) -> None:
+        self.settings = settings
+        self.journal = journal
+        self.people = people
+        self.rooms = Rooms(journal)
+        self.sights = Sights(journal, self.rooms)
+        self.catalogue = Catalogue(journal, self.rooms, self.sights)
+        self.versions = Versions(journal, self.sights)
+        self.history = History(journal, people, self.versions)
+
+    async def close(self) -> None:
+        """Finish what has begun, and let go of the journal."""
+        await self.rooms.close()
+        await self.journal.close()
+
+
+class Door:
+    """Leads to the house once it is open: routes are made before the journal is."""
+
+    def __init__(self) -> None:
+        self._house: House | None = None
+
+    def open(self, house: House) -> None:
+        """From here on requests can be answered."""
+        self._house = house
+
+    @property
+    def house(self) -> House:
+        """The house. Only requests ask for it, and there are none before it is open."""
+        if self._house is None:
+            raise RuntimeError("the editor is not open yet")
+        return self._house

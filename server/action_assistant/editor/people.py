@@ -1,0 +1,39 @@
+"""Who acted here, under the name they last gave."""
+
+from sqlalchemy import select
+
+from action_assistant.editor.happenings import EXAMPLES, NAMED, PEOPLE, SERVER, Named, draft
+from action_assistant.journal import tables
+from action_assistant.journal.journal import Journal
+from action_assistant.web.keys import Person
+
+_OURS = {SERVER: "Action Assistant", EXAMPLES: "Examples"}
+
+
+class People:
+    """Names by id. Knows everyone who ever acted."""
+
+    def __init__(self, journal: Journal, names: dict[str, str]) -> None:
+        self._journal = journal
+        self._names = names
+
+    @classmethod
+    async def known(cls, journal: Journal) -> "People":
+        """Those in the journal."""
+        rows = await journal.query(select(tables.person.c.id, tables.person.c.name))
+        return cls(journal, {row.id: row.name for row in rows})
+
+    async def seen(self, person: Person) -> None:
+        """Somebody acts: remember the name, if it is new."""
+        if self._names.get(person.id) == person.name:
+            return
+        self._names[person.id] = person.name
+        await self._journal.append(PEOPLE, [draft(NAMED, person.id, Named(person.name))])
+
+    def person(self, author: str) -> Person:
+        """Who the author of an event is."""
+        return Person(author, self._names.get(author) or _OURS.get(author, ""))
+
+    def everyone(self) -> list[Person]:
+        """All of them, by name."""
+        return sorted((Person(*item) for item in self._names.items()), key=lambda p: p.name)
