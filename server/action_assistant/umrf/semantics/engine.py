@@ -12,9 +12,16 @@ from action_assistant.umrf.jsontext import parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Graph, Key, Parameter
 from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.semantics.core import Core, Task
-from action_assistant.umrf.semantics.parts import Node, Outcome, Running, build, exit_nodes
+from action_assistant.umrf.semantics.parts import (
+    Node,
+    Outcome,
+    Running,
+    build,
+    exit_nodes,
+    restructure,
+)
 from action_assistant.umrf.semantics.script import Script
-from action_assistant.umrf.semantics.trace import Trace
+from action_assistant.umrf.semantics.trace import GraphState, Hazard, Trace
 
 _Deed: TypeAlias = Callable[[Running], None]
 
@@ -90,6 +97,7 @@ class Engine(Core):
             return self._taken()
         if old is not None and old.state in _BUSY:
             active = old.state
+            self._out.append(GraphState(self._t(), graph.name, "UNINITIALIZED"))
             self._command(partial(self._stop_graph, old))
             raise EngineRefused(
                 f"Cannot execute UMRF graph '{graph.name}' because it's already active ({active})"
@@ -121,6 +129,15 @@ class Engine(Core):
         """Resumes a PAUSED or HALTED graph; `continue_from` is the full name of a node to run."""
         return self._on(graph_name, at_ms, partial(self._resume_graph, continue_from=continue_from))
 
+    def modify(self, graph: Graph, at_ms: float, continue_from: str = "") -> list[Trace]:
+        """Gives a running, paused or halted graph of this name a new structure and lets it go on.
+        Raises `EngineRefused`; a graph that was paused for it then stays PAUSED."""
+        self._run_until(at_ms)
+        old = self.graphs.get(graph.name)
+        if old is not None and not self.crashed and not self.locked:
+            self._command(partial(self._modify_graph, old, graph, continue_from))
+        return self._taken()
+
     # Commands, one after the other
 
     def _taken(self) -> list[Trace]:
@@ -145,7 +162,10 @@ class Engine(Core):
         """The command that held the engine is done; the next ones may go."""
         self._busy = False
         while self._waiting and not self._busy and not self.crashed and not self.locked:
-            self._waiting.popleft()()
+            try:
+                self._waiting.popleft()()
+            except EngineRefused as e:
+                self._out.append(Hazard(self._t(), "", "refused", "goes on", None, e.message))
             self._settle()
 
     # Start
@@ -259,7 +279,7 @@ class Engine(Core):
         result: Outcome = "on_error" if graph.stop_failed else "on_stopped"
         self._soon(partial(self._sub_ended, graph, result))
 
-    def _pause_graph(self, graph: Running) -> None:
+    def _pause_graph(self, graph: Running, then: Task | None = None) -> None:
         if graph.state != "RUNNING":
             return
         nodes = [node for node in graph.nodes.values() if node.state == "RUNNING"]
@@ -270,15 +290,19 @@ class Engine(Core):
             return
         if not nodes:
             self._graph_state(graph, "PAUSED")
+            if then is not None:
+                then()
             return
         self._busy = True
 
-        def then() -> None:
+        def paused_now() -> None:
             if graph.state == "RUNNING":
                 self._graph_state(graph, "PAUSED")
+            if then is not None:
+                then()
             self._free()
 
-        self._at(self.now + self.facts.pause_poll_ms, then)
+        self._at(self.now + self.facts.pause_poll_ms, paused_now)
 
     def _resume_graph(self, graph: Running, continue_from: str = "") -> None:
         if graph.state not in ("PAUSED", "HALTED"):
@@ -298,6 +322,30 @@ class Engine(Core):
                 node.rest_ms = None
         if node_to_run := graph.nodes.get(continue_from):
             self._run(graph, node_to_run)
+
+    def _modify_graph(self, old: Running, new: Graph, continue_from: str) -> None:
+        if old.state not in ("RUNNING", "PAUSED", "HALTED"):
+            raise EngineRefused(
+                f"Cannot modify graph '{old.name}' because it is not in PAUSED state. "
+                f"Current state: '{old.state}'"
+            )
+        kept = {action.full_name for action in new.actions if not action.missing}
+        lost = next((n for n in old.nodes.values() if n.active and n.full_name not in kept), None)
+
+        def then() -> None:
+            if lost is None:
+                restructure(old, self._built(old.name, new, None, None))
+                self._resume_graph(old, continue_from)
+
+        if old.state == "RUNNING":
+            self._pause_graph(old, then)
+        else:
+            then()
+        if lost is not None:
+            raise EngineRefused(
+                f"Cannot modify graph '{old.name}': Action '{lost.full_name}' cannot be deleted, "
+                f"because it is in an active state ({lost.state})"
+            )
 
     # Sub-graphs
 

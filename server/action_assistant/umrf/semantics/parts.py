@@ -222,6 +222,30 @@ def _link_children(running: Running, nodes: Mapping[Key, Node], ghosts: Mapping[
             parent.children.append(Edge(running.exit, label, ()))
 
 
+def restructure(running: Running, new: Running) -> None:
+    """What a modify does: nodes that stay get the relations and values of the new graph, an empty
+    list of relations changes nothing, and every parent's report is forgotten."""
+    merged = {name: running.nodes.get(name, node) for name, node in new.nodes.items()}
+    for node in (*new.nodes.values(), new.entry):
+        for edge in node.children:
+            if edge.child is not None and edge.child is not new.exit:
+                edge.child = merged[edge.child.full_name]
+    for name, node in merged.items():
+        fresh = new.nodes[name]
+        if fresh is node:
+            node.subgraph = None
+            continue
+        node.inputs = fresh.inputs
+        node.children = fresh.children or node.children
+        node.links = fresh.links or node.links
+        for link in node.links.values():
+            link.received = False
+        node.waiting_links = sum(link.required for link in node.links.values())
+    running.nodes, running.entry, running.exit = merged, new.entry, new.exit
+    running.graph = new.graph
+    running.linked.clear()
+
+
 def exit_nodes(running: Running) -> list[Node]:
     """The actions that lead to the exit, in the order of `graph_exit`."""
     ends = [r for r in running.graph.relations if r.child == EXIT]
