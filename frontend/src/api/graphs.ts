@@ -29,7 +29,7 @@ export interface Version {
   label: string;
   digest: string;
   seq: number;
-  author: Author | string;
+  author: Author;
   at: string;
   umrf?: unknown;
 }
@@ -74,6 +74,7 @@ export function useGraphs() {
 
 export function useVersions(graph: string) {
   return useQuery({
+    enabled: graph !== "",
     queryKey: keys.versions(graph),
     queryFn: ({ signal }) => ask<Version[]>(`/api/graphs/${graph}/versions`, { signal }),
   });
@@ -112,9 +113,16 @@ export function publish(graph: string, seq: number): Promise<string> {
   return askText(`/api/graphs/${graph}/versions`, { method: "POST", body: { seq } });
 }
 
-export function authorName(author: Author | string | null | undefined): string {
-  if (!author) return "somebody";
-  return typeof author === "string" ? author : author.name;
+export function authorName(author: Author | null | undefined): string {
+  return author?.name || "somebody";
+}
+
+/** What people call a version: its label, else its number among those of its graph. */
+export function versionName(versions: readonly Version[] | undefined, id: string | null): string {
+  const at = versions?.findIndex((version) => version.id === id) ?? -1;
+  const version = versions?.[at];
+  if (!versions || !version) return "";
+  return version.label || `v${versions.length - at}`;
 }
 
 export function refreshGraphs(client: QueryClient): Promise<void> {

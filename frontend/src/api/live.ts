@@ -1,6 +1,6 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
 import { newAid } from "../graph/ids";
-import { postStop, type Run } from "./runs";
+import { getRun, postStop, type Run } from "./runs";
 
 export type LiveLink = "connecting" | "live" | "down";
 
@@ -73,7 +73,7 @@ export class Live {
     if (this.#socket?.readyState === WebSocket.OPEN) {
       this.#socket.send(JSON.stringify({ type: "stop", run, stop_id: id }));
     }
-    postStop(this.#runner, run).then(
+    postStop(this.#runner, run, id).then(
       () => this.#answerStop(id, "heard", ""),
       (error: Error) => this.#answerStop(id, "unheard", error.message),
     );
@@ -122,8 +122,15 @@ export class Live {
         this.#tries = 0;
         const runs = new Map(this.now.runs);
         const open = new Set(message.runs.map((run) => run.id));
-        // What this page believed to be open and the runner no longer names ended unseen.
-        for (const [id, run] of runs) if (!open.has(id) && run.ended_at === null) runs.delete(id);
+        // What this page believed to be open and the runner no longer names has ended unseen.
+        for (const [id, run] of runs) {
+          if (open.has(id) || run.ended_at !== null) continue;
+          runs.delete(id);
+          getRun(this.#runner, id).then(
+            (ended) => this.#putRun(ended),
+            (error: Error) => console.warn("A run's end is not known", id, error.message),
+          );
+        }
         for (const run of message.runs) runs.set(run.id, run);
         this.#set({ link: "live", since: Date.now(), engines: message.engines, runs });
         break;

@@ -26,7 +26,9 @@ test("every member of every object is found whole", () => {
 
 test("setting one member leaves the others as they are spelled", () => {
   const text = '{"pvf_type": "number", "pvf_value": 5.0, "x": [1,  2]}';
-  expect(withMember(text, "pvf_value", "6")).toBe('{"pvf_type": "number", "pvf_value": 6, "x": [1,  2]}');
+  expect(withMember(text, "pvf_value", "6")).toBe(
+    '{"pvf_type": "number", "pvf_value": 6, "x": [1,  2]}',
+  );
   expect(withMember(text, "pvf_value", null)).toBe('{"pvf_type": "number", "x": [1,  2]}');
   expect(withMember('{"a": 1}', "b", "2")).toBe('{"a": 1, "b": 2}');
 });

@@ -123,7 +123,7 @@ export function runWord(run: Run): { tone: Tone; word: string } {
 /** The end in words, for history. */
 export function endWords(run: Run): string {
   const { word } = runWord(run);
-  const by = typeof run.stopped_by === "string" ? run.stopped_by : run.stopped_by?.name;
+  const by = run.stopped_by?.name;
   if (run.state === "stopped" && by) return `stopped by ${by}`;
   if (run.state === "lost") return "lost: nothing proves its end";
   if (run.state === "finished" && run.result === "on_true") return "finished";

@@ -20,7 +20,7 @@ export type RunResult = "on_true" | "on_false" | "on_error" | "on_stopped" | "on
 
 export type VisitResult = "true" | "false" | "error" | "stopped" | null;
 
-/** One time that an action ran: it began between `from` bounds and ended at `until`. */
+/** One execution: seen going on from `from` to `until`, at most from `not_before` to `not_after`. */
 export interface Visit {
   from: string | null;
   not_before: string | null;
@@ -34,15 +34,17 @@ export interface ActionRun {
   aid: string | null;
   state: string;
   visits: Visit[];
+  /** Earlier visits that are not listed. */
+  older: number;
   messages: { at: string; text: string }[];
 }
 
 export interface Run {
   id: string;
   number: number;
-  graph: string;
+  graph: string | null;
   graph_name: string;
-  version: string;
+  version: string | null;
   digest: string;
   engine: string;
   simulated: boolean;
@@ -51,11 +53,16 @@ export interface Run {
   proof_at: string | null;
   unknown_since: string | null;
   result: RunResult | null;
+  requested_at: string;
   started_at: string | null;
   ended_at: string | null;
   author: { id: string; name: string } | null;
-  stopped_by: { id: string; name: string } | string | null;
-  alarms: unknown[];
+  stopped_by: { id: string; name: string } | null;
+  /** Why it was refused, lost or ended so. */
+  detail: string;
+  alarms: { code: string; at: string; text: string }[];
+  /** Whether the journal has all of it. */
+  recorded: boolean;
   actions?: Record<string, ActionRun>;
   umrf?: unknown;
 }
@@ -100,9 +107,13 @@ export function startRun(order: StartOrder): Promise<Run> {
 }
 
 /** Asks to stop one run, or all of them. */
-export function postStop(runner: string, run: string | "all"): Promise<unknown> {
+export function postStop(runner: string, run: string | "all", stop: string): Promise<unknown> {
   const path = run === "all" ? "/api/stop" : `/api/runs/${encodeURIComponent(run)}/stop`;
-  return ask(`${runner}${path}`, { method: "POST", patience: 6_000 });
+  return ask(`${runner}${path}`, {
+    method: "POST",
+    body: { stop_id: stop },
+    patience: 6_000,
+  });
 }
 
 export function useRuns(runner: string | undefined, graph?: string) {
@@ -114,10 +125,14 @@ export function useRuns(runner: string | undefined, graph?: string) {
   });
 }
 
+export function getRun(runner: string, id: string, signal?: AbortSignal): Promise<Run> {
+  return ask(`${runner}/api/runs/${encodeURIComponent(id)}`, signal ? { signal } : {});
+}
+
 export function useRun(runner: string | undefined, id: string) {
   return useQuery({
     queryKey: ["runs", "one", id],
-    queryFn: ({ signal }) => ask<Run>(`${runner}/api/runs/${encodeURIComponent(id)}`, { signal }),
+    queryFn: ({ signal }) => getRun(runner ?? "", id, signal),
     enabled: runner !== undefined,
   });
 }

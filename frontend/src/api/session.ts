@@ -44,7 +44,7 @@ export async function currentPerson(): Promise<Person> {
 
 /** The same session under another name. */
 export async function rename(name: string): Promise<Person> {
-  const answer = await ask<SessionAnswer>("/api/session", { method: "PATCH", body: { name } });
+  const answer = await ask<SessionAnswer>("/api/session", { method: "POST", body: { name } });
   localStorage.setItem(NAME_KEY, name);
   return personOf(answer);
 }

@@ -12,13 +12,14 @@ interface Props {
   crumbs: readonly Crumb[];
   status?: ReactNode;
   actions?: ReactNode;
+  start?: ReactNode;
   /** The graph on screen. */
   graph?: string;
   /** The screen is the history itself. */
   history?: boolean;
 }
 
-export function Bar({ crumbs, status, actions, graph, history = false }: Props) {
+export function Bar({ crumbs, status, actions, start, graph, history = false }: Props) {
   return (
     <TopBar
       crumbs={crumbs}
@@ -42,6 +43,7 @@ export function Bar({ crumbs, status, actions, graph, history = false }: Props) 
         </>
       }
       account={<AccountMenu />}
+      start={start}
       stop={<StopButton {...(graph === undefined ? {} : { graph })} />}
     />
   );

@@ -4,7 +4,7 @@ import { IconMapOff } from "@tabler/icons-react";
 import { type ReactNode, useMemo } from "react";
 import { Link } from "wouter";
 import { usePerson } from "../account/person";
-import { useVersions } from "../api/graphs";
+import { useVersions, versionName } from "../api/graphs";
 import { progressByAid } from "../api/progress";
 import type { Run } from "../api/runs";
 import { newestRun, useLive } from "../api/use-live";
@@ -26,8 +26,7 @@ function useRunHere(id: string): { run: Run | null; label: string; unsure: boole
   const { now } = useLive();
   const run = newestRun(now, id);
   const versions = useVersions(id).data;
-  const version = versions?.find((candidate) => candidate.id === run?.version);
-  const label = version?.label || run?.digest.slice(0, 7) || "";
+  const label = versionName(versions, run?.version ?? null) || run?.digest.slice(0, 7) || "";
   return { run, label, unsure: now.link === "down" && run?.ended_at === null };
 }
 

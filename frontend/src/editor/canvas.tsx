@@ -31,6 +31,12 @@ interface Props {
   map: boolean;
 }
 
+/** The whole graph in view, clear of the tools below. */
+export const WHOLE = {
+  maxZoom: 1,
+  padding: { top: "28px", bottom: "72px", left: "28px", right: "28px" },
+} as const;
+
 function outcomeOf(handle: string | null | undefined): Precondition {
   return handle === "on_false" || handle === "on_error" || handle === "on_stopped"
     ? handle
@@ -138,7 +144,7 @@ export function Canvas({ bench, canvas, map }: Props) {
         minZoom={0.08}
         maxZoom={2.2}
         fitView
-        fitViewOptions={{ maxZoom: 1, padding: 0.14 }}
+        fitViewOptions={WHOLE}
         onlyRenderVisibleElements={canvas.nodes.length > 150}
         nodeDragThreshold={3}
         proOptions={{ hideAttribution: true }}

@@ -38,6 +38,7 @@ export interface BarParts {
   crumbs: readonly Crumb[];
   status?: ReactNode;
   actions?: ReactNode;
+  start?: ReactNode;
 }
 
 interface Props {
@@ -156,7 +157,7 @@ export function Editor(props: Props) {
         status: (
           <>
             <SavedWord />
-            {!phone && props.status(shown)}
+            {wide && props.status(shown)}
           </>
         ),
         actions: (
@@ -182,9 +183,9 @@ export function Editor(props: Props) {
               </>
             )}
             <People me={props.me} />
-            {!phone && props.start(shown)}
           </>
         ),
+        start: phone ? null : props.start(shown),
       })}
       {phone ? (
         <main className={style.phone}>
@@ -216,7 +217,10 @@ export function Editor(props: Props) {
           <section className={style.canvas} aria-label="Graph">
             {stage}
           </section>
-          <div className={style.strip}>{strip}</div>
+          <div className={style.strip}>
+            {!wide && <div className={style.draft}>{props.status(shown)}</div>}
+            {strip}
+          </div>
           <aside
             className={style.right}
             data-open={wide || right || undefined}

@@ -9,7 +9,7 @@ import { useLink } from "../room/use-room";
 import type { ProblemCount } from "../ui/canvas/elements";
 import { Empty } from "../ui/empty";
 import { useBench } from "./bench";
-import { Canvas } from "./canvas";
+import { Canvas, WHOLE } from "./canvas";
 import style from "./stage.module.css";
 import { Toolbar } from "./toolbar";
 import type { EditorState } from "./use-bench";
@@ -40,7 +40,7 @@ function Inside({ sight, progress, problems, compact, corner }: Props) {
       places: () => places,
       sizes: () => sizes,
       view: {
-        fit: () => void flow.fitView({ maxZoom: 1, padding: 0.14, duration: 200 }),
+        fit: () => void flow.fitView({ ...WHOLE, duration: 200 }),
         zoomIn: () => void flow.zoomIn({ duration: 120 }),
         zoomOut: () => void flow.zoomOut({ duration: 120 }),
         show: (keys) =>
@@ -65,7 +65,7 @@ function Inside({ sight, progress, problems, compact, corner }: Props) {
   // biome-ignore lint/correctness/useExhaustiveDependencies: once, when the graph is there
   useEffect(() => {
     if (!begun) return;
-    const timer = setTimeout(() => void flow.fitView({ maxZoom: 1, padding: 0.14 }), 60);
+    const timer = setTimeout(() => void flow.fitView(WHOLE), 60);
     return () => clearTimeout(timer);
   }, [arrived]);
 

@@ -51,7 +51,7 @@ function Shown({ run, bar }: { run: Run; bar: Props["bar"] }) {
       {bar({
         crumbs: [
           { label: "Runs", to: "/runs" },
-          { label: run.graph_name, to: `/graphs/${run.graph}` },
+          { label: run.graph_name, ...(run.graph === null ? {} : { to: `/graphs/${run.graph}` }) },
           { label: `Run ${run.number}` },
         ],
         status: (
@@ -64,7 +64,7 @@ function Shown({ run, bar }: { run: Run; bar: Props["bar"] }) {
             {run.simulated && <span className={style.simulated}>simulated</span>}
           </>
         ),
-        actions: (
+        actions: run.graph !== null && (
           <Button component={Link} to={`/graphs/${run.graph}`} className={style.back ?? ""}>
             Open graph
           </Button>

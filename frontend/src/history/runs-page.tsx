@@ -53,7 +53,6 @@ function Row({ run, now }: { run: Run; now: number }) {
   const took = start === null ? "" : end === null ? stopwatch(now - start) : duration(end - start);
   const to = `/runs/${run.id}`;
   return (
-    // biome-ignore lint/a11y/useKeyWithClickEvents: the link inside does the same by keyboard
     <tr className={style.row} onClick={() => go(to)}>
       <td className={style.state}>
         <StateWord tone={tone} word={run.ended_at === null ? word : endWords(run)} />

@@ -3,12 +3,14 @@ import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
 import { graphText } from "../api/graphs";
 import { ENTRY, EXIT, type Graph, spoken } from "../graph/model";
-import { CARD, PILL, placesOf } from "../ui/canvas/arrange";
+import { arrange } from "../ui/canvas/arrange";
 import { fromUmrf } from "../ui/canvas/from-umrf";
 import { outcomeColor } from "../ui/outcome";
 import { robotColor } from "../ui/robot";
 
-const MARGIN = 40;
+const MARGIN = 26;
+const CARD = { width: 150, height: 84 } as const;
+const PILL = { width: 44, height: 44 } as const;
 
 interface Box {
   x: number;
@@ -18,10 +20,11 @@ interface Box {
 }
 
 function boxes(graph: Graph): Map<string, Box> {
+  const keys = [ENTRY, ...graph.actions.map((action) => action.key), EXIT];
+  const sizes = new Map(keys.map((key) => [key, key === ENTRY || key === EXIT ? PILL : CARD]));
   const found = new Map<string, Box>();
-  for (const [key, [x, y]] of placesOf(graph)) {
-    const end = key === ENTRY || key === EXIT;
-    found.set(key, { x, y, ...(end ? PILL : CARD) });
+  for (const [key, [x, y]] of arrange(graph, sizes, "LR")) {
+    found.set(key, { x, y, ...(sizes.get(key) ?? CARD) });
   }
   return found;
 }
@@ -45,15 +48,15 @@ export function Miniature({ graph }: { graph: Graph }) {
         const from = places.get(relation.parent);
         const to = places.get(relation.child);
         if (!from || !to) return null;
-        const [x1, y1] = [from.x + from.width / 2, from.y + from.height];
-        const [x2, y2] = [to.x + to.width / 2, to.y];
-        const bend = Math.max(30, Math.abs(y2 - y1) / 2);
+        const [x1, y1] = [from.x + from.width, from.y + from.height / 2];
+        const [x2, y2] = [to.x, to.y + to.height / 2];
+        const bend = Math.max(30, Math.abs(x2 - x1) / 2);
         const outcome = spoken(relation.conditions)[0] ?? "on_true";
         const color = relation.parent === ENTRY ? "var(--ink4)" : outcomeColor[outcome];
         return (
           <path
             key={`${relation.parent}>${relation.child};${relation.listing}`}
-            d={`M${x1} ${y1}C${x1} ${y1 + bend} ${x2} ${y2 - bend} ${x2} ${y2}`}
+            d={`M${x1} ${y1}C${x1 + bend} ${y1} ${x2 - bend} ${y2} ${x2} ${y2}`}
             fill="none"
             strokeWidth={5}
             style={{ stroke: color }}
@@ -67,7 +70,7 @@ export function Miniature({ graph }: { graph: Graph }) {
           <g key={key}>
             <rect
               {...box}
-              rx={end ? 16 : 16}
+              rx={end ? 22 : 16}
               strokeWidth={4}
               style={{
                 fill: "var(--raised)",
@@ -75,14 +78,32 @@ export function Miniature({ graph }: { graph: Graph }) {
               }}
             />
             {action && (
-              <rect
-                x={box.x + 10}
-                y={box.y + 18}
-                width={7}
-                height={box.height - 36}
-                rx={3}
-                style={{ fill: robotColor(action.actor) }}
-              />
+              <>
+                <rect
+                  x={box.x + 12}
+                  y={box.y + 18}
+                  width={7}
+                  height={box.height - 36}
+                  rx={3}
+                  style={{ fill: robotColor(action.actor) }}
+                />
+                <rect
+                  x={box.x + 32}
+                  y={box.y + 24}
+                  width={Math.min(100, 14 + action.name.length * 6)}
+                  height={11}
+                  rx={5}
+                  style={{ fill: "var(--ink4)" }}
+                />
+                <rect
+                  x={box.x + 32}
+                  y={box.y + 48}
+                  width={64}
+                  height={9}
+                  rx={4}
+                  style={{ fill: "var(--line2)" }}
+                />
+              </>
             )}
           </g>
         );

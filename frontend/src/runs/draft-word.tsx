@@ -21,7 +21,7 @@ export function DraftWord({ run, label, graph, seq }: Props) {
   const version = useQuery({
     queryKey: keys.version(run?.version ?? ""),
     queryFn: ({ signal }) => ask<Version>(`/api/versions/${run?.version}`, { signal }),
-    enabled: goes,
+    enabled: goes && run.version !== null,
     staleTime: Number.POSITIVE_INFINITY,
   }).data;
   const running = useMemo(() => (version ? meaning(fromUmrf(version.umrf)) : null), [version]);

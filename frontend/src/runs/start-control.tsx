@@ -2,7 +2,7 @@
 import { notifications } from "@mantine/notifications";
 import { IconPlayerPlayFilled } from "@tabler/icons-react";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
-import { keys, publish, useVersions, type Version } from "../api/graphs";
+import { keys, publish, useVersions, type Version, versionName } from "../api/graphs";
 import { place, sentence } from "../api/http";
 import { memberText } from "../api/member";
 import { startRun } from "../api/runs";
@@ -22,7 +22,7 @@ interface Props {
 /** The name that a start of this moment will have. */
 export function nextLabel(versions: readonly Version[], seq: number): string {
   const same = versions.find((version) => version.seq === seq);
-  return same?.label || `v${versions.length + 1}`;
+  return same ? versionName(versions, same.id) : `v${versions.length + 1}`;
 }
 
 export function useStart(graph: string) {

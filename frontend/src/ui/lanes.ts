@@ -20,5 +20,8 @@ export function lanesOf(run: Run, graph: Graph): Lane[] {
       aid: run.actions?.[name]?.aid ?? known.get(name)?.key ?? null,
       robot: known.get(name)?.actor ?? "",
     }))
-    .sort((a, b) => began(a.name).localeCompare(began(b.name)));
+    .sort((a, b) => {
+      const [x, y] = [began(a.name), began(b.name)];
+      return x < y ? -1 : x > y ? 1 : 0;
+    });
 }

@@ -80,7 +80,7 @@ export const theme = createTheme({
     Menu: Menu.extend({ defaultProps: { shadow: "md", position: "bottom-end" } }),
     Popover: Popover.extend({ defaultProps: { shadow: "md" } }),
     Modal: Modal.extend({ defaultProps: { centered: true, radius: "lg" } }),
-    Tabs: Tabs.extend({ defaultProps: {} }),
+    Tabs: Tabs.extend({ styles: { tab: { padding: "0.7rem 0.625rem 0.6rem" } } }),
     Kbd: Kbd.extend({ defaultProps: { size: "xs" } }),
   },
 });

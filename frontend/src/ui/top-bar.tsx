@@ -13,8 +13,9 @@ interface Props {
   crumbs: readonly Crumb[];
   /** Beside the crumbs: states in words. */
   status?: ReactNode;
-  /** Before STOP. */
   actions?: ReactNode;
+  /** Beside STOP. */
+  start?: ReactNode;
   account: ReactNode;
   stop: ReactNode;
 }
@@ -23,7 +24,7 @@ export function Mark() {
   return <img src="/mark.svg" alt="" width={24} height={24} className={style.mark} />;
 }
 
-export function TopBar({ crumbs, status, actions, account, stop }: Props) {
+export function TopBar({ crumbs, status, actions, account, start, stop }: Props) {
   return (
     <header className={style.bar}>
       <Link to="/" className={style.home} aria-label="All graphs">
@@ -50,6 +51,7 @@ export function TopBar({ crumbs, status, actions, account, stop }: Props) {
       <div className={style.status}>{status}</div>
       <div className={style.actions}>{actions}</div>
       <div className={style.account}>{account}</div>
+      {start && <div className={style.actions}>{start}</div>}
       <div className={style.stop}>{stop}</div>
     </header>
   );

@@ -84,7 +84,7 @@ export function ActionForm({ action }: { action: Action }) {
         onCommit={(text) => setField(doc, action.key, "description", text)}
       />
       <Parameters action={action} side="in" />
-      <RunsWhen action={action} />
+      <RunsWhen of={action.key} title="When" />
       <Arrows action={action} />
       <Parameters action={action} side="out" />
       <section className={style.section}>

@@ -2,6 +2,7 @@
 import { Tabs } from "@mantine/core";
 import type { Problems } from "../../api/graphs";
 import { relationId } from "../../graph/layout";
+import { EXIT } from "../../graph/model";
 import { type Bench, type Panel, selectedActions, selectedRelations, useBench } from "../bench";
 import { ActionForm } from "./action-form";
 import style from "./details.module.css";
@@ -9,6 +10,7 @@ import { GraphForm } from "./graph-form";
 import { JsonView } from "./json-view";
 import { ProblemList } from "./problems";
 import { RelationForm } from "./relation-form";
+import { RunsWhen } from "./runs-when";
 
 interface Props {
   id: string;
@@ -23,7 +25,8 @@ function title(bench: Bench): string {
   const [action] = actions;
   if (actions.length + relations.length > 1) return `${actions.length + relations.length} selected`;
   if (action) return `${action.name} ${action.instanceId}`;
-  return relations.length === 1 ? "Arrow" : "Graph";
+  if (relations.length === 1) return "Arrow";
+  return bench.selection.has(EXIT) ? "Exit" : "Graph";
 }
 
 function Properties() {
@@ -42,6 +45,7 @@ function Properties() {
   }
   if (action) return <ActionForm key={action.key} action={action} />;
   if (relation) return <RelationForm key={relationId(relation)} relation={relation} />;
+  if (bench.selection.has(EXIT)) return <RunsWhen of={EXIT} title="The graph ends" />;
   return <GraphForm />;
 }
 

@@ -5,6 +5,7 @@ import { useState } from "react";
 import { removeRelation, setRemap, setRequired, setResponse } from "../../graph/edit";
 import { relationId } from "../../graph/layout";
 import { ENTRY, RESPONSES, type Relation, type Response } from "../../graph/model";
+import { relationWords } from "../../graph/words";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
 import { endName, useBench } from "../bench";
 import style from "./details.module.css";
@@ -131,6 +132,13 @@ export function RelationForm({ relation }: { relation: Relation }) {
               </div>
             ))}
           </section>
+          <div className={style.say}>
+            <div>
+              {relationWords(graph, relation).map((sentence) => (
+                <p key={sentence}>{sentence}</p>
+              ))}
+            </div>
+          </div>
           <Switch
             label={`${child} waits for this`}
             description={

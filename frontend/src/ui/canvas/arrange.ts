@@ -17,9 +17,13 @@ function sizeOf(key: Key, sizes: Sizes): Size {
 }
 
 /** Fresh places for everything, ranks from entry down to exit. */
-export function arrange(graph: Graph, sizes: Sizes = new Map()): Places {
+export function arrange(
+  graph: Graph,
+  sizes: Sizes = new Map(),
+  direction: "TB" | "LR" = "TB",
+): Places {
   const dagre = new Dagre({ multigraph: true });
-  dagre.setGraph({ rankdir: "TB", nodesep: 56, ranksep: 84, marginx: 0, marginy: 0 });
+  dagre.setGraph({ rankdir: direction, nodesep: 56, ranksep: 84, marginx: 0, marginy: 0 });
   dagre.setDefaultEdgeLabel(() => ({}));
   const keys = [ENTRY, ...graph.actions.map((action) => action.key), EXIT];
   for (const key of keys) dagre.setNode(key, { ...sizeOf(key, sizes) });

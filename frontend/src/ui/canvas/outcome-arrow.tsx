@@ -25,8 +25,8 @@ function backwards(sx: number, sy: number, tx: number, ty: number): Line {
 
 function lineOf(props: EdgeProps<Arrow>): Line {
   const { sourceX, sourceY, targetX, targetY } = props;
-  const from = sourceY + 9;
-  const to = targetY - 6;
+  const from = sourceY + 1;
+  const to = targetY - 2;
   if (to < from + 8) return backwards(sourceX, from, targetX, to);
   const [path, x, y] = getBezierPath({
     sourceX,
