@@ -1,3 +1,4 @@
+import fc from "fast-check";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import type * as Y from "yjs";
 import { connect, type Room, roomUrl } from "./connect";
@@ -95,6 +96,51 @@ test("an update goes only after the room was given what it lacked, so that it ne
   server.accept();
   expect(keys(server.doc)).toEqual(["early", "later"]);
   expect(server.doc.store.pendingStructs).toBeNull();
+});
+
+const deeds = fc.constantFrom(
+  ...(["edit", "edit", "colleague", "stall", "commit", "drop", "crash", "accept", "wait"] as const),
+);
+
+test("whatever breaks when, nothing is called saved that the server lacks, and in the end both agree", () => {
+  fc.assert(
+    fc.property(fc.array(deeds, { maxLength: 40 }), (script) => {
+      const server = new FakeServer();
+      const room = connect({ url: "ws://host/room", open: server.open, random: () => 1 });
+      const isOpen = () => server.last.readyState === 1;
+      const mine: string[] = [];
+      script.forEach((deed, n) => {
+        if (deed === "edit") {
+          mine.push(`mine ${n}`);
+          write(`mine ${n}`, room.doc);
+        } else if (deed === "colleague" && isOpen()) {
+          server.broadcast((doc) => write(`theirs ${n}`, doc));
+        } else if (deed === "stall") server.stalled = true;
+        else if (deed === "commit") server.commit();
+        else if (deed === "accept" && server.last.readyState === 0) server.accept();
+        else if (deed === "wait") vi.advanceTimersByTime(10_000);
+        else if (deed === "drop" && isOpen()) server.last.end(1006);
+        else if (deed === "crash" && isOpen()) {
+          server.lose();
+          server.last.end(1006);
+        }
+        const stored = new Set(keys(server.doc));
+        const lacking = mine.filter((key) => !stored.has(key));
+        expect(room.link().unsaved).toBeGreaterThanOrEqual(lacking.length);
+      });
+      server.stalled = false;
+      server.commit();
+      if (!isOpen()) {
+        room.reconnect();
+        server.accept();
+      }
+      expect(room.link()).toMatchObject({ state: "live", unsaved: 0, seq: server.seq });
+      expect(keys(room.doc)).toEqual(keys(server.doc));
+      expect(keys(server.doc)).toEqual(expect.arrayContaining(mine));
+      room.close();
+    }),
+    { numRuns: 300 },
+  );
 });
 
 test("what others change moves the moment and is not counted as one's own", () => {

@@ -106,6 +106,11 @@ export class FakeServer {
     }
   }
 
+  /** What came and was not committed is gone. */
+  lose(): void {
+    this.log.length = 0;
+  }
+
   /** A colleague's edit. */
   broadcast(work: (doc: Y.Doc) => void): void {
     const before = Y.encodeStateVector(this.doc);
