@@ -134,6 +134,8 @@ class Core:
     def _notice_stuck(self, graph: Running) -> None:
         if graph.state != "RUNNING" or graph.stuck or graph.active > graph.held:
             return
+        if graph.pausing or self.locked:
+            return
         graph.stuck = True
         if graph.held:
             message = "Only paused actions are left; a pause and a resume of the graph wake them."
@@ -201,7 +203,7 @@ class Core:
             case "stop":
                 self._stop_node(graph, child)
             case "pause":
-                self._pause_node(graph, child)
+                self._pause_by_response(graph, child)
             case "restart":
                 pass
         return "done" if self.crashed else ""
@@ -423,15 +425,17 @@ class Core:
 
         self._at(self.now + poll_ms, look)
 
+    def _pause_by_response(self, graph: Running, node: Node) -> None:
+        if not self._pause_node(graph, node):
+            message = f"{node.full_name} handles no pause: it never leaves PAUSE_REQUESTED."
+            self._hazard(graph, "H5", "goes on", message, node)
+
     def _pause_node(self, graph: Running, node: Node) -> bool:
         """Whether the action is paused, or was not running."""
         if node.state != "RUNNING":
             return True
         self._state(graph, node, "PAUSE_REQUESTED")
         if node.subgraph is not None or not node.call.pauses:
-            what = "is a sub-graph" if node.subgraph is not None else "does not handle a pause"
-            message = f"{node.full_name} {what}: it never gets from PAUSE_REQUESTED to PAUSED."
-            self._hazard(graph, "H5", "goes on", message, node)
             return False
         self._state(graph, node, "PAUSED")
         if node.due_ms is not None:

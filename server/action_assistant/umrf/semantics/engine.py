@@ -283,19 +283,20 @@ class Engine(Core):
         if graph.state != "RUNNING":
             return
         nodes = [node for node in graph.nodes.values() if node.state == "RUNNING"]
-        paused = [self._pause_node(graph, node) for node in nodes]
-        if not all(paused):
+        unpaused = [node for node in nodes if not self._pause_node(graph, node)]
+        if unpaused:
             message = "The pause never completes: the engine answers no command any more."
-            self._lock(graph, "H5", message)
+            self._lock(graph, "H5", message, unpaused[0])
             return
         if not nodes:
             self._graph_state(graph, "PAUSED")
             if then is not None:
                 then()
             return
-        self._busy = True
+        self._busy = graph.pausing = True
 
         def paused_now() -> None:
+            graph.pausing = False
             if graph.state == "RUNNING":
                 self._graph_state(graph, "PAUSED")
             if then is not None:

@@ -140,6 +140,7 @@ class Running:
         self.active = 0
         self.held = 0
         self.stuck = False
+        self.pausing = False
         self.stop_failed = False
         self.has_ghost_ends = False
         self.linked: dict[Node, list[Node] | None] = {}
