@@ -82,7 +82,7 @@ def position(value: object) -> Position | None:
 
 def response(value: object) -> Response | None:
     """One of the six responses."""
-    return cast(Response, value) if isinstance(value, str) and value in RESPONSES else None
+    return value if isinstance(value, str) and value in RESPONSES else None
 
 
 def json_text(value: object) -> str | None:
