@@ -24,7 +24,8 @@ def test_both_processes_answer_and_end_together(tmp_path: Path) -> None:
         family = psutil.Process(product.process("editor").ppid()).children()
         assert len(family) == 2
         assert "editor" not in " ".join(product.process("runner").cmdline()[1:])
-        config = product.editor().get("/api/config").json()
+        with product.editor() as editor:
+            config = editor.get("/api/config").json()
         assert config["mode"] == "local"
         assert config["runner_url"] == product.runner_url
     assert not any(process.is_running() for process in family)
@@ -47,7 +48,7 @@ def test_children_do_not_outlive_a_killed_serve(tmp_path: Path) -> None:
     product = Product(tmp_path / "data")
     product.start()
     children = [product.process("editor"), product.process("runner")]
-    psutil.Process(children[0].ppid()).kill()
+    product.kill_serve()
     eventually(lambda: not any(child.is_running() for child in children))
 
 

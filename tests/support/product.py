@@ -105,6 +105,13 @@ class Product:
         self._process.wait()
         self._process = None
 
+    def kill_serve(self) -> None:
+        """kill -9 of the parent alone."""
+        assert self._process is not None
+        self._process.kill()
+        self._process.wait()
+        self._process = None
+
     def end(self) -> int:
         """Ask it to end; the exit code."""
         if self._process is None:

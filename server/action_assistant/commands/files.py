@@ -5,14 +5,14 @@ import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 
 from action_assistant.errors import CannotStart
 from action_assistant.umrf import check as checks
 from action_assistant.umrf import codec, semantics
-from action_assistant.umrf.facts import PINNED, SIMULATED, facts_for
+from action_assistant.umrf.facts import PINNED, SIMULATED, EngineFacts, facts_for
 from action_assistant.umrf.model import Graph, Problem, Where
 
 _DAY: Final = 24 * 3600.0  # seconds
@@ -109,7 +109,7 @@ def _check(options: argparse.Namespace) -> int:
     return 1 if bad else 0
 
 
-def _verdict(path: Path, facts: "checks.EngineFacts") -> Verdict:
+def _verdict(path: Path, facts: EngineFacts) -> Verdict:
     try:
         reading = codec.read(_text(path))
     except codec.Unreadable as error:
@@ -150,9 +150,9 @@ def _through_document(graph: Graph) -> Graph:
 
     from action_assistant.editor import document
 
-    first: Doc[object] = Doc()
+    first: Doc[Any] = Doc()
     document.fill(first, graph)
-    second: Doc[object] = Doc()
+    second: Doc[Any] = Doc()
     second.apply_update(first.get_update())
     return document.read(second)
 

@@ -1,14 +1,12 @@
 """Commands that are processes: serve, editor, runner; and migrate, which prepares their databases."""
 
 import argparse
-import asyncio
 import logging
 import sys
 from pathlib import Path
 
 from action_assistant import places, settings
 from action_assistant.errors import CannotStart
-from action_assistant.serve import Plan, serve
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -100,6 +98,8 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
 
 
 def _serve(options: argparse.Namespace) -> int:
+    from action_assistant.serve import Plan, serve
+
     if options.port == 65535:
         raise CannotStart("The runner needs the port after --port; 65535 has none.")
     settings.check_host(options.host, settings.more_hosts())
@@ -145,11 +145,12 @@ def _runner(options: argparse.Namespace) -> int:
 
 
 def _migrate(options: argparse.Namespace) -> int:
-    from action_assistant.journal.migrate import migrate
+    from action_assistant.journal.migrate import Branch, migrate
 
     data = settings.writable_folder(options.data.resolve())
     database = options.database or f"sqlite:///{data / 'editor.db'}"
-    for branch, url in (("editor", database), ("runner", f"sqlite:///{data / 'runner.db'}")):
-        revision = asyncio.run(asyncio.to_thread(migrate, url, branch))
+    urls: dict[Branch, str] = {"editor": database, "runner": f"sqlite:///{data / 'runner.db'}"}
+    for branch, url in urls.items():
+        revision = migrate(url, branch)
         print(f"{branch}: {url} is at revision {revision}")
     return 0

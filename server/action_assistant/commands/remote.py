@@ -8,14 +8,16 @@ import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-import httpx
 import msgspec
 
 from action_assistant import places
 from action_assistant.errors import CannotStart
 from action_assistant.web.keys import TOKEN_FILE
+
+if TYPE_CHECKING:  # slow to load, and most commands do not need it
+    import httpx
 
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _POLL: Final = 0.2  # seconds
@@ -83,15 +85,15 @@ def _command(
 class Server:
     """A running editor and its runner, as a program sees them."""
 
-    def __init__(self, editor: httpx.Client, runner_url: str) -> None:
+    def __init__(self, editor: "httpx.Client", runner_url: str) -> None:
         self._client = editor
         self._runner_url = runner_url
 
-    def editor(self, method: str, path: str, **body: Any) -> httpx.Response:
+    def editor(self, method: str, path: str, **body: Any) -> "httpx.Response":
         """Ask the editor; a refusal becomes one sentence."""
         return _asked(self._client, method, path, **body)
 
-    def runner(self, method: str, path: str, **body: Any) -> httpx.Response:
+    def runner(self, method: str, path: str, **body: Any) -> "httpx.Response":
         """Ask the runner."""
         return _asked(self._client, method, self._runner_url + path, **body)
 
@@ -115,7 +117,9 @@ class _No(Exception):
     """The answer is no."""
 
 
-def _asked(client: httpx.Client, method: str, path: str, **body: Any) -> httpx.Response:
+def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "httpx.Response":
+    import httpx
+
     try:
         answer = client.request(method, path, **body)
     except httpx.HTTPError as error:
@@ -128,7 +132,7 @@ def _asked(client: httpx.Client, method: str, path: str, **body: Any) -> httpx.R
     return answer
 
 
-def _sentence(answer: httpx.Response) -> str:
+def _sentence(answer: "httpx.Response") -> str:
     try:
         problem = answer.json()
         place = (problem.get("where") or {}).get("path", "")
@@ -152,6 +156,8 @@ def _token(data: Path) -> str:
 
 @contextmanager
 def _server(options: argparse.Namespace) -> Iterator[Server]:
+    import httpx
+
     url = options.url or os.environ.get("ACTION_ASSISTANT_URL") or "http://127.0.0.1:8000"
     headers = {"authorization": f"Bearer {_token(options.data)}"}
     with httpx.Client(base_url=url, headers=headers, timeout=30, trust_env=False) as client:
