@@ -9,7 +9,7 @@ from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.values import check_values
 from action_assistant.umrf.codec import Reading
 from action_assistant.umrf.facts import PINNED, EngineFacts
-from action_assistant.umrf.model import Graph, Problem, Signature, Where
+from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem, Signature, Where
 
 #: Codes of what makes the engine's parser refuse a text.
 REFUSED: Final = frozenset(
@@ -42,6 +42,23 @@ def check_reading(
     the graph in it."""
     problems = [*reading.problems, *_carried_states(reading), *check(reading.graph, library, facts)]
     return sorted(problems, key=lambda problem: problem.severity)
+
+
+def refused_by_parser(reading: Reading) -> list[Problem]:
+    """Why the engine's parser refuses a file as it stands; nothing of such a file can run."""
+    ends = {ENTRY, EXIT}
+    at_ends = {
+        f"{r.parent}>{r.child}" for r in reading.graph.relations if {r.parent, r.child} & ends
+    }
+    return [
+        problem
+        for problem in check_reading(reading)
+        if problem.severity == "error"
+        and (
+            problem.code in REFUSED
+            or (problem.code == "ghost" and (problem.where.relation or "").split(";")[0] in at_ends)
+        )
+    ]
 
 
 def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ()) -> list[Problem]:

@@ -251,6 +251,8 @@ def _check_exit(subject: Subject, reach: Reach) -> None:
         )
         subject.report("no-exit", "warning", message, member="/graph_exit")
         return
+    if any(problem.code == "H8" for problem in subject.problems):
+        return  # why no parent of the exit ends is said already
     for relation in exits:
         if relation.required and not reach.reports.get(relation.parent):
             message = (

@@ -1,0 +1,312 @@
+"""What `check` says about graphs."""
+
+import json
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+
+from action_assistant.umrf.check import (
+    STRUCTURAL,
+    blocking,
+    check,
+    check_reading,
+    refused_by_parser,
+)
+from action_assistant.umrf.codec import Unreadable, read
+from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.model import Graph, Problem, Signature
+from action_assistant.umrf.semantics import Hazard, NodeState, simulate
+from strategies import graphs
+
+ROOT = Path(__file__).parents[2]
+SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf"
+SAFE = ["on_error -> ignore"]
+
+
+def lines(path: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def action(name: str, *, parents: Any = (), children: Any = (), **fields: Any) -> dict[str, Any]:
+    """An action; parents and children by name, or as whole items."""
+    sides = {
+        "parents": [{"name": p, "conditions": SAFE} if isinstance(p, str) else p for p in parents],
+        "children": [{"name": c} if isinstance(c, str) else c for c in children],
+    }
+    return {"name": name, "type": "sync"} | sides | fields
+
+
+def file(*actions: dict[str, Any], entry: Any = ("A",), exits: Any = ("B",), **fields: Any) -> Any:
+    """A graph file; ends by name, or as whole items."""
+    ends = {
+        "graph_entry": [{"name": e} if isinstance(e, str) else e for e in entry],
+        "graph_exit": [
+            {"name": e, "conditions": ["on_error -> run"]} if isinstance(e, str) else e
+            for e in exits
+        ],
+    }
+    return {"graph_name": "g", "actions": list(actions)} | ends | fields
+
+
+def problems(value: Any, library: dict[str, Signature] | None = None) -> list[Problem]:
+    return check_reading(read(json.dumps(value)), library)
+
+
+def found(value: Any, library: dict[str, Signature] | None = None) -> dict[str, str]:
+    """Codes with their severity."""
+    return {problem.code: problem.severity for problem in problems(value, library)}
+
+
+A = action("A", children=["B"])
+B = action("B", parents=["A"])
+TEXT = {"pvf_type": "string"}
+
+
+def test_a_sound_graph_has_no_problems() -> None:
+    assert problems(file(A, B)) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "code", "severity"),
+    [
+        (file(A, B, graph_name=""), "graph-name-empty", "warning"),
+        (file(A, B, graph_name=5), "value-type", "error"),
+        (file(A, B, graph_description=[]), "value-type", "error"),
+        (file(A | {"name": ""}, B, entry=[]), "name-empty", "error"),
+        (file(A | {"type": ""}, B), "type-empty", "error"),
+        (file(A | {"type": "magic"}, B), "type-unknown", "warning"),
+        (file(A | {"actor": 5}, B), "value-type", "error"),
+        (file(A | {"instance_id": 1.7}, B), "instance-id-cut", "warning"),
+        (file(A | {"instance_id": -1}, B), "instance-id", "error"),
+        (file(A | {"instance_id": 70000}, B), "instance-id", "error"),
+        (file(A | {"parents": None}, B), "value-type", "error"),
+        (file(A | {"name": "My Action"}, B, entry=["My Action"]), "name-class", "warning"),
+        (file(A | {"name": "graph_entry"}, B), "H6", "error"),
+        (file(A, B, B), "H6", "error"),
+        (file(A, B, entry=["Z"]), "ghost", "error"),
+        (file(A | {"children": [{"name": "B"}, {"name": "Z"}]}, B), "ghost", "error"),
+        (file(A | {"input_parameters": {"p": TEXT | {"pvf_value": 5}}}, B), "parameter-illegal", "error"),
+        (file(A | {"input_parameters": {"p": 5}}, B), "parameter-illegal", "error"),
+        (file(A | {"input_parameters": []}, B), "value-type", "error"),
+        (file(A | {"output_parameters": {"a:b": TEXT}}, B), "parameter-name", "warning"),
+        (
+            file(A | {"input_parameters": {"p": TEXT | {"pvf_value": "z", "pvf_allowed_values": ["a"]}}}, B),
+            "parameter-allowed", "warning",
+        ),
+        (file(A, action("B", parents=[{"name": "A", "conditions": ["on_true -> skip"]}])), "condition-illegal", "error"),
+        (file(A, action("B", parents=[{"name": "A", "required": "true"}])), "value-type", "error"),
+        (file(action("A", children=[{"name": "B", "remap": {"a": "b"}}]), B), "remap-illegal", "error"),
+        (file(action("A", children=[{"name": "B", "conditions": []}]), B), "wrong-side", "warning"),
+        (file(A, action("B", parents=["A", "A"])), "relation-repeated", "warning"),
+        (file(A | {"state": "FINISHED"}, B), "H1", "error"),
+        (file(A, action("B")), "H2", "error"),
+        (file(action("A"), B), "H2b", "error"),
+        (file(A, action("B", parents=[{"name": "A"}])), "H3", "warning"),
+        (file(A, action("B", parents=["A"]), action("C")), "unreachable", "warning"),
+        (file(A, B, entry=[]), "no-entry", "error"),
+        (file(A, B, exits=[]), "no-exit", "warning"),
+        (file(entry=[], exits=[]), "empty", "warning"),
+        (file(A | {"input_parameters": {"p": TEXT}}, B), "H7", "error"),
+        (file(A, B | {"input_parameters": {"p": TEXT}}), "H8", "error"),
+        (file(A | {"actor": "x"}, B | {"actor": "y"}), "actors", "error"),
+        (file(A, action("B", parents=[{"name": "A", "conditions": ["on_true -> restart", *SAFE]}])), "restart", "warning"),
+        (file(A, action("B", parents=[{"name": "A", "conditions": ["on_true -> pause", *SAFE]}])), "H5", "warning"),
+    ],
+)  # fmt: skip
+def test_each_mistake_has_its_code(value: Any, code: str, severity: str) -> None:
+    assert found(value).get(code) == severity
+
+
+def test_a_way_back_that_is_required_is_named_and_can_be_mended() -> None:
+    loop = file(
+        action("A", parents=["B"], children=["B"]),
+        action("B", parents=["A"], children=["A"]),
+    )
+    problem = next(p for p in problems(loop) if p.code == "H8")
+    assert (problem.severity, problem.fix) == ("error", "not-required")
+    assert problem.where.path == "/actions/0/parents/0/required"
+    assert problem.where.relation == "a2>a1"
+    assert "for ever" in problem.message
+    loop["actions"][0]["parents"][0]["required"] = False
+    assert "H8" not in found(loop)
+
+
+def test_a_join_of_a_branch_that_never_runs_never_fires() -> None:
+    graph = file(
+        action("A", children=["C"]),
+        action("B", children=["C"]),
+        action("C", parents=["A", "B"]),
+        exits=["C"],
+    )
+    assert found(graph) == {"H8": "error", "unreachable": "warning"}
+    message = next(p.message for p in problems(graph) if p.code == "H8")
+    assert "C_0 waits for B_0" in message
+
+
+def test_a_spontaneous_action_before_a_loop_is_an_error() -> None:
+    back = {"name": "C", "required": False, "conditions": SAFE}
+    graph = file(
+        action("A", children=["B"], type="spontaneous"),
+        action("B", parents=["A", back], children=["C"]),
+        action("C", parents=["B"], children=["B"]),
+        exits=["C"],
+    )
+    assert found(graph)["H9"] == "error"
+
+
+def test_a_graph_that_may_finish_while_others_run_is_warned_of() -> None:
+    graph = file(
+        action("A"), action("B"), entry=["A", "B"],
+        exits=[{"name": "A", "required": False}, {"name": "B", "required": False}],
+    )  # fmt: skip
+    assert found(graph)["H12"] == "warning"
+
+
+def test_renaming_what_does_not_exist_is_an_error_of_that_relation() -> None:
+    remap = [{"from": "nope", "to": "p"}]
+    graph = file(action("A", children=[{"name": "B", "remap": remap}]), B)
+    problem = next(p for p in problems(graph) if p.code == "H2")
+    assert problem.where.path == "/actions/0/children/0/remap"
+    assert "aborts" in problem.message
+
+
+def test_renaming_that_changes_the_order_of_outputs_loses_one() -> None:
+    remap = [{"from": "alpha", "to": "zeta"}]
+    outputs = {"alpha": TEXT, "beta": TEXT}
+    graph = file(
+        action("A", children=[{"name": "B", "remap": remap}], output_parameters=outputs),
+        B | {"input_parameters": {"beta": TEXT, "zeta": TEXT}},
+    )
+    assert found(graph)["remap-order"] == "error"
+    fits = file(
+        action("A", children=[{"name": "B", "remap": [{"from": "alpha", "to": "aleph"}]}],
+               output_parameters=outputs),
+        B | {"input_parameters": {"beta": TEXT, "aleph": TEXT}},
+    )  # fmt: skip
+    assert problems(fits) == []
+
+
+def test_a_library_knows_names_types_and_what_is_optional() -> None:
+    known = {"A": Signature(inputs={"p": "string"}, optional=frozenset({"p"})), "B": Signature()}
+    assert found(file(A | {"input_parameters": {"p": TEXT}}, B), known) == {}
+    assert found(file(A, B), known) == {"signature": "error"}
+    number = A | {"input_parameters": {"p": {"pvf_type": "number", "pvf_value": 1}}}
+    assert found(file(number, B), known) == {"parameter-type": "error"}
+    assert found(file(A, B), {"A": Signature()}) == {"unknown-action": "warning"}
+
+
+def test_structural_errors_block_whatever_is_overridden() -> None:
+    twice = problems(file(A, B, B))
+    assert {p.code for p in blocking(twice, overridden=["H6", "H2b"])} == {"H6"}
+    silent = problems(file(A | {"input_parameters": {"p": TEXT}}, B))
+    assert blocking(silent, overridden=["H7"]) == []
+    assert {p.code for p in blocking(silent)} == {"H7"}
+
+
+def test_facts_decide_which_hazards_there_are() -> None:
+    fixed = msgspec.structs.replace(PINNED, bypass_fixed=True, synchronises=True)
+    value = file(A | {"actor": "x"}, action("B", parents=[{"name": "A"}]) | {"actor": "y"})
+    graph = read(json.dumps(value)).graph
+    assert {p.code for p in check(graph)} == {"H3", "actors"}
+    assert check(graph, None, fixed) == []
+
+
+def test_errors_come_first_and_every_path_leads_somewhere() -> None:
+    found_ = problems(file(A, B, B, action("C"), exits=[]))
+    severities = [problem.severity for problem in found_]
+    assert severities == sorted(severities)
+    assert all(problem.where.path.startswith("/") for problem in found_ if problem.where.aid)
+
+
+@given(graphs())
+@settings(max_examples=150)
+def test_any_graph_is_checked(graph: Graph) -> None:
+    for problem in check(graph):
+        assert problem.message
+        assert problem.severity in ("error", "warning")
+
+
+@given(graphs())
+@settings(max_examples=150)
+def test_what_check_says_can_never_run_does_not_run(graph: Graph) -> None:
+    never = {
+        problem.where.aid
+        for problem in check(graph)
+        if problem.code in ("unreachable", "never-run") and problem.where.aid
+    }
+    names = {action.full_name for action in graph.actions if action.key in never}
+    for trace in simulate(graph, max_events=500):
+        if isinstance(trace, Hazard) and trace.effect == "crash":
+            return
+        assert not (isinstance(trace, NodeState) and trace.node in names)
+
+
+def test_ten_thousand_actions_are_checked_in_seconds() -> None:
+    names = [f"A{i}" for i in range(10_000)]
+    actions = [
+        action(name, parents=names[i - 1 : i], children=names[i + 1 : i + 2])
+        for i, name in enumerate(names)
+    ]
+    graph = read(json.dumps(file(*actions, entry=names[:1], exits=names[-1:]))).graph
+    started = time.perf_counter()
+    assert check(graph) == []
+    assert time.perf_counter() - started < 5
+
+
+# The engine's own verdicts
+
+
+VALIDATION = [case for case in lines(SHARED / "traces" / "validation.jsonl")]  # noqa: C416
+
+
+@pytest.mark.skipif(not VALIDATION, reason=f"there are no verdicts in {SHARED}")
+def test_we_refuse_exactly_what_the_engines_parser_refuses() -> None:
+    differing = []
+    for case in VALIDATION:
+        if case["case"].startswith("action:"):
+            continue
+        try:
+            refused = [p for p in check_reading(read(case["input"])) if p.code in STRUCTURAL]
+        except Unreadable:
+            refused = [Problem(code="unreadable", severity="error", where=None, message="")]  # type: ignore[arg-type]
+        if bool([p for p in refused if p.severity == "error"]) == case["accepted"]:
+            differing.append(case["case"])
+    assert differing == []
+
+
+def accepted() -> list[Path]:
+    verdicts = lines(SHARED / "corpus" / "verdicts.jsonl")
+    return [
+        SHARED / "corpus" / v["file"]
+        for v in verdicts
+        if v["accepted"] and v["file"].startswith("graphs/")
+    ]
+
+
+@pytest.mark.skipif(not accepted(), reason=f"there is no corpus in {SHARED}")
+def test_real_graphs_that_the_engine_reads_are_blocked_for_what_it_does_then() -> None:
+    """Only for hazards that its source or a recording shows, never for what it would refuse."""
+    certain = {"H1", "H2", "H2b", "H7", "H8", "actors"}
+    for path in accepted():
+        reading = read(path.read_bytes())
+        assert refused_by_parser(reading) == []
+        assert {p.code for p in check_reading(reading) if p.severity == "error"} <= certain
+
+
+@pytest.mark.skipif(not VALIDATION, reason=f"there is no corpus in {SHARED}")
+def test_graphs_that_the_engine_ran_are_not_blocked() -> None:
+    ran = [
+        "semantics_test_1", "semantics_test_2", "semantics_test_3", "semantics_test_4",
+        "semantics_test_5", "semantics_test_6", "semantics_test_7", "semantics_test_8",
+        "semantics_test_9", "external_changes_test_0", "external_changes_test_1",
+        "join_and", "join_or_retrigger", "fork_join_diamond", "cycle_countdown", "sub_seq",
+        "error_handler", "spont_slow_child", "param_override", "param_allowed_ok",
+    ]  # fmt: skip
+    for name in ran:
+        reading = read((SHARED / "traces" / f"{name}.graph.json").read_bytes())
+        assert blocking(check_reading(reading)) == [], name
