@@ -1,4 +1,4 @@
-/** One's own name, and light or dark. Asks for the name once. */
+/** One's own name, and light or dark. */
 import {
   Avatar,
   Button,
@@ -26,15 +26,13 @@ const schemes = [
 
 export function AccountMenu() {
   const { person, rename } = usePerson();
-  const [asked, setAsked] = useState(() => rememberedName() !== "");
-  const [open, setOpen] = useState(!asked);
+  const [open, setOpen] = useState(false);
   const [name, setName] = useState(rememberedName() || person.name);
   const [problem, setProblem] = useState("");
   const { colorScheme, setColorScheme } = useMantineColorScheme();
   const save = async () => {
     try {
       await rename(name.trim());
-      setAsked(true);
       setOpen(false);
     } catch (error) {
       setProblem(sentence(error));
@@ -63,7 +61,6 @@ export function AccountMenu() {
           }}
         >
           <Stack gap="sm">
-            {!asked && <Text fw={600}>What should others see you as?</Text>}
             <Group gap="sm" align="end" wrap="nowrap">
               <TextInput
                 label="Your name"
@@ -74,10 +71,7 @@ export function AccountMenu() {
                 data-autofocus
                 flex={1}
               />
-              <Button
-                type="submit"
-                disabled={name.trim() === "" || (asked && name === person.name)}
-              >
+              <Button type="submit" disabled={name.trim() === "" || name === person.name}>
                 Save
               </Button>
             </Group>

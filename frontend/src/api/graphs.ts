@@ -104,6 +104,11 @@ export function deleteGraph(id: string): Promise<void> {
   return ask(`/api/graphs/${id}`, { method: "DELETE" });
 }
 
+/** Brings a deleted graph back. */
+export function recoverGraph(id: string): Promise<unknown> {
+  return ask(`/api/graphs/${id}/recover`, { method: "POST" });
+}
+
 export function graphText(id: string): Promise<string> {
   return askText(`/api/graphs/${id}/umrf`);
 }

@@ -3,6 +3,7 @@ import { MantineProvider } from "@mantine/core";
 import { Notifications } from "@mantine/notifications";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { Route, Switch } from "wouter";
+import { AskName } from "../account/ask-name";
 import { Gate } from "../account/gate";
 import { Refusal } from "../api/http";
 import { LiveProvider } from "../api/use-live";
@@ -39,6 +40,7 @@ export function App() {
                 <Route path="/runs/:id">{({ id }) => <RunScreen key={id} id={id} />}</Route>
                 <Route component={Lost} />
               </Switch>
+              <AskName />
               <StopNotice />
               <CarriedGhost carrier={actionCarrier} />
             </DropFiles>

@@ -18,6 +18,7 @@ import { Details } from "./details/details";
 import style from "./editor.module.css";
 import { Outline } from "./outline";
 import { People } from "./people";
+import { ProblemWord } from "./problem-word";
 import { QuickAdd } from "./quick-add";
 import { SavedWord } from "./saved-word";
 import { Stage } from "./stage";
@@ -157,6 +158,7 @@ export function Editor(props: Props) {
         status: (
           <>
             <SavedWord />
+            <ProblemWord problems={problems} />
             {wide && props.status(shown)}
           </>
         ),

@@ -5,7 +5,7 @@ import type { Progress } from "../api/progress";
 import { relationId } from "../graph/layout";
 import { type Action, ENTRY, type Graph, type Key } from "../graph/model";
 import { answersOf } from "../ui/canvas/elements";
-import { cardLines } from "../ui/canvas/value-text";
+import { cardLines, lineText } from "../ui/canvas/value-text";
 import { Empty } from "../ui/empty";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../ui/outcome";
 import { robotColor } from "../ui/robot";
@@ -69,7 +69,7 @@ function Item({ action, progress }: { action: Action; progress: Progress | null 
         </span>
         <span className={style.sub}>
           {action.actor || "any robot"}
-          {line && ` · ${line}`}
+          {line && ` · ${lineText(line)}`}
         </span>
       </button>
       <div className={style.arrows}>

@@ -11,7 +11,13 @@ import {
 } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { Link } from "wouter";
-import { deleteGraph, type GraphSummary, refreshGraphs, useGraphs } from "../api/graphs";
+import {
+  deleteGraph,
+  type GraphSummary,
+  recoverGraph,
+  refreshGraphs,
+  useGraphs,
+} from "../api/graphs";
 import { sentence } from "../api/http";
 import { endWords, runWord } from "../api/progress";
 import { newestRun, useLive } from "../api/use-live";
@@ -40,9 +46,29 @@ function Problems({ graph }: { graph: GraphSummary }) {
 
 function CardMenu({ graph }: { graph: GraphSummary }) {
   const client = useQueryClient();
+  const bringBack = async (notice: string) => {
+    notifications.hide(notice);
+    try {
+      await recoverGraph(graph.id);
+    } catch (error) {
+      notifications.show({ color: "red", title: "Not brought back", message: sentence(error) });
+    }
+    await refreshGraphs(client);
+  };
   const remove = async () => {
     try {
       await deleteGraph(graph.id);
+      const id = `deleted-${graph.id}`;
+      notifications.show({
+        id,
+        title: `${graph.name} is deleted`,
+        message: (
+          <Button size="compact-sm" mt="xs" onClick={() => void bringBack(id)}>
+            Bring it back
+          </Button>
+        ),
+        autoClose: 12_000,
+      });
     } catch (error) {
       notifications.show({ color: "red", title: "Not deleted", message: sentence(error) });
     }

@@ -1,8 +1,7 @@
 /** The actions that can be added: what the graphs of this server use, newest signature first. */
-import { useQueries, useQuery } from "@tanstack/react-query";
+import { useQueries } from "@tanstack/react-query";
 import { useMemo } from "react";
 import { type GraphSummary, graphText, useGraphs } from "../api/graphs";
-import { ask } from "../api/http";
 import type { NewAction } from "../graph/edit";
 import type { Parameter } from "../graph/model";
 import { fromUmrf } from "../ui/canvas/from-umrf";
@@ -53,26 +52,10 @@ export function collect(graphs: readonly unknown[]): KnownAction[] {
     .sort((a, b) => a.template.name.localeCompare(b.template.name));
 }
 
-function useExamples() {
-  return useQuery({
-    queryKey: ["examples"],
-    queryFn: ({ signal }) => ask<unknown>("/api/examples", { signal }),
-    staleTime: Number.POSITIVE_INFINITY,
-    retry: false,
-  });
-}
-
-function umrfOf(example: unknown): unknown {
-  return typeof example === "object" && example !== null && "umrf" in example
-    ? example.umrf
-    : example;
-}
-
 const byAge = (a: GraphSummary, b: GraphSummary) => b.updated_at.localeCompare(a.updated_at);
 
 export function useKnownActions(): { actions: KnownAction[]; ready: boolean } {
   const graphs = useGraphs();
-  const examples = useExamples();
   const newest = useMemo(
     () => [...(graphs.data ?? [])].sort(byAge).slice(0, MOST_GRAPHS),
     [graphs.data],
@@ -86,11 +69,7 @@ export function useKnownActions(): { actions: KnownAction[]; ready: boolean } {
     })),
     combine: (results) => results.map((result) => result.data),
   });
-  const actions = useMemo(() => {
-    const own = texts.filter((umrf) => umrf !== undefined);
-    const shipped = Array.isArray(examples.data) ? examples.data.map(umrfOf) : [];
-    return collect([...own, ...shipped]);
-  }, [texts, examples.data]);
+  const actions = useMemo(() => collect(texts.filter((umrf) => umrf !== undefined)), [texts]);
   return { actions, ready: !graphs.isPending };
 }
 

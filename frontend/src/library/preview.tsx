@@ -120,5 +120,5 @@ export function Preview({ graph, seq }: { graph: string; seq: number }) {
     retry: false,
   });
   const drawn = useMemo(() => (umrf.data === undefined ? null : fromUmrf(umrf.data)), [umrf.data]);
-  return drawn === null ? null : <Miniature graph={drawn} />;
+  return drawn === null || drawn.actions.length === 0 ? null : <Miniature graph={drawn} />;
 }

@@ -9,7 +9,7 @@ import { StateWord } from "../state-word";
 import { duration, stopwatch, useNow } from "../when";
 import style from "./action-card.module.css";
 import type { CardNode, ProblemCount } from "./elements";
-import { cardLines } from "./value-text";
+import { cardLines, lineText } from "./value-text";
 
 function ProgressLine({ progress }: { progress: Progress | null }) {
   const going = progress?.since != null;
@@ -76,8 +76,12 @@ export const ActionCard = memo(function ActionCard({
       {lines.length > 0 && (
         <div className={style.lines}>
           {lines.map((line) => (
-            <div key={line} title={line}>
-              {line}
+            <div
+              key={line.name}
+              title={lineText(line)}
+              data-open={line.value === null || undefined}
+            >
+              {lineText(line)}
             </div>
           ))}
         </div>

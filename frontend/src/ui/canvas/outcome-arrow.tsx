@@ -11,15 +11,20 @@ interface Line {
   y: number;
 }
 
-/** Round the side for an arrow that leads back up, so that loops can be told from the way down. */
+const ACROSS = 240; // px between handles of cards that stand side by side
+
+/** Up beside the target, so that loops and ways across can be told from the way down. */
 function backwards(sx: number, sy: number, tx: number, ty: number): Line {
-  const side = Math.max(sx, tx) + 150;
+  const beside = Math.abs(tx - sx) > ACROSS;
+  const side = beside ? tx - Math.sign(tx - sx) * 132 : Math.max(sx, tx) + 150;
   const [low, high] = [sy + 34, ty - 34];
-  const r = 18;
+  const out = Math.sign(side - sx) || 1;
+  const back = Math.sign(tx - side) || -1;
+  const r = Math.min(18, Math.abs(side - sx) / 2, (low - high) / 2);
   const path =
-    `M${sx} ${sy}V${low - r}Q${sx} ${low} ${sx + r} ${low}H${side - r}` +
-    `Q${side} ${low} ${side} ${low - r}V${high + r}Q${side} ${high} ${side - r} ${high}` +
-    `H${tx + r}Q${tx} ${high} ${tx} ${high + r}V${ty}`;
+    `M${sx} ${sy}V${low - r}Q${sx} ${low} ${sx + out * r} ${low}H${side - out * r}` +
+    `Q${side} ${low} ${side} ${low - r}V${high + r}Q${side} ${high} ${side + back * r} ${high}` +
+    `H${tx - back * r}Q${tx} ${high} ${tx} ${high + r}V${ty}`;
   return { path, x: side, y: (low + high) / 2 };
 }
 

@@ -16,13 +16,23 @@ export function valueText(parameter: Parameter): string | null {
   return text.startsWith("{") ? memberText(text, "pvf_value") : text;
 }
 
-/** The first inputs that say something, as `name = value`. */
-export function cardLines(inputs: readonly Parameter[], most: number): string[] {
-  const lines: string[] = [];
-  for (const input of inputs) {
-    if (lines.length === most) break;
-    const value = valueText(input);
-    if (value !== null) lines.push(`${pathWords(input.path)} = ${value.replace(/\s+/g, " ")}`);
-  }
-  return lines;
+export interface CardLine {
+  readonly name: string;
+  /** Null: no value of its own. */
+  readonly value: string | null;
+}
+
+/** The inputs that matter most: those with a value, then those that still wait for one. */
+export function cardLines(inputs: readonly Parameter[], most: number): CardLine[] {
+  const lines = inputs.map((input) => ({
+    name: pathWords(input.path),
+    value: valueText(input)?.replace(/\s+/g, " ") ?? null,
+  }));
+  const given = lines.filter((line) => line.value !== null);
+  const open = lines.filter((line) => line.value === null);
+  return [...given, ...open].slice(0, most);
+}
+
+export function lineText({ name, value }: CardLine): string {
+  return value === null ? `${name} = ?` : `${name} = ${value}`;
 }
