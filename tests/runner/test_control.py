@@ -293,6 +293,23 @@ async def test_an_engine_that_holds_a_new_life_proves_nothing() -> None:
 
 
 @virtual
+async def test_a_start_that_got_lost_is_unknown_is_not_repeated_and_is_given_up_after_a_stop() -> (
+    None
+):
+    robot = Robot(engine())
+    robot.start_loss = 1.0
+    world = World({"David": robot})
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await anyio.sleep(120)
+        assert control.open[run.id].run.state == "unknown"
+        await control.stop(run.id, ANN)
+        assert await ended(control, run.id) == "lost"
+    assert len(robot.starts) == 1
+    assert world.ledger.history(run.id).proof_at is None
+
+
+@virtual
 async def test_stopping_everything_catches_a_start_that_is_being_stored() -> None:
     robot = Robot(engine())
     world = World({"David": robot})

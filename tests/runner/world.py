@@ -7,12 +7,13 @@ import itertools
 import random
 import selectors
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 import anyio
 import anyio.lowlevel
 import msgspec
+from anyio.abc import TaskGroup
 from sqlalchemy import Row, Select, StaticPool, create_engine
 
 from action_assistant.errors import Conflict, Unavailable
@@ -23,10 +24,11 @@ from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.events import Author, RunEvent, decode
-from action_assistant.runner.links.port import Answer, Link, Order, Report
+from action_assistant.runner.links.port import Answer, EngineRefused, Link, NoAnswer, Order, Report
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run, replay
+from action_assistant.runner.seen import Snapshot
 from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import SIMULATED
@@ -168,7 +170,11 @@ class MemoryLedger:
 
 
 class Robot:
-    """An engine that outlives the runner, behind a link that loses, delays and drops things."""
+    """An engine that outlives the runner, behind a link that loses, delays and drops things.
+
+    As with real ones, a graph is shown RUNNING before its first action is (`blind` seconds), answers
+    may be old when they come, and a start may arrive late.
+    """
 
     simulated = False
     pauses = False
@@ -177,15 +183,36 @@ class Robot:
         self.engine = engine
         self.chance = chance or random.Random(0)
         self.loss = 0.0
+        self.start_loss = 0.0
+        self.start_delay = 0.0
+        self.blind = 0.0
+        self.old = 0.01
         self.silent = False
+        self.tasks: TaskGroup | None = None  # for messages under way
         self.starts: list[Order] = []
         self.stops: list[tuple[float, str]] = []
         self.delivered = 0
+        self._began: dict[str, float] = {}
 
     async def start(self, order: Order) -> None:
-        """One message, which arrives."""
+        """One message, which arrives, unless it gets lost."""
         self.starts.append(order)
+        if self.chance.random() < self.start_loss:
+            return
+        if self.start_delay and self.tasks is not None:
+            self.tasks.start_soon(self._late, order, self.engine)
+        else:
+            await self._begin(order)
+
+    async def _begin(self, order: Order) -> None:
+        self._began[order.run] = anyio.current_time()
         await self.engine.start(order)
+
+    async def _late(self, order: Order, engine: SimulatorLink) -> None:
+        await anyio.sleep(self.start_delay)
+        if engine is self.engine:  # the message dies with the engine it went to
+            with suppress(EngineRefused, NoAnswer):
+                await self._begin(order)
 
     async def stop(self, graph_name: str) -> None:
         """One message, which may be lost."""
@@ -203,11 +230,20 @@ class Robot:
         await self.engine.resume(graph_name, continue_from)
 
     async def get(self) -> Answer:
-        """May be lost, like any message."""
+        """May be lost, like any message; may be old when it comes."""
         if self.silent or self.chance.random() < self.loss:
             await anyio.sleep_forever()
-        await anyio.sleep(self.chance.random() * 0.01)
-        return await self.engine.get()
+        answer = await self.engine.get()
+        await anyio.sleep(self.chance.random() * self.old)
+        shown = tuple(self._blinded(each, answer) for each in answer.graphs)
+        return msgspec.structs.replace(answer, graphs=shown)
+
+    def _blinded(self, shown: Snapshot, answer: Answer) -> Snapshot:
+        began = self._began.get(shown.run or "", -1e9)
+        if (answer.at - EPOCH) / 1e6 >= began + self.blind:
+            return shown
+        nodes = dict.fromkeys(shown.nodes, "UNINITIALIZED")
+        return msgspec.structs.replace(shown, nodes=nodes)
 
     async def run(self) -> None:
         """The engine lives by itself."""
@@ -291,6 +327,21 @@ def carousel(name: str = "carousel") -> Graph:
     back = Relation(parent=second, child=first, conditions=GO_ON, required=False)
     kept = tuple(each for each in line.relations if each.child != EXIT)
     return msgspec.structs.replace(line, relations=(*kept, back))
+
+
+def two_ends(name: str = "two_ends") -> Graph:
+    """`Work_0` ends the graph while `Work_1` may still run (H12)."""
+    line = sequence(name, 2)
+    first, second = (action.key for action in line.actions)
+    entries = tuple(
+        Relation(parent=ENTRY, child=child, conditions=ENTRY_CONDITIONS)
+        for child in (first, second)
+    )
+    bypass = Conditions(on_true="bypass", on_false="bypass", on_error="bypass")
+    exits = tuple(
+        Relation(parent=parent, child=EXIT, conditions=bypass) for parent in (first, second)
+    )
+    return msgspec.structs.replace(line, relations=(*entries, *exits))
 
 
 async def until(true: Callable[[], bool], patience: float = 60.0) -> None:

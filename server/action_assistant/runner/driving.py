@@ -52,6 +52,7 @@ _STOP_POLL_S: Final = 0.1
 _GET_S: Final = 1.0  # an engine that is not busy answers within milliseconds
 _SILENT_S: Final = 3.0
 _APPEAR_S: Final = 3.0  # until a started graph must show in answers
+_GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun
 _UNCONFIRMED_S: Final = 2.0
 _REST_S: Final = 1.0  # a graph that never began is believed only after it was seen so for this long
 _TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
@@ -325,6 +326,8 @@ class OpenRun:
             return
         if self.run.incarnation is None:
             self._end("lost", "The runner ended before it could note whether the start was sent.")
+        elif self.run.desired == "stopped" and waited >= _GIVEN_UP_S:
+            self._end("lost", "The engine answers but has never shown this run.")
         elif self.run.unknown_since is None:
             since = answer.at - round(waited * 1e6)
             self.tell(Silent(answer.at, since, "The engine answers but does not show this run."))
