@@ -2,6 +2,12 @@
 
 from typing import Final
 
+from action_assistant.umrf.dialects_old import (
+    from_action,
+    from_actions,
+    from_umrf_actions,
+    items_of,
+)
 from action_assistant.umrf.jsontext import Json, Number
 from action_assistant.umrf.model import Problem, Where
 from action_assistant.umrf.relations import MAX_REFERRED_ID, whole_of
@@ -9,23 +15,55 @@ from action_assistant.umrf.relations import MAX_REFERRED_ID, whole_of
 Translation = tuple[dict[str, Json], tuple[str, ...], tuple[Problem, ...]]
 
 _MARKS: Final = ("graph_name", "actions", "umrf_actions", "graph_entry", "graph_exit")
+_ACTION_MARKS: Final = ("name", "type", "effect", "suffix", "package_name", "input_parameters")
 
 
 def dialect_of(file: dict[str, Json]) -> str | None:
-    """The name of the dialect (`D3`, `D3-designer`, …), or None for what is no graph."""
+    """The name of the dialect, or None for what is no UMRF.
+
+    `D3` current graphs, `D3-designer` with entry and exit as objects, `D2` of 2023, `D1` with
+    `umrf_actions`, `D1'` the same from a language model, `D3-action` and `D0` single actions.
+    """
     if not any(mark in file for mark in _MARKS):
-        return None
+        return _action_dialect(file)
+    if "umrf_actions" in file and "actions" not in file:
+        told = {"effect", "type", "package_name"}
+        full = any(told & action.keys() for action in items_of(file, "umrf_actions"))
+        return "D1" if full else "D1'"
     ends = [file.get("graph_entry"), file.get("graph_exit")]
     if any(isinstance(end, dict) and isinstance(end.get("actions"), list) for end in ends):
         return "D3-designer"
-    return "D3"
+    actions = list(items_of(file, "actions"))
+    no_ends = len(actions) > 1 and not file.keys() & {"graph_entry", "graph_exit"}
+    return "D2" if no_ends or any(map(_is_d2, actions)) else "D3"
+
+
+def _action_dialect(file: dict[str, Json]) -> str | None:
+    if sum(mark in file for mark in _ACTION_MARKS) < 2:
+        return None
+    return "D3-action" if "type" in file else "D0"
+
+
+def _is_d2(action: dict[str, Json]) -> bool:
+    return isinstance(action.get("state"), Number) or any(
+        "condition" in parent for parent in items_of(action, "parents")
+    )
 
 
 def translated(file: dict[str, Json], dialect: str) -> Translation:
     """The file in D3, notes on what was translated, and why the engine refuses it as it stands."""
-    if dialect == "D3-designer":
-        return _from_designer(file)
-    return file, (), ()
+    match dialect:
+        case "D3-designer":
+            return _from_designer(file)
+        case "D2":
+            old = from_actions(file)
+        case "D1" | "D1'":
+            old = from_umrf_actions(file, shallow=dialect == "D1'")
+        case "D0" | "D3-action":
+            old = from_action(file)
+        case _:
+            return file, (), ()
+    return old.file, (*old.told(), *renumber(old.file)), tuple(old.problems)
 
 
 def _from_designer(file: dict[str, Json]) -> Translation:

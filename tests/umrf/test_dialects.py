@@ -1,0 +1,119 @@
+"""Older files, and what becomes of them."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from action_assistant.umrf.check import STRUCTURAL, check, check_reading
+from action_assistant.umrf.codec import Reading, read, write
+from action_assistant.umrf.model import ENTRY, EXIT
+
+ROOT = Path(__file__).parents[2]
+SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf" / "corpus"
+OWN = Path(__file__).parent / "examples"
+
+
+def reading_of(name: str) -> Reading:
+    return read((OWN / name).read_bytes())
+
+
+def verdicts() -> list[dict[str, Any]]:
+    path = SHARED / "verdicts.jsonl"
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+@pytest.mark.parametrize(
+    ("name", "dialect"),
+    [
+        ("designer.umrf.graph.json", "D3-designer"),
+        ("of_2023.json", "D2"),
+        ("ros1.umrfg.json", "D1"),
+        ("shallow.umrfg.json", "D1'"),
+        ("single.umrf.json", "D0"),
+    ],
+)
+def test_an_old_file_is_refused_as_it_stands_and_sound_afterwards(name: str, dialect: str) -> None:
+    reading = reading_of(name)
+    assert reading.dialect == dialect
+    assert reading.notes
+    assert {p.code for p in check_reading(reading)} & STRUCTURAL
+    assert not {p.code for p in check(reading.graph)} & STRUCTURAL
+    again = read(write(reading.graph))
+    assert (again.dialect, again.notes, again.problems) == ("D3", (), ())
+
+
+def test_graphs_of_ros_1_get_entry_exit_types_and_conditions() -> None:
+    graph = reading_of("ros1.umrfg.json").graph
+    assert [(a.full_name, a.type) for a in graph.actions] == [
+        ("TaCount_0", "sync"), ("TaShow_1", "async"), ("Root_0", "sync"),
+    ]  # fmt: skip
+    ends = [(r.parent, r.child) for r in graph.relations if r.parent == ENTRY or r.child == EXIT]
+    assert ends == [(ENTRY, "a1"), ("a3", EXIT)]
+    show = next(r for r in graph.relations if (r.parent, r.child) == ("a1", "a2"))
+    assert (show.conditions.on_true, show.conditions.on_error) == ("stop", "bypass")
+    back = next(r for r in graph.relations if (r.parent, r.child) == ("a2", "a1"))
+    assert not back.required
+    assert graph.actions[0].inputs[0].text.endswith('"pvf_required":true}')
+    assert dict(graph.actions[0].extra) == {"package_name": '"ta_count"'}
+
+
+def test_every_action_of_a_shallow_file_stays_one() -> None:
+    graph = reading_of("shallow.umrfg.json").graph
+    assert [a.full_name for a in graph.actions] == ["Root_0", "go_1"]
+
+
+def test_conditions_of_2023_say_what_they_meant() -> None:
+    graph = reading_of("of_2023.json").graph
+    told = {r.child: r.conditions for r in graph.relations if r.parent == "a1"}
+    assert (told["a2"].on_true, told["a2"].on_false, told["a2"].on_error) == (
+        "run",
+        "ignore",
+        "ignore",
+    )
+    assert (told["a3"].on_true, told["a3"].on_false, told["a3"].on_error) == (
+        "ignore",
+        "run",
+        "run",
+    )
+
+
+def test_a_single_action_becomes_a_graph_of_itself() -> None:
+    reading = reading_of("single.umrf.json")
+    assert reading.graph.name == "TaMove"
+    assert [(a.full_name, a.type) for a in reading.graph.actions] == [("TaMove_2", "async")]
+    current = read('{"name": "A", "type": "sync"}')
+    assert current.dialect == "D3-action"
+    assert not current.problems
+
+
+def test_fields_that_the_engine_does_not_know_do_not_make_a_file_older() -> None:
+    actions = [
+        {"name": "A", "type": "sync", "id": 3, "effect": "synchronous",
+         "children": [{"name": "B", "condition": "always -> run"}]},
+        {"name": "B", "type": "sync", "parents": [{"name": "A"}]},
+    ]  # fmt: skip
+    file = {
+        "graph_name": "g", "graph_entry": [{"name": "A"}], "graph_exit": [{"name": "B"}],
+        "actions": actions,
+    }  # fmt: skip
+    reading = read(json.dumps(file))
+    assert (reading.dialect, reading.notes) == ("D3", ())
+    assert dict(reading.graph.actions[0].extra) == {"id": "3", "effect": '"synchronous"'}
+
+
+@pytest.mark.skipif(not verdicts(), reason=f"there is no corpus in {SHARED}")
+def test_we_are_never_laxer_than_the_engines_parser() -> None:
+    for verdict in verdicts():
+        reading = read((SHARED / verdict["file"]).read_bytes())
+        refused = {p.code for p in check_reading(reading) if p.severity == "error"} & STRUCTURAL
+        assert bool(refused) != verdict["accepted"], (verdict["file"], refused)
+
+
+@pytest.mark.skipif(not verdicts(), reason=f"there is no corpus in {SHARED}")
+def test_what_was_translated_is_a_current_file() -> None:
+    for verdict in verdicts():
+        again = read(write(read((SHARED / verdict["file"]).read_bytes()).graph))
+        assert (again.dialect, again.notes, again.problems) == ("D3", (), ()), verdict["file"]
