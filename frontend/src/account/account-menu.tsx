@@ -43,12 +43,12 @@ export function AccountMenu() {
       <Popover.Target>
         <UnstyledButton
           onClick={() => setOpen((was) => !was)}
-          aria-label={`You are ${person.name}. Name and appearance`}
-          title={person.name}
+          aria-label={`You are ${person.name || "Guest"}. Name and appearance`}
+          title={person.name || "Guest"}
         >
           <Avatar size={28} radius="xl" variant="filled" color={personColor(person.id)}>
             <Text span size="xs" fw={650} c="var(--on-accent)">
-              {initials(person.name)}
+              {initials(person.name || "Guest")}
             </Text>
           </Avatar>
         </UnstyledButton>

@@ -26,11 +26,19 @@ export function Gate({ children }: { children: ReactNode }) {
   const [gate, setGate] = useState<Gate>({ at: "knocking" });
   useEffect(() => {
     let gone = false;
-    void knock().then((next) => {
-      if (!gone) setGate(next);
-    });
+    const enter = () =>
+      void knock().then((next) => {
+        if (!gone) setGate(next);
+      });
+    // A fresh link pasted into the same tab changes only the fragment.
+    const onHash = () => {
+      if (location.hash.includes("t=")) enter();
+    };
+    enter();
+    window.addEventListener("hashchange", onHash);
     return () => {
       gone = true;
+      window.removeEventListener("hashchange", onHash);
     };
   }, []);
   const takeName = useCallback(async (name: string) => {

@@ -1,5 +1,6 @@
 /** Graphs, versions and problems as the editor answers them. */
-import { type QueryClient, useQuery } from "@tanstack/react-query";
+import { type QueryClient, useQuery, useQueryClient } from "@tanstack/react-query";
+import { useEffect } from "react";
 import { ask, askText } from "./http";
 
 export interface Config {
@@ -72,12 +73,20 @@ export function useGraphs() {
   });
 }
 
-export function useVersions(graph: string) {
-  return useQuery({
+/** The versions of a graph, newest first; read again when `wanted` is not among them. */
+export function useVersions(graph: string, wanted: string | null = null) {
+  const client = useQueryClient();
+  const versions = useQuery({
     enabled: graph !== "",
     queryKey: keys.versions(graph),
     queryFn: ({ signal }) => ask<Version[]>(`/api/graphs/${graph}/versions`, { signal }),
   });
+  const missing =
+    wanted !== null && versions.data?.every((version) => version.id !== wanted) === true;
+  useEffect(() => {
+    if (missing) void client.invalidateQueries({ queryKey: keys.versions(graph) });
+  }, [missing, client, graph]);
+  return versions;
 }
 
 /** Problems of the moment `seq`; the last known ones stay until the next answer is there. */

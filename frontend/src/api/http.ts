@@ -93,9 +93,14 @@ export function sentence(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-/** Where in a file a refusal points, in words; empty when it points nowhere. */
+/** Where in a file a refusal points, in words; empty when that is nowhere, or said already. */
 export function place(error: unknown): string {
   if (!(error instanceof Refusal)) return "";
+  const words = placeOf(error);
+  return error.message.includes(words) ? "" : words;
+}
+
+function placeOf(error: Refusal): string {
   const where = error.details.where;
   if (where?.line !== undefined) {
     return `line ${where.line}${where.column === undefined ? "" : `, column ${where.column}`}`;

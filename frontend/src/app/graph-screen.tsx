@@ -25,7 +25,7 @@ import { useTitle } from "./title";
 function useRunHere(id: string): { run: Run | null; label: string; unsure: boolean } {
   const { now } = useLive();
   const run = newestRun(now, id);
-  const versions = useVersions(id).data;
+  const versions = useVersions(id, run?.version ?? null).data;
   const label = versionName(versions, run?.version ?? null) || run?.digest.slice(0, 7) || "";
   return { run, label, unsure: now.link === "down" && run?.ended_at === null };
 }

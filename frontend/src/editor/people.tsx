@@ -8,6 +8,10 @@ import style from "./people.module.css";
 
 const MOST = 4;
 
+function nameOf(person: Person): string {
+  return person.name || "Guest";
+}
+
 /** Each person once, however many windows they have. */
 export function onePerId(people: readonly Person[]): Person[] {
   return [...new Map(people.map((person) => [person.id, person])).values()];
@@ -17,14 +21,14 @@ export function People({ me }: { me: string }) {
   const others = onePerId(usePeople()).filter((person) => person.id !== me);
   if (others.length === 0) return null;
   const shown = others.slice(0, MOST);
-  const names = others.map((person) => person.name).join(", ");
+  const names = others.map(nameOf).join(", ");
   return (
     <div className={style.people}>
       <span className="visually-hidden">Also here: {names}</span>
       {shown.map((person) => (
-        <Tooltip key={person.id} label={person.name}>
+        <Tooltip key={person.id} label={nameOf(person)}>
           <span className={style.face} style={{ background: personColor(person.id) }}>
-            {initials(person.name)}
+            {initials(nameOf(person))}
           </span>
         </Tooltip>
       ))}
@@ -63,7 +67,7 @@ export function Cursors() {
                 stroke="#fff"
               />
             </svg>
-            <span>{person.name}</span>
+            <span>{nameOf(person)}</span>
           </div>
         );
       })}

@@ -20,6 +20,7 @@ import {
   nodesOf,
   type ProblemCount,
 } from "../ui/canvas/elements";
+import { personColor } from "../ui/robot";
 
 export interface Size {
   readonly width: number;
@@ -81,7 +82,16 @@ export function useCanvas({ graph, selection, select, progress, problems }: Give
   chosen.current = selection;
 
   const drawn = useRef<{ nodes: CanvasNode[]; edges: Arrow[] }>({ nodes: [], edges: [] });
-  const options = { places, selected: selection, progress, problems, measured: sizes };
+  const others = useMemo(
+    () =>
+      new Map(
+        people.flatMap((person) =>
+          person.presence.selection.map((key) => [key, personColor(person.id)] as const),
+        ),
+      ),
+    [people],
+  );
+  const options = { others, places, selected: selection, progress, problems, measured: sizes };
   const nodes = keep(drawn.current.nodes, nodesOf(graph, options));
   const edges = keep(drawn.current.edges, edgesOf(graph, options));
   useEffect(() => {

@@ -30,7 +30,7 @@ export function StopButton({ graph }: Props) {
       aria-label={`Stop ${target}. Software stop, no emergency stop`}
       title={`Stop ${target}.\nA software stop: no replacement for the emergency stop.`}
     >
-      <IconSquareFilled size={13} aria-hidden />
+      <IconSquareFilled size={13} aria-hidden style={{ flex: "none" }} />
       <span className={style.word}>STOP</span>
       <span className={style.count}>{words(now.link, only ? 1 : open.length)}</span>
     </button>

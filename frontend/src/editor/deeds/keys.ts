@@ -13,6 +13,12 @@ function isTaken(target: EventTarget | null): boolean {
   );
 }
 
+/** The pointer rests on the canvas and nothing has the focus: Tab is free for the search. */
+function isOverCanvas(): boolean {
+  const idle = document.activeElement === document.body || document.activeElement === null;
+  return idle && document.querySelector(".react-flow__pane:hover") !== null;
+}
+
 export function useShortcuts(bench: Bench): void {
   const now = useRef(bench);
   now.current = bench;
@@ -22,6 +28,11 @@ export function useShortcuts(bench: Bench): void {
       if (event.key === "/") {
         event.preventDefault();
         document.querySelector<HTMLInputElement>("[data-search]")?.focus();
+        return;
+      }
+      if (event.key === "Tab" && isOverCanvas()) {
+        event.preventDefault();
+        now.current.openAdd();
         return;
       }
       if (event.key === "Escape") {

@@ -14,7 +14,7 @@ import { cardLines, lineText } from "./value-text";
 function ProgressLine({ progress }: { progress: Progress | null }) {
   const going = progress?.since != null;
   const now = useNow(1000, going);
-  if (progress === null) return null;
+  if (progress === null) return <StateWord tone="idle" word="idle" />;
   const parts: string[] = [];
   if (progress.since !== null) parts.push(stopwatch(now - progress.since));
   else if (progress.took !== null) parts.push(duration(progress.took));
@@ -40,13 +40,14 @@ export const ActionCard = memo(function ActionCard({
   selected,
   isConnectable,
 }: NodeProps<CardNode>) {
-  const { action, progress, problems } = data;
+  const { action, progress, problems, other } = data;
   const lines = cardLines(action.inputs, 2);
   const color = robotColor(action.actor);
   return (
     <div
       className={style.card}
-      style={{ "--c": color } as React.CSSProperties}
+      style={{ "--c": color, "--other": other ?? undefined } as React.CSSProperties}
+      data-other={other === null ? undefined : true}
       data-selected={selected || undefined}
       data-tone={progress?.tone}
       data-ghost={action.missing || undefined}

@@ -3,7 +3,8 @@ import { Graph as Dagre, layout } from "@dagrejs/dagre";
 import { ENTRY, EXIT, type Graph, type Key, type Position } from "../../graph/model";
 
 export const CARD = { width: 208, height: 104 } as const;
-export const PILL = { width: 84, height: 32 } as const;
+/** The ends are as wide as cards, so that the same x means the same middle. */
+export const PILL = { width: 208, height: 32 } as const;
 
 export interface Size {
   readonly width: number;
@@ -23,7 +24,7 @@ export function arrange(
   direction: "TB" | "LR" = "TB",
 ): Places {
   const dagre = new Dagre({ multigraph: true });
-  dagre.setGraph({ rankdir: direction, nodesep: 56, ranksep: 84, marginx: 0, marginy: 0 });
+  dagre.setGraph({ rankdir: direction, nodesep: 56, ranksep: 108, marginx: 0, marginy: 0 });
   dagre.setDefaultEdgeLabel(() => ({}));
   const keys = [ENTRY, ...graph.actions.map((action) => action.key), EXIT];
   for (const key of keys) dagre.setNode(key, { ...sizeOf(key, sizes) });

@@ -14,7 +14,8 @@ import {
   spoken,
 } from "../../graph/model";
 import { OUTCOMES } from "../outcome";
-import type { Places } from "./arrange";
+import { CARD, PILL, type Places } from "./arrange";
+import { type Box, laneFor, MOST_CARDS } from "./lanes";
 
 export interface ProblemCount {
   readonly error: number;
@@ -22,7 +23,13 @@ export interface ProblemCount {
 }
 
 export type CardNode = Node<
-  { action: Action; progress: Progress | null; problems: ProblemCount | null },
+  {
+    action: Action;
+    progress: Progress | null;
+    problems: ProblemCount | null;
+    /** The colour of somebody else who has it selected. */
+    other: string | null;
+  },
   "action"
 >;
 export type EndNode = Node<{ end: "entry" | "exit"; progress: null }, "end">;
@@ -42,6 +49,8 @@ export type Arrow = Edge<
     answers: readonly Answer[] | null;
     optional: boolean;
     lead: boolean;
+    /** The x of the lane on which it goes round cards; null: straight down. */
+    lane: number | null;
     entry: boolean;
     lit: boolean;
   },
@@ -66,6 +75,7 @@ export interface NodeOptions {
   selected: ReadonlySet<string>;
   progress: ReadonlyMap<Key, Progress>;
   problems: ReadonlyMap<Key, ProblemCount>;
+  others?: ReadonlyMap<Key, string>;
   measured: ReadonlyMap<Key, { width?: number; height?: number }>;
 }
 
@@ -97,6 +107,7 @@ export function nodesOf(graph: Graph, options: NodeOptions): CanvasNode[] {
         action,
         progress: options.progress.get(action.key) ?? null,
         problems: options.problems.get(action.key) ?? null,
+        other: options.others?.get(action.key) ?? null,
       },
     }),
   );
@@ -110,7 +121,39 @@ function isLit(relation: Relation, outcome: Precondition, options: NodeOptions):
   return parent !== undefined && `on_${parent.tone}` === outcome;
 }
 
-function arrowsOf(relation: Relation, options: NodeOptions): Arrow[] {
+/** Where cards stand. Empty when there are too many to look for ways round them. */
+function boxesOf(graph: Graph, options: NodeOptions): Map<Key, Box> {
+  const boxes = new Map<Key, Box>();
+  if (graph.actions.length > MOST_CARDS) return boxes;
+  const put = (key: Key, size: { width: number; height: number }) => {
+    const at = options.places.get(key);
+    const { width = size.width, height = size.height } = options.measured.get(key) ?? {};
+    if (at) boxes.set(key, { x: at[0], y: at[1], width, height });
+  };
+  for (const { key } of graph.actions) put(key, CARD);
+  put(ENTRY, PILL);
+  put(EXIT, PILL);
+  return boxes;
+}
+
+const LANE_WIDTH = 9; // px between the lanes of one relation's outcomes
+
+function laneOf(relation: Relation, outcome: Precondition, boxes: Map<Key, Box>): number | null {
+  const from = boxes.get(relation.parent);
+  const to = boxes.get(relation.child);
+  if (!from || !to || relation.parent === relation.child) return null;
+  const at = OUTCOMES.indexOf(outcome);
+  const share = relation.parent === ENTRY ? 0.5 : 0.14 + 0.24 * at;
+  const start = { x: from.x + from.width * share, y: from.y + from.height };
+  const others = [...boxes]
+    .filter(([key]) => key !== relation.parent && key !== relation.child)
+    .map(([, box]) => box);
+  const lane = laneFor(start, { x: to.x + to.width / 2, y: to.y }, others);
+  if (lane === null) return null;
+  return lane + Math.sign(lane - to.x) * LANE_WIDTH * at;
+}
+
+function arrowsOf(relation: Relation, options: NodeOptions, boxes: Map<Key, Box>): Arrow[] {
   const id = relationId(relation);
   const outcomes = spoken(relation.conditions);
   const shown: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
@@ -130,6 +173,7 @@ function arrowsOf(relation: Relation, options: NodeOptions): Arrow[] {
       answers: i === 0 && !entry ? answersOf(relation) : null,
       optional: !relation.required,
       lead: i === 0,
+      lane: laneOf(relation, outcome, boxes),
       entry,
       lit: isLit(relation, outcome, options),
     },
@@ -138,9 +182,10 @@ function arrowsOf(relation: Relation, options: NodeOptions): Arrow[] {
 
 export function edgesOf(graph: Graph, options: NodeOptions): Arrow[] {
   const there = new Set<Key>([ENTRY, EXIT, ...graph.actions.map((action) => action.key)]);
+  const boxes = boxesOf(graph, options);
   return graph.relations
     .filter(({ parent, child }) => there.has(parent) && there.has(child))
-    .flatMap((relation) => arrowsOf(relation, options));
+    .flatMap((relation) => arrowsOf(relation, options, boxes));
 }
 
 /** `next`, with every element of `before` that says the same in its place. */

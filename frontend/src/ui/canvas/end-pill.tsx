@@ -12,17 +12,23 @@ export const EndPill = memo(function EndPill({
 }: NodeProps<EndNode>) {
   const entry = data.end === "entry";
   return (
-    <div className={style.pill} data-end={data.end} data-selected={selected || undefined}>
-      {entry ? <IconPlayerPlayFilled size={11} aria-hidden /> : <IconFlag size={13} aria-hidden />}
-      {entry ? "Entry" : "Exit"}
-      <Handle
-        type={entry ? "source" : "target"}
-        id={entry ? "start" : "in"}
-        position={entry ? Position.Bottom : Position.Top}
-        className={style.handle ?? ""}
-        isConnectable={isConnectable}
-        aria-label={entry ? "Start with" : "End with"}
-      />
+    <div className={style.frame}>
+      <div className={style.pill} data-end={data.end} data-selected={selected || undefined}>
+        {entry ? (
+          <IconPlayerPlayFilled size={11} aria-hidden />
+        ) : (
+          <IconFlag size={13} aria-hidden />
+        )}
+        {entry ? "Entry" : "Exit"}
+        <Handle
+          type={entry ? "source" : "target"}
+          id={entry ? "start" : "in"}
+          position={entry ? Position.Bottom : Position.Top}
+          className={style.handle ?? ""}
+          isConnectable={isConnectable}
+          aria-label={entry ? "Start with" : "End with"}
+        />
+      </div>
     </div>
   );
 });

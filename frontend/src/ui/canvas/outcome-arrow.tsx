@@ -16,7 +16,7 @@ const ACROSS = 240; // px between handles of cards that stand side by side
 /** Up beside the target, so that loops and ways across can be told from the way down. */
 function backwards(sx: number, sy: number, tx: number, ty: number): Line {
   const beside = Math.abs(tx - sx) > ACROSS;
-  const side = beside ? tx - Math.sign(tx - sx) * 132 : Math.max(sx, tx) + 150;
+  const side = beside ? tx - Math.sign(tx - sx) * 132 : Math.min(sx, tx) - 150;
   const [low, high] = [sy + 34, ty - 34];
   const out = Math.sign(side - sx) || 1;
   const back = Math.sign(tx - side) || -1;
@@ -28,11 +28,27 @@ function backwards(sx: number, sy: number, tx: number, ty: number): Line {
   return { path, x: side, y: (low + high) / 2 };
 }
 
+/** Down a lane beside the cards that stand in the way. */
+function round(sx: number, sy: number, tx: number, ty: number, lane: number): Line {
+  const out = Math.sign(lane - sx) || 1;
+  const back = Math.sign(tx - lane) || -1;
+  const [high, low] = [sy + 26, ty - 26];
+  const r = Math.max(0, Math.min(18, Math.abs(lane - sx) / 2, Math.abs(tx - lane) / 2));
+  const v = Math.min(r, Math.max(0, (low - high) / 2));
+  const path =
+    `M${sx} ${sy}V${high - v}Q${sx} ${high} ${sx + out * r} ${high}H${lane - out * r}` +
+    `Q${lane} ${high} ${lane} ${high + v}V${low - v}Q${lane} ${low} ${lane + back * r} ${low}` +
+    `H${tx - back * r}Q${tx} ${low} ${tx} ${low + v}V${ty}`;
+  return { path, x: lane, y: (high + low) / 2 };
+}
+
 function lineOf(props: EdgeProps<Arrow>): Line {
   const { sourceX, sourceY, targetX, targetY } = props;
   const from = sourceY + 1;
   const to = targetY - 2;
   if (to < from + 8) return backwards(sourceX, from, targetX, to);
+  const lane = props.data?.lane ?? null;
+  if (lane !== null && to > from + 60) return round(sourceX, from, targetX, to, lane);
   const [path, x, y] = getBezierPath({
     sourceX,
     sourceY: from,
@@ -49,7 +65,7 @@ export function answerWords(answer: Answer): string {
   return `${answer.outcomes.map((outcome) => outcomeWord[outcome]).join(", ")} → ${answer.response}`;
 }
 
-function AnswerLine({ answer }: { answer: Answer }) {
+function AnswerLine({ answer, optional }: { answer: Answer; optional: boolean }) {
   return (
     <span className={style.answer}>
       {answer.outcomes.map((outcome) => (
@@ -58,7 +74,10 @@ function AnswerLine({ answer }: { answer: Answer }) {
           {outcomeWord[outcome]}
         </span>
       ))}
-      <span className={style.response}>→ {answer.response}</span>
+      <span className={style.response}>
+        → {answer.response}
+        {optional && " · optional"}
+      </span>
     </span>
   );
 }
@@ -95,11 +114,14 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
             data-relation={data.relation}
             style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
           >
-            {data.answers.map((answer) => (
-              <AnswerLine key={answer.response} answer={answer} />
+            {data.answers.map((answer, i) => (
+              <AnswerLine
+                key={answer.response}
+                answer={answer}
+                optional={data.optional && i === (data.answers?.length ?? 0) - 1}
+              />
             ))}
             {data.answers.length === 0 && <span className={style.response}>ignores all</span>}
-            {data.optional && <span className={style.response}>optional</span>}
           </div>
         </EdgeLabelRenderer>
       )}
