@@ -80,8 +80,8 @@ def _carried_states(reading: Reading) -> list[Problem]:
             severity="error",
             where=Where(path=f"{places.get(key, '')}/state", aid=key),
             message=f"The file says that {names[key]} is {state}: started as it stands, the engine "
-            "aborts with every running graph, or the action never runs.",
-            fix="drop-states",
+            "aborts with every running graph, or the action never runs. Reading the file and writing "
+            "it again leaves the state out.",
         )
         for key, state in reading.states.items()
     ]

@@ -143,10 +143,8 @@ def _check_signature(
                 f"The {side}s of {action.full_name} are not those of its action, so the engine cannot "
                 f"resolve the graph.{what}"
             )
-            subject.report(
-                "signature", "error", message, action=action, member=f"/{side}_parameters",
-                fix="signature",
-            )  # fmt: skip
+            member = f"/{side}_parameters"
+            subject.report("signature", "error", message, action=action, member=member)
         for name in sorted(set(ours) & set(theirs)):
             if ours[name].type != theirs[name]:
                 message = (

@@ -44,7 +44,8 @@ class Slot:
         self.value: Any = plain(leaf["pvf_value"]) if "pvf_value" in leaf else MISSING
         self.required = leaf.get("pvf_required") is not False
         self.updatable = leaf.get("pvf_updatable") is not False
-        self.allowed = [plain(v) for v in allowed] if isinstance(allowed, list) else []
+        listed = allowed if isinstance(allowed, list) else [] if allowed is None else [allowed]
+        self.allowed = [plain(value) for value in listed]
         self.received = False
 
     def has_value(self) -> bool:

@@ -1,0 +1,89 @@
+"""Fixes of problems: each one call, idempotent, without inventing meaning."""
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+import msgspec
+
+from action_assistant.umrf.model import Action, Graph, Key, Problem, Relation
+from action_assistant.umrf.relations import MAX_REFERRED_ID
+
+
+def fix(graph: Graph, problem: Problem) -> Graph:
+    """The graph after the problem's fix; the graph itself where there is nothing to do."""
+    mend = _FIXES.get(problem.fix or "")
+    return mend(graph, problem) if mend else graph
+
+
+def _mend_relation(change: Callable[[Relation], Relation | None]) -> "_Fix":
+    """A fix that changes the relation of the problem, or removes it (None)."""
+
+    def mend(graph: Graph, problem: Problem) -> Graph:
+        relations = (
+            change(relation) if _names(relation) == problem.where.relation else relation
+            for relation in graph.relations
+        )
+        return _without_lonely_ghosts(
+            msgspec.structs.replace(graph, relations=tuple(r for r in relations if r is not None))
+        )
+
+    return mend
+
+
+def _names(relation: Relation) -> str:
+    listing = f";{relation.listing}" if relation.listing else ""
+    return f"{relation.parent}>{relation.child}{listing}"
+
+
+def _mirrored(relation: Relation) -> Relation:
+    return msgspec.structs.replace(relation, only=None)
+
+
+def _not_required(relation: Relation) -> Relation:
+    return msgspec.structs.replace(relation, required=False)
+
+
+def _without_lonely_ghosts(graph: Graph) -> Graph:
+    named = {key for r in graph.relations for key in (r.parent, r.child)}
+    actions = tuple(a for a in graph.actions if not a.missing or a.key in named)
+    return msgspec.structs.replace(graph, actions=actions)
+
+
+def _renumbered(graph: Graph, problem: Problem) -> Graph:
+    """Gives the action the lowest number that is free for its name."""
+    used: Mapping[Key, Action] = {action.key: action for action in graph.actions}
+    action = used.get(problem.where.aid or "")
+    if action is None:
+        return graph
+    taken = {a.instance_id for a in graph.actions if a.name == action.name and a is not action}
+    reserved = {0} if action.name in ("graph_entry", "graph_exit") else set()
+    if action.instance_id not in taken | reserved and action.instance_id <= MAX_REFERRED_ID:
+        return graph
+    free = next(n for n in range(len(taken) + 2) if n not in taken | reserved)
+    extra = tuple((field, text) for field, text in action.extra if field != "instance_id")
+    return _with_action(
+        graph, msgspec.structs.replace(action, instance_id=free, twin=False, extra=extra)
+    )
+
+
+def _typed(graph: Graph, problem: Problem) -> Graph:
+    for action in graph.actions:
+        if action.key == problem.where.aid and not action.type:
+            return _with_action(graph, msgspec.structs.replace(action, type="sync"))
+    return graph
+
+
+def _with_action(graph: Graph, changed: Action) -> Graph:
+    actions = tuple(changed if a.key == changed.key else a for a in graph.actions)
+    return msgspec.structs.replace(graph, actions=actions)
+
+
+_Fix = Callable[[Graph, Problem], Graph]
+
+_FIXES: Final[dict[str, _Fix]] = {
+    "mirror-relation": _mend_relation(_mirrored),
+    "not-required": _mend_relation(_not_required),
+    "remove-relation": _mend_relation(lambda _: None),
+    "renumber": _renumbered,
+    "type-sync": _typed,
+}
