@@ -25,9 +25,15 @@ steps = st.one_of(
     st.tuples(st.just("repeat"), who),
     st.tuples(st.just("reconnect"), who),
     st.tuples(st.just("leave"), who),
-    st.tuples(st.just("empty"),),
-    st.tuples(st.just("settle"),),
-    st.tuples(st.just("check"),),
+    st.tuples(
+        st.just("empty"),
+    ),
+    st.tuples(
+        st.just("settle"),
+    ),
+    st.tuples(
+        st.just("check"),
+    ),
 )
 streams = itertools.count()
 

@@ -165,6 +165,8 @@ class Room:
         await asyncio.wait([self._task])
 
     def _enter(self, item: Item) -> None:
+        if self._ended:
+            return  # whoever said it is being sent away, and will say it again
         self._waiting.append(item)
         self._quiet.clear()
         self._news.set()

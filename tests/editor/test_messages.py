@@ -1,0 +1,65 @@
+"""Messages of a room's socket: what was written is read, what is cut short is refused."""
+
+import contextlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pycrdt import Decoder, YMessageType, YSyncMessageType, create_update_message
+
+from action_assistant.editor import wire
+from action_assistant.editor.wire import Edit, Entry, Malformed, Presence, Question, Reader
+
+data = st.binary(max_size=300)
+entries = st.lists(
+    st.builds(Entry, st.integers(0, 2**53), st.integers(0, 2**40), st.binary(max_size=50))
+)
+
+
+@given(st.integers(0, 2**64 - 1))
+def test_a_number_survives(value: int) -> None:
+    assert Reader(wire.number(value)).number() == value
+
+
+@given(data, entries)
+def test_messages_survive(content: bytes, said: list[Entry]) -> None:
+    assert wire.parse(wire.question(content)) == Question(content)
+    assert wire.parse(wire.answer(content)) == Edit(content)
+    assert wire.parse(wire.change(content)) == Edit(content)
+    assert wire.parse(wire.presence(said)) == Presence(tuple(said))
+
+
+@given(data)
+def test_we_write_what_the_library_writes(content: bytes) -> None:
+    assert wire.change(content) == create_update_message(content)
+    assert wire.change(content)[:2] == bytes((YMessageType.SYNC, YSyncMessageType.SYNC_UPDATE))
+
+
+@given(st.integers(0, 2**40), st.integers(0, 2**40))
+def test_an_acknowledgement_is_three_numbers(messages: int, seq: int) -> None:
+    decoder = Decoder(wire.acks(messages, seq))
+    assert [decoder.read_var_uint() for _ in range(3)] == [100, messages, seq]
+
+
+@given(data)
+def test_any_bytes_are_a_message_or_malformed(content: bytes) -> None:
+    with contextlib.suppress(Malformed):
+        wire.parse(content)
+
+
+@given(st.sampled_from([wire.question, wire.answer, wire.change]), st.binary(min_size=1))
+def test_a_message_that_was_cut_is_malformed(write: object, content: bytes) -> None:
+    frame = write(content)  # type: ignore[operator]
+    for end in range(len(frame)):
+        with pytest.raises(Malformed):
+            wire.parse(frame[:end])
+
+
+def test_kinds_that_we_do_not_know_are_passed_over() -> None:
+    assert wire.parse(b"\x02\x00") is None
+    assert wire.parse(b"\x79abc") is None
+
+
+def test_a_count_that_the_bytes_cannot_hold_costs_nothing() -> None:
+    with pytest.raises(Malformed):
+        wire.parse(b"\x01\x06" + b"\xff" * 5 + b"\x0f")

@@ -1,0 +1,145 @@
+"""Who is in a room: the server vouches for names, and for nobody speaking for others."""
+
+import json
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from action_assistant.editor import wire
+from action_assistant.editor.presence import STATE_LIMIT, Attendance, Seat, colour_of
+from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.wire import Entry
+from action_assistant.web.keys import Person
+from editor.client import Client, settle
+
+
+def entry(client: int, clock: int = 1, **state: Any) -> Entry:
+    return Entry(client, clock, json.dumps(state).encode())
+
+
+def said(entries: list[Entry]) -> dict[int, Any]:
+    return {each.client: json.loads(each.state) for each in entries}
+
+
+def seat(name: str) -> Seat:
+    return Seat(Person(name, name.title()))
+
+
+def test_the_server_says_who_it_is() -> None:
+    room, ada = Attendance(), seat("ada")
+    told = room.hear(ada, (entry(7, cursor=[1, 2], user={"id": "bob", "name": "Bob"}),))
+    user = {"id": "ada", "name": "Ada", "color": colour_of("ada")}
+    assert said(told) == {7: {"cursor": [1, 2], "user": user}}
+
+
+def test_names_of_any_script_arrive_whole() -> None:
+    room = Attendance()
+    person = Person("x", "Ülle 🤖 اسم 名前")
+    told = room.hear(Seat(person), (entry(1, editing="ключ"),))
+    frame = wire.presence(told)
+    parsed = wire.parse(frame)
+    assert isinstance(parsed, wire.Presence)
+    assert json.loads(parsed.entries[0].state)["user"]["name"] == person.name
+    assert json.loads(parsed.entries[0].state)["editing"] == "ключ"
+
+
+def test_nobody_speaks_for_others() -> None:
+    room, ada, eve = Attendance(), seat("ada"), seat("eve")
+    room.hear(ada, (entry(1, cursor=[0, 0]),))
+    assert room.hear(eve, (entry(1, 9, cursor=[6, 6]),)) == []
+    assert room.hear(eve, (Entry(1, 9, b"null"),)) == []
+    room.hear(eve, (entry(2),))
+    assert room.hear(eve, (entry(1, 9, cursor=[6, 6]), entry(3))) == []
+    assert said(list(room.everyone()))[1]["cursor"] == [0, 0]
+    assert set(said(list(room.everyone()))) == {1, 2}
+
+
+def test_who_reconnects_takes_over_from_the_socket_before() -> None:
+    room, old, new = Attendance(), seat("ada"), seat("ada")
+    room.hear(old, (entry(1, 5),))
+    assert len(room.hear(new, (entry(1, 6, cursor=[1, 1]),))) == 1
+    assert room.leave(old) == []
+    assert said(list(room.everyone()))[1]["cursor"] == [1, 1]
+    assert room.leave(new) == [Entry(1, 6, b"null")]
+    assert room.everyone() == ()
+
+
+def test_another_window_of_the_same_person_is_left_alone_by_an_echo() -> None:
+    room, one, two = Attendance(), seat("ada"), seat("ada")
+    room.hear(one, (entry(1),))
+    room.hear(two, (entry(2),))
+    assert room.hear(two, (entry(1, 7),)) == []
+    assert room.leave(two) == [Entry(2, 1, b"null")]
+    assert set(said(list(room.everyone()))) == {1}
+
+
+def test_who_takes_itself_away_is_gone_and_may_come_back() -> None:
+    room, ada = Attendance(), seat("ada")
+    room.hear(ada, (entry(1, 1),))
+    assert room.hear(ada, (Entry(1, 2, b"null"),)) == [Entry(1, 2, b"null")]
+    assert room.everyone() == ()
+    assert len(room.hear(ada, (entry(1, 3),))) == 1
+
+
+def test_what_is_no_state_is_not_passed_on() -> None:
+    room = Attendance()
+    wrong = [b"", b"5", b"[]", b"{", b'{"a": ' + b"[" * 5000, b"\xff", b'"x"']
+    wrong.append(json.dumps({"a": "x" * STATE_LIMIT}).encode())
+    for state in wrong:
+        assert room.hear(seat("eve"), (Entry(1, 1, state),)) == []
+    assert room.everyone() == ()
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 5), st.booleans()), max_size=40))
+def test_whatever_is_said_entries_belong_to_seats_that_said_them(
+    words: list[tuple[int, int, bool]],
+) -> None:
+    room = Attendance()
+    seats = [seat(f"p{n}") for n in range(4)]
+    for who, client, gone in words:
+        state = b"null" if gone else b"{}"
+        for told in room.hear(seats[who], (Entry(client, 1, state),)):
+            assert told.client == client
+            if not gone:
+                assert json.loads(told.state)["user"]["id"] == f"p{who}"
+    for each in room.everyone():
+        holder = json.loads(each.state)["user"]["id"]
+        assert seats[int(holder[1:])].client == each.client
+    for each_seat in seats:
+        room.leave(each_seat)
+    assert room.everyone() == ()
+
+
+async def test_a_newcomer_sees_who_is_there_and_all_see_who_leaves(rooms: Rooms) -> None:
+    ada, bob = Client("ada"), Client("bob")
+    async with rooms.enter("graph/g") as room:
+        ada.join(room)
+        ada.deliver(wire.presence([entry(1, selection=["x"])]))
+        bob.join(room)
+        await settle(ada, bob)
+        assert json.loads(bob.others[1])["selection"] == ["x"]
+        bob.deliver(wire.presence([entry(2)]))
+        await settle(ada, bob)
+        assert set(ada.others) == {2}
+        ada.leave()
+        await settle(bob)
+        assert bob.others == {}
+        bob.deliver(bytes((wire.QUERY_AWARENESS,)))
+        await settle(bob)
+        assert set(bob.others) == {2}
+
+
+async def test_of_many_words_of_one_person_only_the_last_waits(rooms: Rooms) -> None:
+    ada, slow = Client("ada"), Client("slow")
+    async with rooms.enter("graph/g") as room:
+        ada.join(room)
+        slow.join(room)
+        await settle(ada, slow)
+        for n in range(2000):
+            ada.deliver(wire.presence([entry(1, n, cursor=[n, n])]))
+        assert slow.member is not None
+        assert not slow.member.closed
+        (frame,) = await slow.member.take()
+        slow.take(frame)
+        assert json.loads(slow.others[1])["cursor"] == [1999, 1999]

@@ -1,0 +1,473 @@
+"""The rules of a room, one by one."""
+
+import asyncio
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+from pycrdt import Doc, Map
+
+from action_assistant.editor import replica, wire
+from action_assistant.editor.member import WAITING_FRAMES
+from action_assistant.editor.replica import Replica, load
+from action_assistant.editor.room import Room
+from action_assistant.editor.rooms import Rooms
+from action_assistant.errors import BadInput, Unavailable
+from action_assistant.journal.events import Draft
+from action_assistant.journal.journal import Journal
+from editor.client import Client, settle
+
+STREAM = "graph/g"
+
+
+def updates(*changes: tuple[str, str | None]) -> list[bytes]:
+    """The updates of one author who writes or erases things, in order."""
+    client = Client("author")
+    for name, value in changes:
+        if value is None:
+            del client.map[name]
+        else:
+            client.map[name] = value
+    return [bytes(frame_update(frame)) for frame in client.out]
+
+
+def frame_update(frame: bytes) -> bytes:
+    message = wire.parse(frame)
+    assert isinstance(message, wire.Edit)
+    return message.update
+
+
+async def bodies(journal: Journal) -> list[bytes]:
+    return [event.body for event in await journal.read(STREAM)]
+
+
+class Gate:
+    """Holds appends back, or lets them fail, as a slow or full disk would."""
+
+    def __init__(self, journal: Journal, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.open = asyncio.Event()
+        self.open.set()
+        self.broken = False
+        original = journal.append
+
+        async def append(
+            stream: str, drafts: Sequence[Draft], *, expected: int | None = None
+        ) -> int:
+            await self.open.wait()
+            if self.broken:
+                raise Unavailable("disk full")
+            return await original(stream, drafts, expected=expected)
+
+        monkeypatch.setattr(journal, "append", append)
+
+
+@pytest.fixture
+def gate(journal: Journal, monkeypatch: pytest.MonkeyPatch) -> Gate:
+    return Gate(journal, monkeypatch)
+
+
+async def test_an_edit_reaches_the_others_and_is_acknowledged(
+    journal: Journal, rooms: Rooms
+) -> None:
+    ada, bob = Client("ada"), Client("bob")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        bob.join(room)
+        await settle(ada, bob)
+        ada.map["a"] = "1"
+        await settle(ada, bob)
+        assert bob.things == {"a": "1"}
+        assert ada.durable == ada.sent == 2  # step 2 and the edit
+        assert ada.seq == bob.seq == room.seq == 1
+        (event,) = await journal.read(STREAM)
+        assert (event.author, event.kind) == ("ada", "graph.updated.v1")
+
+
+async def test_nobody_sees_an_edit_before_it_is_committed(rooms: Rooms, gate: Gate) -> None:
+    ada, bob, cyd = Client("ada"), Client("bob"), Client("cyd")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        bob.join(room)
+        await settle(ada, bob)
+        gate.open.clear()
+        ada.map["a"] = "1"
+        ada.speak()
+        cyd.join(room)  # in the middle of the commit
+        cyd.speak()
+        await asyncio.sleep(0.05)
+        await bob.listen()
+        await cyd.listen()
+        await ada.listen()
+        assert bob.things == cyd.things == {}
+        assert ada.durable == 1
+        gate.open.set()
+        await settle(ada, bob, cyd)
+        assert bob.things == cyd.things == {"a": "1"}
+        assert ada.durable == 2
+
+
+async def test_a_change_that_cannot_be_stored_reaches_nobody(
+    journal: Journal, rooms: Rooms, gate: Gate
+) -> None:
+    ada, bob = Client("ada"), Client("bob")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        bob.join(room)
+        await settle(ada, bob)
+        gate.broken = True
+        ada.map["a"] = "1"
+        ada.speak()
+        assert ada.member is not None
+        assert bob.member is not None
+        assert await ada.member.ended() == await bob.member.ended() == wire.RESTARTING
+        await bob.listen()
+        assert bob.things == {}
+        assert await journal.newest(STREAM) == 0
+    gate.broken = False
+    async with rooms.enter(STREAM) as again:
+        assert again is not room
+        ada.join(again)
+        bob.join(again)
+        await settle(ada, bob)
+        assert bob.things == {"a": "1"}
+        assert await journal.newest(STREAM) == 1
+
+
+async def test_the_server_s_own_edit_hears_when_it_cannot_be_stored(
+    rooms: Rooms, gate: Gate
+) -> None:
+    (update,) = updates(("a", "1"))
+    async with rooms.enter(STREAM) as room:
+        gate.broken = True
+        with pytest.raises(Unavailable, match="disk full"):
+            await room.submit(update, "server")
+        with pytest.raises(Unavailable):
+            await room.submit(update, "server")
+        with pytest.raises(Unavailable):
+            await room.look(lambda _, seq: seq)
+
+
+async def test_bytes_are_stored_as_they_came_and_only_if_they_bring_something(
+    journal: Journal, rooms: Rooms
+) -> None:
+    one, two = updates(("a", "1"), ("b", "2"))
+    async with rooms.enter(STREAM) as room:
+        assert await room.submit(one, "ada") == 1
+        assert await room.submit(one, "bob") == 1
+        assert await room.submit(two, "bob") == 2
+        assert await room.submit(wire.NOTHING_NEW, "bob") == 2
+    assert await bodies(journal) == [one, two]
+
+
+async def test_an_edit_that_waits_for_an_earlier_one_is_stored(
+    journal: Journal, rooms: Rooms
+) -> None:
+    one, two, three = updates(("a", "1"), ("a", "2"), ("a", None))
+    async with rooms.enter(STREAM) as room:
+        assert await room.submit(three, "ada") == 1
+        assert await room.submit(two, "ada") == 2
+        assert await room.submit(two, "ada") == 2  # again: known
+        assert await room.submit(one, "ada") == 3
+        assert not (await room.quiet()).waiting
+    assert await bodies(journal) == [three, two, one]
+
+
+async def test_a_newcomer_gets_what_waits_too(rooms: Rooms) -> None:
+    one, two, three = updates(("a", "1"), ("b", "2"), ("a", None))
+    ada = Client("ada")
+    async with rooms.enter(STREAM) as room:
+        await room.submit(two, "x")
+        await room.submit(three, "x")
+        ada.join(room)
+        await settle(ada)
+        await room.submit(one, "x")
+        await settle(ada)
+        assert ada.things == {"b": "2"}
+
+
+async def test_no_snapshot_is_made_of_a_document_that_waits(journal: Journal, rooms: Rooms) -> None:
+    one, two = updates(("a", "1"), ("a", None))
+    async with rooms.enter(STREAM) as room:
+        await room.submit(two, "x")
+        await room.rest(lambda: True)
+        assert await journal.snapshot(STREAM) is None
+        await room.submit(one, "x")
+        await room.rest(lambda: True)
+        kept = await journal.snapshot(STREAM)
+        assert kept is not None
+        assert kept.seq == 2
+
+
+async def test_a_snapshot_is_made_every_thousand_events_and_changes_nothing(
+    journal: Journal, rooms: Rooms
+) -> None:
+    many = updates(*((f"k{n % 7}", str(n)) for n in range(1100)))
+    async with rooms.enter(STREAM) as room:
+        await asyncio.gather(*(room.submit(update, "x") for update in many))
+    kept = await journal.snapshot(STREAM)
+    assert kept is not None
+    assert 1000 <= kept.seq <= 1100
+    await journal.append(STREAM, [Draft("graph.updated.v1", "y", updates(("z", "end"))[0])])
+    loaded, plain = await load(journal, STREAM), Doc[Any]()
+    for body in await bodies(journal):
+        plain.apply_update(body)
+    things = plain.get("things", type=Map).to_py()
+    assert loaded.kept == kept.seq
+    assert loaded.replica.doc.get("things", type=Map).to_py() == things
+    loaded.replica.close()
+    then = await load(journal, STREAM, upto=500)
+    assert then.seq == 500
+    assert then.replica.doc.get("things", type=Map).to_py()["k2"] == "499"
+    then.replica.close()
+
+
+async def test_a_snapshot_that_cannot_be_applied_is_passed_over(journal: Journal) -> None:
+    await journal.append(STREAM, [Draft("graph.updated.v1", "x", u) for u in updates(("a", "1"))])
+    await journal.keep_snapshot(STREAM, 1, b"\x01\x01nonsense")
+    loaded = await load(journal, STREAM)
+    assert loaded.replica.doc.get("things", type=Map).to_py() == {"a": "1"}
+    loaded.replica.close()
+
+
+async def test_what_is_no_update_ends_its_sender_and_nobody_else(
+    journal: Journal, rooms: Rooms
+) -> None:
+    ada, eve = Client("ada"), Client("eve")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        eve.join(room)
+        await settle(ada, eve)
+        eve.deliver(wire.change(b"\x01\x01\x01nonsense"))
+        eve.deliver(wire.change(updates(("later", "x"))[0]))
+        ada.map["a"] = "1"
+        await settle(ada)
+        assert eve.member is not None
+        assert await eve.member.ended() == wire.MALFORMED
+        assert ada.member is not None
+        assert not ada.member.closed
+    assert len(await bodies(journal)) == 1
+
+
+class PanicException(BaseException):
+    """Named as what the CRDT library raises when it panics; not every version does for the same bytes."""
+
+
+async def test_an_update_that_breaks_the_library_is_refused_and_harms_nobody(
+    journal: Journal, rooms: Rooms, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (poison,) = updates(("poison", "1"))
+    original = Replica.apply
+
+    def apply(self: Replica, *given: bytes) -> None:
+        with replica._guarded():
+            if poison in given:
+                raise PanicException("index out of bounds")
+        original(self, *given)
+
+    monkeypatch.setattr(Replica, "apply", apply)
+    ada, eve = Client("ada"), Client("eve")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        eve.join(room)
+        ada.map["a"] = "1"
+        await settle(ada, eve)
+        before = await room.quiet()
+        ada.map["b"] = "2"
+        ada.speak()
+        eve.deliver(wire.change(poison))
+        ada.map["c"] = "3"
+        ada.speak()
+        await settle(ada)
+        assert eve.member is not None
+        assert await eve.member.ended() == wire.MALFORMED
+        assert (await room.quiet()) is not before  # read again from the log
+        with pytest.raises(BadInput):
+            await room.submit(poison, "server")
+        assert (await room.quiet()).doc.get("things", type=Map).to_py() == ada.things
+        assert len(ada.things) == 3
+        assert ada.durable == ada.sent
+    assert len(await bodies(journal)) == 3
+
+
+async def test_counts_that_bytes_cannot_hold_are_refused_before_the_library_allocates(
+    rooms: Rooms,
+) -> None:
+    async with rooms.enter(STREAM) as room:
+        with pytest.raises(BadInput, match="more clients than bytes"):
+            await room.submit(bytes.fromhex("8be0cc71"), "eve")
+
+
+async def test_an_update_over_a_mebibyte_is_refused(journal: Journal, rooms: Rooms) -> None:
+    eve = Client("eve")
+    async with rooms.enter(STREAM) as room:
+        eve.join(room)
+        await settle(eve)
+        eve.map["a"] = "x" * (1 << 20)
+        eve.speak()
+        assert eve.member is not None
+        assert await eve.member.ended() == wire.TOO_BIG
+        await room.quiet()
+    assert await bodies(journal) == []
+
+
+async def test_a_viewer_sees_everything_and_changes_nothing(journal: Journal, rooms: Rooms) -> None:
+    ada, vic = Client("ada"), Client("vic")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        vic.join(room, edits=False)
+        ada.map["a"] = "1"
+        await settle(ada, vic)
+        assert vic.things == {"a": "1"}
+        assert not vic.out  # was not asked what it has
+        vic.deliver(wire.answer(wire.NOTHING_NEW))
+        await settle(ada, vic)
+        assert vic.member is not None
+        assert not vic.member.closed
+        vic.map["a"] = "2"
+        vic.speak()
+        assert await vic.member.ended() == wire.FORBIDDEN
+        await settle(ada)
+        assert ada.things == {"a": "1"}
+    assert len(await bodies(journal)) == 1
+
+
+async def test_who_reads_too_slowly_is_let_go_and_nobody_waits(rooms: Rooms) -> None:
+    ada, bob, slow = Client("ada"), Client("bob"), Client("slow")
+    async with rooms.enter(STREAM) as room:
+        for client in (ada, bob, slow):
+            client.join(room)
+        await settle(ada, bob, slow)
+        for n in range(WAITING_FRAMES + 10):
+            ada.map["a"] = str(n)
+            await settle(ada, bob)
+        assert slow.member is not None
+        assert await slow.member.ended() == wire.TOO_SLOW
+        assert bob.things == ada.things
+        assert bob.member is not None
+        assert not bob.member.closed
+        slow.join(room)
+        await settle(slow)
+        assert slow.things == ada.things
+
+
+async def test_many_edits_between_two_commits_travel_as_one_message(
+    rooms: Rooms, gate: Gate
+) -> None:
+    ada, bob = Client("ada"), Client("bob")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        bob.join(room)
+        await settle(ada, bob)
+        gate.open.clear()
+        for n in range(40):
+            ada.map["a"] = str(n)
+            ada.speak()
+            await asyncio.sleep(0)
+        gate.open.set()
+        await room.quiet()
+        assert bob.member is not None
+        frames = [f for f in await bob.member.take() if f[0] == wire.SYNC]
+        assert len(frames) <= 2
+        for frame in frames:
+            bob.take(frame)
+        assert bob.things == {"a": "39"}
+        assert room.seq == 40
+
+
+async def test_opening_at_the_same_time_gives_one_room(rooms: Rooms) -> None:
+    async def visit() -> Room:
+        async with rooms.enter(STREAM) as room:
+            await asyncio.sleep(0)
+            return room
+
+    found = await asyncio.gather(*(visit() for _ in range(20)))
+    assert len(set(map(id, found))) == 1
+
+
+async def test_a_visitor_who_gives_up_takes_nobody_along(rooms: Rooms) -> None:
+    async def visit() -> int:
+        async with rooms.enter(STREAM) as room:
+            return room.seq
+
+    impatient = asyncio.create_task(visit())
+    patient = asyncio.create_task(visit())
+    await asyncio.sleep(0)
+    impatient.cancel()
+    assert await patient == 0
+
+
+async def test_an_empty_room_is_let_go_after_a_while_and_its_memory_freed(
+    journal: Journal,
+) -> None:
+    rooms = Rooms(journal, linger=0.05)
+    ada = Client("ada")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        ada.map["a"] = "1"
+        await settle(ada)
+        ada.leave()
+    assert rooms.open_room(STREAM) is room
+    await asyncio.sleep(0.02)
+    async with rooms.enter(STREAM) as same:
+        assert same is room
+        await asyncio.sleep(0.1)
+    assert rooms.open_room(STREAM) is room  # joining in time has cancelled it
+    await asyncio.sleep(0.2)
+    assert rooms.open_room(STREAM) is None
+    assert (await journal.snapshot(STREAM)) is not None
+    async with rooms.enter(STREAM) as fresh:
+        assert fresh is not room
+        assert fresh.seq == 1
+    await rooms.close()
+
+
+async def test_when_the_server_ends_everyone_is_told_to_come_again(journal: Journal) -> None:
+    rooms = Rooms(journal)
+    ada = Client("ada")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        await settle(ada)
+        ada.map["a"] = "1"
+        ada.speak()
+        member = ada.member
+        assert member is not None
+        await rooms.close()
+        assert await member.ended() == wire.RESTARTING
+    assert len(await bodies(journal)) == 1
+
+
+async def test_a_silent_socket_hears_something(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("action_assistant.editor.rooms._TICK", 0.02)
+    monkeypatch.setattr("action_assistant.editor.rooms._SILENCE", 0.05)
+    rooms = Rooms(journal)
+    ada = Client("ada")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        await settle(ada)
+        assert ada.member is not None
+        async with asyncio.timeout(2):
+            assert await ada.member.take() == [wire.BEAT]
+        ada.leave()
+    await rooms.close()
+
+
+async def test_looking_shows_what_is_committed(rooms: Rooms, gate: Gate) -> None:
+    (update,) = updates(("a", "1"))
+
+    def see(replica: Replica, seq: int) -> tuple[Any, int]:
+        return replica.doc.get("things", type=Map).to_py(), seq
+
+    async with rooms.enter(STREAM) as room:
+        gate.open.clear()
+        submitting = asyncio.create_task(room.submit(update, "x"))
+        await asyncio.sleep(0.02)
+        looking = asyncio.create_task(room.look(see))
+        await asyncio.sleep(0.02)
+        assert not looking.done()
+        gate.open.set()
+        assert await looking == ({"a": "1"}, 1)
+        assert await submitting == 1
+        with pytest.raises(ZeroDivisionError):
+            await room.look(lambda _, seq: seq // 0)
