@@ -36,6 +36,7 @@ export function Bar({ crumbs, status, actions, start, graph, history = false }: 
               px="sm"
               leftSection={<IconHistory size={16} aria-hidden />}
               className={style.history ?? ""}
+              data-tight={start ? true : undefined}
             >
               Runs
             </Button>

@@ -1,7 +1,7 @@
 /** What a deed works on: the open graph, what is selected, and the view of it. */
 import { createContext, use } from "react";
 import type * as Y from "yjs";
-import type { NewAction } from "../graph/edit";
+import { addAction, moveActions, type NewAction, together } from "../graph/edit";
 import { relationId } from "../graph/layout";
 import {
   type Action,
@@ -13,6 +13,7 @@ import {
   type Precondition,
   type Relation,
 } from "../graph/model";
+import { CARD, unplaced } from "../ui/canvas/arrange";
 
 /** Where the search for an action opens, and what it is tied to once chosen. */
 export interface AddRequest {
@@ -81,4 +82,28 @@ export function endName(graph: Graph, key: Key): string {
   return action ? `${action.name} ${action.instanceId}` : "something deleted";
 }
 
-export type { NewAction };
+/**
+ * A free place for one more card: under what is selected, else in the middle of the view. Upper
+ * left corner, on the canvas.
+ */
+export function freePlace(bench: Bench): Position {
+  const [selected] = selectedActions(bench);
+  const places = bench.places();
+  const at = selected && places.get(selected.key);
+  let [x, y] = at ? [at[0], at[1] + 180] : bench.view.middle();
+  if (!at) x -= CARD.width / 2;
+  const isTaken = () =>
+    [...places.values()].some(
+      ([px, py]) => Math.abs(px - x) < CARD.width + 16 && Math.abs(py - y) < CARD.height + 16,
+    );
+  for (let i = 0; i < 60 && isTaken(); i += 1) x += CARD.width / 2;
+  return [Math.round(x), Math.round(y)];
+}
+
+/** Adds an action by hand: everything else stays where it is drawn. Answers its key. */
+export function placeAction(bench: Bench, action: NewAction, position: Position): Key {
+  return together(bench.doc, () => {
+    moveActions(bench.doc, unplaced(bench.graph, bench.places()));
+    return addAction(bench.doc, { ...action, position });
+  });
+}

@@ -10,7 +10,7 @@ import {
   SelectionMode,
 } from "@xyflow/react";
 import { type MouseEvent, useEffect, useRef } from "react";
-import { addAction, connect } from "../graph/edit";
+import { connect } from "../graph/edit";
 import type { Position, Precondition } from "../graph/model";
 import { useRoom } from "../room/use-room";
 import { CARD } from "../ui/canvas/arrange";
@@ -19,7 +19,7 @@ import { ArrowTips } from "../ui/canvas/outcome-arrow";
 import { edgeTypes, nodeTypes } from "../ui/canvas/view";
 import { actionCarrier } from "../ui/carry";
 import { robotColor } from "../ui/robot";
-import type { Bench } from "./bench";
+import { type Bench, placeAction } from "./bench";
 import style from "./canvas.module.css";
 import { Cursors } from "./people";
 import type { useCanvas } from "./use-canvas";
@@ -27,6 +27,7 @@ import type { useCanvas } from "./use-canvas";
 interface Props {
   bench: Bench;
   canvas: ReturnType<typeof useCanvas>;
+  me: string;
   /** There is room for a map. */
   map: boolean;
 }
@@ -56,7 +57,7 @@ function nodeAt([x, y]: Position): string | null {
   return hit?.dataset.id ?? null;
 }
 
-export function Canvas({ bench, canvas, map }: Props) {
+export function Canvas({ bench, canvas, me, map }: Props) {
   const { doc, presence } = useRoom();
   const { flow } = canvas;
   const frame = useRef<HTMLDivElement>(null);
@@ -68,9 +69,9 @@ export function Canvas({ bench, canvas, map }: Props) {
         if (!box || x < box.left || x > box.right || y < box.top || y > box.bottom) return;
         const at = flow.screenToFlowPosition({ x, y });
         const position: Position = [Math.round(at.x - CARD.width / 2), Math.round(at.y - 24)];
-        bench.select([addAction(doc, { ...load, position })]);
+        bench.select([placeAction(bench, load, position)]);
       }),
-    [flow, doc, bench],
+    [flow, bench],
   );
 
   const openAddAt = (screen: Position, from: { key: string; outcome: Precondition } | null) => {
@@ -152,7 +153,7 @@ export function Canvas({ bench, canvas, map }: Props) {
       >
         <ArrowTips />
         <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
-        <Cursors />
+        <Cursors me={me} />
         {map && (
           <MiniMap<CanvasNode>
             position="top-right"

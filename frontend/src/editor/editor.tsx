@@ -6,13 +6,11 @@ import { type ReactNode, useCallback, useMemo, useState } from "react";
 import { type Problems, useProblems } from "../api/graphs";
 import type { Progress } from "../api/progress";
 import type { NewAction } from "../graph/edit";
-import { addAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import { useLink } from "../room/use-room";
-import { CARD } from "../ui/canvas/arrange";
 import type { ProblemCount } from "../ui/canvas/elements";
 import type { Crumb } from "../ui/top-bar";
-import { type Bench, BenchContext, type Panel } from "./bench";
+import { type Bench, BenchContext, freePlace, type Panel, placeAction } from "./bench";
 import { useShortcuts } from "./deeds/keys";
 import { Details } from "./details/details";
 import style from "./editor.module.css";
@@ -91,20 +89,6 @@ function obstacleOf(
   return null;
 }
 
-/** Where an action goes that was tapped in the list: under what is selected, else into the middle. */
-function placeFor(bench: Bench): [number, number] {
-  const [selected] = bench.graph.actions.filter((action) => bench.selection.has(action.key));
-  const at = selected && bench.places().get(selected.key);
-  const taken = [...bench.places().values()];
-  let [x, y] = at ? [at[0], at[1] + 180] : bench.view.middle();
-  if (!at) x -= CARD.width / 2;
-  while (taken.some(([tx, ty]) => Math.abs(tx - x) < 90 && Math.abs(ty - y) < 70)) {
-    x += 60;
-    y += 40;
-  }
-  return [Math.round(x), Math.round(y)];
-}
-
 export function Editor(props: Props) {
   const { id, known, progress } = props;
   const wide = useMediaQuery("(min-width: 1101px)", true, { getInitialValueInEffect: false });
@@ -123,7 +107,7 @@ export function Editor(props: Props) {
   useShortcuts(bench);
 
   const place = (template: NewAction) => {
-    bench.select([addAction(bench.doc, { ...template, position: placeFor(bench) })]);
+    bench.select([placeAction(bench, template, freePlace(bench))]);
     setLeft(false);
   };
   const [selected = null] = bench.graph.actions
@@ -142,6 +126,7 @@ export function Editor(props: Props) {
   };
   const stage = (
     <Stage
+      me={props.me}
       sight={sight}
       progress={progress}
       problems={counts}
@@ -162,31 +147,7 @@ export function Editor(props: Props) {
             {wide && props.status(shown)}
           </>
         ),
-        actions: (
-          <>
-            {!wide && !phone && (
-              <>
-                <ActionIcon
-                  size={34}
-                  aria-label="Graphs and actions"
-                  aria-pressed={left}
-                  onClick={() => setLeft((was) => !was)}
-                >
-                  <IconLayoutSidebar size={18} />
-                </ActionIcon>
-                <ActionIcon
-                  size={34}
-                  aria-label="Details"
-                  aria-pressed={right}
-                  onClick={() => setRight((was) => !was)}
-                >
-                  <IconLayoutSidebarRight size={18} />
-                </ActionIcon>
-              </>
-            )}
-            <People me={props.me} />
-          </>
-        ),
+        actions: <People me={props.me} />,
         start: phone ? null : props.start(shown),
       })}
       {phone ? (
@@ -205,7 +166,7 @@ export function Editor(props: Props) {
             {pane === "run" && (
               <div className={style.sheet}>
                 <div className={style.start}>{props.start(shown)}</div>
-                {props.status(shown)}
+                <div className={style.status}>{props.status(shown)}</div>
                 {strip}
               </div>
             )}
@@ -218,6 +179,30 @@ export function Editor(props: Props) {
           </aside>
           <section className={style.canvas} aria-label="Graph">
             {stage}
+            {!wide && (
+              <>
+                <ActionIcon
+                  size={40}
+                  variant="default"
+                  className={style.toLeft ?? ""}
+                  aria-label="Graphs and actions"
+                  aria-pressed={left}
+                  onClick={() => setLeft((was) => !was)}
+                >
+                  <IconLayoutSidebar size={18} />
+                </ActionIcon>
+                <ActionIcon
+                  size={40}
+                  variant="default"
+                  className={style.toRight ?? ""}
+                  aria-label="Details"
+                  aria-pressed={right}
+                  onClick={() => setRight((was) => !was)}
+                >
+                  <IconLayoutSidebarRight size={18} />
+                </ActionIcon>
+              </>
+            )}
           </section>
           <div className={style.strip}>
             {!wide && <div className={style.draft}>{props.status(shown)}</div>}

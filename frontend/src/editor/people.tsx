@@ -3,7 +3,7 @@ import { Tooltip } from "@mantine/core";
 import { ViewportPortal } from "@xyflow/react";
 import type { Person } from "../room/presence";
 import { usePeople } from "../room/use-room";
-import { initials, personColor } from "../ui/robot";
+import { colorsOf, initials } from "../ui/robot";
 import style from "./people.module.css";
 
 const MOST = 4;
@@ -21,13 +21,14 @@ export function People({ me }: { me: string }) {
   const others = onePerId(usePeople()).filter((person) => person.id !== me);
   if (others.length === 0) return null;
   const shown = others.slice(0, MOST);
+  const colors = colorsOf([me, ...others.map((person) => person.id)]);
   const names = others.map(nameOf).join(", ");
   return (
     <div className={style.people}>
       <span className="visually-hidden">Also here: {names}</span>
       {shown.map((person) => (
         <Tooltip key={person.id} label={nameOf(person)}>
-          <span className={style.face} style={{ background: personColor(person.id) }}>
+          <span className={style.face} style={{ background: colors.get(person.id) }}>
             {initials(nameOf(person))}
           </span>
         </Tooltip>
@@ -41,8 +42,9 @@ export function People({ me }: { me: string }) {
   );
 }
 
-export function Cursors() {
+export function Cursors({ me }: { me: string }) {
   const people = usePeople();
+  const colors = colorsOf([me, ...people.map((person) => person.id)]);
   return (
     <ViewportPortal>
       {people.map((person) => {
@@ -55,7 +57,7 @@ export function Cursors() {
             style={
               {
                 transform: `translate(${at[0]}px, ${at[1]}px)`,
-                "--c": personColor(person.id),
+                "--c": colors.get(person.id),
               } as React.CSSProperties
             }
             aria-hidden

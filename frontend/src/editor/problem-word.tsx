@@ -20,7 +20,8 @@ export function ProblemWord({ problems }: { problems: Problems | undefined }) {
       }
     >
       <IconAlertTriangle size={13} aria-hidden />
-      <span>{count === 1 ? "1 problem" : `${count} problems`}</span>
+      {count}
+      <span> {count === 1 ? "problem" : "problems"}</span>
     </button>
   );
 }

@@ -2,11 +2,11 @@
 import { Kbd, TextInput } from "@mantine/core";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useEffect, useId, useMemo, useRef, useState } from "react";
-import { addAction, connect, type NewAction, together } from "../graph/edit";
+import { connect, type NewAction, together } from "../graph/edit";
 import type { Position } from "../graph/model";
 import { CARD } from "../ui/canvas/arrange";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../ui/outcome";
-import { type AddRequest, type Bench, endName } from "./bench";
+import { type AddRequest, type Bench, endName, placeAction } from "./bench";
 import style from "./quick-add.module.css";
 
 interface Props {
@@ -39,7 +39,7 @@ function placed(bench: Bench, request: AddRequest, template: NewAction): string 
   const [x, y] = request.at;
   const position: Position = [x - Math.round(CARD.width / 2), y];
   return together(bench.doc, () => {
-    const key = addAction(bench.doc, { ...template, position });
+    const key = placeAction(bench, template, position);
     if (request.from) connect(bench.doc, request.from.key, key, request.from.outcome);
     return key;
   });

@@ -16,6 +16,7 @@ import type { EditorState } from "./use-bench";
 import { useCanvas } from "./use-canvas";
 
 interface Props {
+  me: string;
   sight: EditorState["sight"];
   progress: ReadonlyMap<Key, Progress>;
   problems: ReadonlyMap<Key, ProblemCount>;
@@ -24,10 +25,11 @@ interface Props {
   corner: ReactNode;
 }
 
-function Inside({ sight, progress, problems, compact, corner }: Props) {
+function Inside({ me, sight, progress, problems, compact, corner }: Props) {
   const bench = useBench();
   const link = useLink();
   const canvas = useCanvas({
+    me,
     graph: bench.graph,
     selection: bench.selection,
     select: bench.select,
@@ -71,7 +73,12 @@ function Inside({ sight, progress, problems, compact, corner }: Props) {
 
   return (
     <div className={style.stage}>
-      <Canvas bench={bench} canvas={canvas} map={!compact && bench.graph.actions.length > 3} />
+      <Canvas
+        bench={bench}
+        canvas={canvas}
+        me={me}
+        map={!compact && bench.graph.actions.length > 3}
+      />
       {!arrived && (
         <div className={style.waiting} aria-busy="true">
           <Skeleton height={92} width={208} radius="lg" />

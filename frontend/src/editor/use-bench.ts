@@ -1,7 +1,8 @@
 /** The state of an open editor, and the bench that deeds work on. */
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useGraph, useRoom, useUndo } from "../room/use-room";
-import type { AddRequest, Bench, Panel, Tool, View } from "./bench";
+import { CARD } from "../ui/canvas/arrange";
+import { type AddRequest, type Bench, freePlace, type Panel, type Tool, type View } from "./bench";
 
 const NONE: ReadonlySet<string> = new Set();
 
@@ -61,13 +62,15 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
     },
     [onPanel],
   );
+  const latest = useRef<Bench | null>(null);
   const openAdd = useCallback((request?: AddRequest) => {
-    if (request) {
-      setAdding(request);
+    if (request || latest.current === null) {
+      setAdding(request ?? null);
       return;
     }
-    const at = sight.current.view.middle();
-    setAdding({ screen: sight.current.view.screenOf(at), at, from: null });
+    const [x, y] = freePlace(latest.current);
+    const at = [x + CARD.width / 2, y] as const;
+    setAdding({ screen: latest.current.view.screenOf(at), at, from: null });
   }, []);
   const closeAdd = useCallback(() => setAdding(null), []);
 
@@ -98,5 +101,6 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
     }),
     [doc, undo, graph, canUndo, canRedo, selection, tool, select, setPanel, openAdd, id],
   );
+  latest.current = bench;
   return { bench, panel, adding, sight, closeAdd };
 }

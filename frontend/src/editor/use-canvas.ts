@@ -11,7 +11,7 @@ import { moveActions } from "../graph/edit";
 import type { Graph, Key, Position } from "../graph/model";
 import type { Person } from "../room/presence";
 import { usePeople, useRoom } from "../room/use-room";
-import { type Places, placesOf } from "../ui/canvas/arrange";
+import { type Places, placesOf, unplaced } from "../ui/canvas/arrange";
 import {
   type Arrow,
   type CanvasNode,
@@ -20,7 +20,7 @@ import {
   nodesOf,
   type ProblemCount,
 } from "../ui/canvas/elements";
-import { personColor } from "../ui/robot";
+import { colorsOf } from "../ui/robot";
 
 export interface Size {
   readonly width: number;
@@ -28,6 +28,7 @@ export interface Size {
 }
 
 interface Given {
+  me: string;
   graph: Graph;
   selection: ReadonlySet<string>;
   select: (ids: Iterable<string>) => void;
@@ -70,7 +71,7 @@ export function selectionAfter(
   return same ? before : next;
 }
 
-export function useCanvas({ graph, selection, select, progress, problems }: Given) {
+export function useCanvas({ me, graph, selection, select, progress, problems }: Given) {
   const { doc, presence } = useRoom();
   const people = usePeople();
   const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
@@ -82,15 +83,14 @@ export function useCanvas({ graph, selection, select, progress, problems }: Give
   chosen.current = selection;
 
   const drawn = useRef<{ nodes: CanvasNode[]; edges: Arrow[] }>({ nodes: [], edges: [] });
-  const others = useMemo(
-    () =>
-      new Map(
-        people.flatMap((person) =>
-          person.presence.selection.map((key) => [key, personColor(person.id)] as const),
-        ),
+  const others = useMemo(() => {
+    const colors = colorsOf([me, ...people.map((person) => person.id)]);
+    return new Map(
+      people.flatMap((person) =>
+        person.presence.selection.map((key) => [key, colors.get(person.id) ?? ""] as const),
       ),
-    [people],
-  );
+    );
+  }, [me, people]);
   const options = { others, places, selected: selection, progress, problems, measured: sizes };
   const nodes = keep(drawn.current.nodes, nodesOf(graph, options));
   const edges = keep(drawn.current.edges, edgesOf(graph, options));
@@ -150,7 +150,10 @@ export function useCanvas({ graph, selection, select, progress, problems }: Give
     const moved = all.map(
       (node) => [node.id, [round(node.position.x), round(node.position.y)]] as const,
     );
-    if (begun.current !== null) moveActions(doc, moved);
+    if (begun.current !== null) {
+      const dropped = new Map([...unplaced(graph, rest), ...moved]);
+      moveActions(doc, dropped);
+    }
     begun.current = null;
     setDrag(null);
     presence.tell({ drag: undefined });

@@ -15,6 +15,19 @@ export function personColor(id: string): string {
   return `var(--robot-${hash(id) % COLOURS})`;
 }
 
+/** A colour for each of the people in one place, each their own as long as colours last. */
+export function colorsOf(ids: readonly string[]): Map<string, string> {
+  const colors = new Map<string, string>();
+  const taken = new Set<number>();
+  for (const id of [...new Set(ids)].sort()) {
+    let at = hash(id) % COLOURS;
+    for (let i = 0; i < COLOURS && taken.has(at); i += 1) at = (at + 1) % COLOURS;
+    taken.add(at);
+    colors.set(id, `var(--robot-${at})`);
+  }
+  return colors;
+}
+
 export function initials(name: string): string {
   const words = name.trim().split(/\s+/);
   const letters =

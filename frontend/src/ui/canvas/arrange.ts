@@ -63,7 +63,23 @@ function knownPlaces(graph: Graph): Places {
   return known;
 }
 
-/** The middle of what an end is tied to, or of everything. */
+/**
+ * Where what has no place of its own is drawn. Written down before somebody places one thing by
+ * hand, so that the rest does not move. Nothing when every action has a place.
+ */
+export function unplaced(graph: Graph, places: ReadonlyMap<Key, Position>): [Key, Position][] {
+  const loose = graph.actions.filter((action) => action.position === null);
+  if (loose.length === 0) return [];
+  const keys = loose.map((action) => action.key);
+  if (!graph.entryPosition) keys.push(ENTRY);
+  if (!graph.exitPosition) keys.push(EXIT);
+  return keys.flatMap((key): [Key, Position][] => {
+    const at = places.get(key);
+    return at ? [[key, at]] : [];
+  });
+}
+
+/** The middle of what an end is tied to; before anything is, it stays over the first action. */
 function middle(graph: Graph, end: Key, places: Places): number {
   const tied = graph.relations.flatMap((r) =>
     end === ENTRY && r.parent === ENTRY
@@ -72,7 +88,7 @@ function middle(graph: Graph, end: Key, places: Places): number {
         ? [r.parent]
         : [],
   );
-  const keys = tied.length > 0 ? tied : graph.actions.map((action) => action.key);
+  const keys = tied.length > 0 ? tied : graph.actions.slice(0, 1).map((action) => action.key);
   const xs = keys.flatMap((key) => places.get(key)?.[0] ?? []);
   const sum = xs.reduce((total, x) => total + x, 0);
   return (xs.length === 0 ? 0 : sum / xs.length) + CARD.width / 2 - PILL.width / 2;

@@ -1,0 +1,104 @@
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { Live } from "./live";
+import type { Run } from "./runs";
+
+/** The browser's end of a socket whose other end is the test. */
+class Wire {
+  static readonly OPEN = 1;
+  static all: Wire[] = [];
+  readyState = 1;
+  sent: string[] = [];
+  onmessage: ((event: { data: string }) => void) | null = null;
+  onclose: (() => void) | null = null;
+  readonly url: string;
+  constructor(url: string) {
+    this.url = url;
+    Wire.all.push(this);
+  }
+  send(text: string) {
+    this.sent.push(text);
+  }
+  close() {
+    this.readyState = 3;
+    this.onclose?.();
+  }
+  say(message: object) {
+    this.onmessage?.({ data: JSON.stringify(message) });
+  }
+}
+
+const newest = () => {
+  const wire = Wire.all.at(-1);
+  if (!wire) throw new Error("no socket was opened");
+  return wire;
+};
+
+const run = (state: string, ended: string | null = null) =>
+  ({ id: "r", number: 1, state, ended_at: ended }) as unknown as Run;
+
+const posted = vi.fn();
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  Wire.all = [];
+  posted.mockReset();
+  vi.stubGlobal("WebSocket", Wire);
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    posted(init.method, url);
+    const body = url.endsWith("/api/runs/r") ? run("lost", "2026-01-01T00:00:00Z") : {};
+    return new Response(JSON.stringify(body), { status: 200 });
+  });
+});
+
+afterEach(() => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+test("one socket, by the runner's own address", () => {
+  const live = new Live("https://robots.example/runner");
+  live.open();
+  expect(Wire.all.map((wire) => wire.url)).toEqual(["wss://robots.example/runner/api/live"]);
+  live.close();
+});
+
+test("a runner that falls silent is unknown, and asked again", async () => {
+  const live = new Live("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  expect(live.now.link).toBe("live");
+  await vi.advanceTimersByTimeAsync(3_000);
+  expect(live.now.link).toBe("live");
+  newest().say({ type: "beat", at: "" });
+  await vi.advanceTimersByTimeAsync(4_000);
+  expect(live.now.link).toBe("down");
+  expect(live.now.runs.get("r")?.state).toBe("running");
+  await vi.advanceTimersByTimeAsync(1_000);
+  expect(Wire.all.length).toBe(2);
+  live.close();
+});
+
+test("Stop goes by socket and by POST at once", async () => {
+  const live = new Live("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  live.stop("r");
+  expect(JSON.parse(newest().sent[0] ?? "")).toMatchObject({ type: "stop", run: "r" });
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/r/stop");
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.now.stops.at(-1)?.state).toBe("heard");
+  expect(live.now.runs.get("r")?.state).toBe("running");
+  live.close();
+});
+
+test("a run that ended while the link was down is asked for", async () => {
+  const live = new Live("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  newest().close();
+  await vi.advanceTimersByTimeAsync(1_000);
+  newest().say({ type: "hello", engines: [], runs: [] });
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.now.runs.get("r")?.state).toBe("lost");
+  live.close();
+});

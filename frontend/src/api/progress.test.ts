@@ -1,0 +1,71 @@
+import { expect, test } from "vitest";
+import { endWords, progressByAid, progressOf, runWord } from "./progress";
+import type { ActionRun, Run } from "./runs";
+
+const run: Run = {
+  id: "r",
+  number: 1,
+  graph: "g",
+  graph_name: "g",
+  version: "v",
+  digest: "d",
+  engine: "simulator",
+  simulated: true,
+  state: "running",
+  desired: "running",
+  proof_at: null,
+  unknown_since: null,
+  result: null,
+  requested_at: "2026-01-01T00:00:00Z",
+  started_at: "2026-01-01T00:00:00Z",
+  ended_at: null,
+  author: { id: "p", name: "Ada" },
+  stopped_by: null,
+  detail: "",
+  alarms: [],
+  recorded: true,
+};
+
+const visit = {
+  from: "2026-01-01T00:00:01Z",
+  not_before: "2026-01-01T00:00:00Z",
+  not_after: null,
+  until: null,
+  result: null,
+  how: "observed",
+} as const;
+
+const going: ActionRun = { aid: "a", state: "RUNNING", visits: [visit], older: 0, messages: [] };
+
+test("an action that runs says since when", () => {
+  const progress = progressOf(going, run, false);
+  expect([progress.tone, progress.word]).toEqual(["run", "running"]);
+  expect(progress.since).toBe(Date.parse(visit.from));
+});
+
+test("while nobody hears of the run, what ran is unknown", () => {
+  expect(progressOf(going, run, true).tone).toBe("unknown");
+  expect(progressOf(going, { ...run, state: "unknown" }, false).tone).toBe("unknown");
+});
+
+test("an end that was not seen is not told as one of the four outcomes", () => {
+  const ended: ActionRun = {
+    ...going,
+    state: "FINISHED",
+    visits: [{ ...visit, until: visit.from }],
+  };
+  expect(progressOf(ended, run, false)).toMatchObject({ tone: "done", word: "finished" });
+});
+
+test("actions of sub-graphs carry no place on this canvas", () => {
+  const actions = { A_0: going, SUB__A_0: { ...going, aid: null } };
+  expect([...progressByAid({ ...run, actions }, false).keys()]).toEqual(["a"]);
+});
+
+test("a run is called stopped or finished only by its own state", () => {
+  expect(runWord({ ...run, desired: "stopped" }).word).toBe("running");
+  expect(runWord({ ...run, state: "stopping" }).word).toBe("stopping");
+  const stopped = { ...run, state: "stopped", stopped_by: { id: "q", name: "Mari" } } as const;
+  expect(endWords(stopped)).toBe("stopped by Mari");
+  expect(runWord({ ...run, state: "finished", result: "on_error" }).tone).toBe("error");
+});

@@ -1,0 +1,89 @@
+// @vitest-environment jsdom
+import { MantineProvider } from "@mantine/core";
+import { act } from "react";
+import { createRoot, type Root } from "react-dom/client";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { HoldButton } from "./hold-button";
+
+vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
+vi.stubGlobal("matchMedia", () => ({
+  matches: false,
+  addEventListener: () => {},
+  removeEventListener: () => {},
+}));
+vi.stubGlobal(
+  "ResizeObserver",
+  class {
+    observe() {}
+    unobserve() {}
+    disconnect() {}
+  },
+);
+
+let root: Root;
+const onHeld = vi.fn();
+
+function button(): HTMLButtonElement {
+  const found = document.querySelector("button");
+  if (!found) throw new Error("no button");
+  return found;
+}
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  onHeld.mockReset();
+  const place = document.body.appendChild(document.createElement("div"));
+  root = createRoot(place);
+  act(() =>
+    root.render(
+      <MantineProvider>
+        <HoldButton label="Start" name="Start v1" question="Sure?" onHeld={onHeld} />
+      </MantineProvider>,
+    ),
+  );
+});
+
+afterEach(() => {
+  act(() => root.unmount());
+  document.body.replaceChildren();
+  vi.useRealTimers();
+});
+
+const fire = (event: Event) => act(() => void button().dispatchEvent(event));
+const wait = (ms: number) => act(() => vi.advanceTimersByTime(ms));
+const pointer = (type: string) => new MouseEvent(type, { bubbles: true, button: 0 });
+const key = (type: string) => new KeyboardEvent(type, { key: "Enter", bubbles: true });
+
+test("a tap starts nothing", () => {
+  fire(pointer("pointerdown"));
+  wait(200);
+  fire(pointer("pointerup"));
+  wait(2000);
+  expect(onHeld).not.toHaveBeenCalled();
+});
+
+test("held by pointer it starts once", () => {
+  fire(pointer("pointerdown"));
+  wait(700);
+  fire(pointer("pointerup"));
+  wait(2000);
+  expect(onHeld).toHaveBeenCalledTimes(1);
+});
+
+test("held by Enter it starts once", () => {
+  fire(key("keydown"));
+  wait(700);
+  fire(key("keyup"));
+  expect(onHeld).toHaveBeenCalledTimes(1);
+});
+
+test("a screen reader's click asks first", () => {
+  fire(new MouseEvent("click", { bubbles: true, detail: 0 }));
+  wait(500);
+  expect(onHeld).not.toHaveBeenCalled();
+  const confirm = [...document.querySelectorAll("button")].find(
+    (other) => other.textContent === "Start v1",
+  );
+  act(() => confirm?.click());
+  expect(onHeld).toHaveBeenCalledTimes(1);
+});
