@@ -20,6 +20,7 @@ from runner.world import (
     engine,
     order,
     sequence,
+    two_ends,
     until,
     virtual,
 )
@@ -367,6 +368,37 @@ async def test_an_action_that_ignores_stop_ends_in_error_not_in_stopped() -> Non
     found = world.ledger.history(run.id)
     assert state == "error"
     assert any(each.code == "stop_unconfirmed" for each in found.alarms)
+
+
+@virtual
+async def test_a_robot_that_does_not_obey_any_more_is_never_called_stopped() -> None:
+    """H12: the graph has finished, an action still runs, and the engine ignores every stop."""
+    robot = Robot(engine({"Work_0": [{"after_s": 1}], "*": [{"never": True}]}))
+    world = World({"David": robot})
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(robot.engine.run)
+        async with world.runner() as control:
+            run = (await control.start(order(two_ends(), engine="David"), ANN)).run
+            await anyio.sleep(5)
+            assert control.open[run.id].run.state == "running"
+            await control.stop(run.id, ANN)
+            await anyio.sleep(60)
+            now = control.open[run.id].run
+            assert (now.state, now.proof_at) == ("stopping", None)
+            assert "ignores Stop, while Work_1 goes on" in now.alarms[-1].text
+        tasks.cancel_scope.cancel()
+
+
+@virtual
+async def test_a_simulated_engine_that_does_not_obey_is_switched_off_and_its_run_lost() -> None:
+    world = World()
+    script = {"Work_0": [{"after_s": 1}], "*": [{"never": True}]}
+    async with world.runner() as control:
+        run = (await control.start(order(two_ends(), script=script), ANN)).run
+        await anyio.sleep(5)
+        await control.stop(run.id, ANN)
+        assert await ended(control, run.id) == "lost"
+    assert "switched off" in world.ledger.history(run.id).detail
 
 
 @virtual

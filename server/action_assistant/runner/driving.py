@@ -54,6 +54,7 @@ _SILENT_S: Final = 3.0
 _APPEAR_S: Final = 3.0  # until a started graph must show in answers
 _GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun
 _UNCONFIRMED_S: Final = 2.0
+_SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobody
 _REST_S: Final = 1.0  # a graph that never began is believed only after it was seen so for this long
 _TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
 _ONE_PRESS_S: Final = 1.0
@@ -382,9 +383,10 @@ class OpenRun:
                 alarmed = True
                 why = failed or self._stop_trouble or "no proof has come"
                 self._alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}.")
-                if self._hung and self._owns_link:
-                    self._end("lost", f"{self._hung} It was switched off.")
-                    return
+            if self._owns_link and anyio.current_time() - began >= _SWITCH_OFF_S:
+                why = self._hung or f"It does not obey: {self._stop_trouble}."
+                self._end("lost", f"{why} The simulated engine was switched off.")
+                return
             await anyio.sleep(gap)
             gap = min(gap * 1.5, 1.0)
 
