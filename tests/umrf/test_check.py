@@ -148,6 +148,21 @@ def test_a_join_of_a_branch_that_never_runs_never_fires() -> None:
     assert "C_0 waits for B_0" in message
 
 
+def test_two_branches_of_a_decision_that_the_exit_both_requires_are_found() -> None:
+    graph = file(
+        action("A", children=["B", "C"]),
+        action("B", parents=[{"name": "A", "conditions": ["on_false -> ignore", *SAFE]}]),
+        action("C", parents=[{"name": "A", "conditions": ["on_true -> ignore", *SAFE]}]),
+        exits=["B", "C"],
+    )
+    messages = [p.message for p in problems(graph) if p.code == "H8"]
+    assert len(messages) == 1
+    assert "the exit still waits for parents" in messages[0]
+    for end in graph["graph_exit"]:
+        end["required"] = False
+    assert problems(graph) == []
+
+
 def test_a_spontaneous_action_before_a_loop_is_an_error() -> None:
     back = {"name": "C", "required": False, "conditions": SAFE}
     graph = file(

@@ -262,6 +262,20 @@ def test_two_actions_without_duration_in_a_loop_lock_the_engine() -> None:
     assert hazards(traces) == ["H5"]
 
 
+def test_a_bypass_in_circles_locks_the_engine_and_ends_the_trace() -> None:
+    round_ = Conditions("run", "run", "bypass")
+    graph = optional(graph_of("entry>A", "A>B", "B>A", AB=round_, BA=round_), "B>A")
+    traces = list(simulate(graph, script=script(B=[Behaviour(result="on_error")])))
+    assert isinstance(traces[-1], Hazard)
+    assert (traces[-1].code, traces[-1].effect) == ("H3", "hang")
+
+
+def test_an_action_that_cannot_be_loaded_in_a_loop_ends_the_trace() -> None:
+    graph = optional(graph_of("entry>A", "A>B", "B>A"), "B>A")
+    traces = list(simulate(graph, script=Script({"*": (Behaviour(init_error=True),)})))
+    assert hazards(traces) == ["H5"]
+
+
 def test_a_spontaneous_action_before_a_loop_kills_the_engine() -> None:
     graph = optional(graph_of("entry>A", "A>B", "B>C", "C>B", "C>exit"), "C>B")
     first = msgspec.structs.replace(graph.actions[0], type="spontaneous")

@@ -5,6 +5,7 @@ from typing import Final
 
 from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
+from action_assistant.umrf.checks.scenarios import check_scenarios
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.values import check_values
 from action_assistant.umrf.codec import Reading
@@ -32,6 +33,7 @@ def check(
     check_flow(subject)
     check_values(subject, library)
     _check_actors(subject)
+    check_scenarios(subject)
     return sorted(subject.problems, key=lambda problem: problem.severity)
 
 

@@ -37,6 +37,8 @@ Task: TypeAlias = Callable[[], None]
 
 #: A node that starts so often at one instant runs in a loop without time.
 INSTANT_LAPS = 3
+#: So many bypasses at one instant, and ten for each action, are a circle.
+BYPASSES = 1_000
 
 _OUTCOMES: dict[str, Outcome] = {
     "on_true": "on_true", "on_false": "on_false", "on_error": "on_error",
@@ -222,6 +224,13 @@ class Core:
         if not self.facts.bypass_fixed or self.facts.simulated:
             message = "A bypass to an action reads freed memory: the engine may abort here."
             self._hazard(graph, "H3", "goes on", message, child)
+        graph.bypasses = graph.bypasses + 1 if graph.bypassed_ms == self.now else 0
+        graph.bypassed_ms = self.now
+        if graph.bypasses > BYPASSES + 10 * len(graph.nodes):
+            message = "A bypass goes round in circles: the engine starts threads without end."
+            self._lock(graph, "H3", message, child)
+            self._halt_time()
+            return
         self._soon(partial(self._inform, graph, child, result))
 
     def _finish(self, graph: Running, last: Node, result: Outcome) -> None:
@@ -247,6 +256,13 @@ class Core:
                 f"“run” reaches {node.full_name}, whose thread still lives: the engine aborts."
             )
             self._crash(graph, "H4", message, node)
+            return
+        node.again = node.again + 1 if node.started_ms == self.now else 0
+        node.started_ms = self.now
+        if node.again >= INSTANT_LAPS:
+            message = "Actions without duration in a loop: the engine blocks itself."
+            self._lock(graph, "H5", message, node)
+            self._halt_time()
             return
         node.token += 1
         node.call = node.behaviours[min(node.calls, len(node.behaviours) - 1)]
@@ -279,13 +295,6 @@ class Core:
         return True
 
     def _begin(self, graph: Running, node: Node) -> None:
-        node.again = node.again + 1 if node.started_ms == self.now else 0
-        if node.again >= INSTANT_LAPS:
-            message = "Actions without duration in a loop: the engine blocks itself."
-            self._lock(graph, "H5", message, node)
-            self._halt_time()
-            return
-        node.started_ms = self.now
         node.calls += 1
         node.rest_ms = None
         self._state(graph, node, "RUNNING")

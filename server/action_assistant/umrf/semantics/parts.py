@@ -141,6 +141,8 @@ class Running:
         self.held = 0
         self.stuck = False
         self.pausing = False
+        self.bypasses = 0
+        self.bypassed_ms = -1.0
         self.stop_failed = False
         self.has_ghost_ends = False
         self.linked: dict[Node, list[Node] | None] = {}
