@@ -1,6 +1,5 @@
 """Graphs from the nested values of a D3 file, losing nothing (DESIGN 4, 5)."""
 
-import re
 from collections import Counter
 from collections.abc import Callable
 from itertools import chain
@@ -8,7 +7,17 @@ from typing import Final, TypeAlias
 
 import msgspec
 
-from action_assistant.umrf.jsontext import Json, Number, dump, pointer
+from action_assistant.umrf.fields import (
+    Extra,
+    action_attributes,
+    graph_attributes,
+    is_runtime,
+    number_of,
+    parameters_of,
+    position_of,
+    text_of,
+)
+from action_assistant.umrf.jsontext import Json, dump, pointer
 from action_assistant.umrf.model import (
     ENGINE_DEFAULTS,
     ENTRY,
@@ -18,17 +27,13 @@ from action_assistant.umrf.model import (
     Conditions,
     Graph,
     Key,
-    Parameter,
-    Position,
     Problem,
     Relation,
     Remap,
     Where,
 )
-from action_assistant.umrf.parameters import flatten
-from action_assistant.umrf.relations import conditions_of, remap_of, whole_of
+from action_assistant.umrf.relations import conditions_of, remap_of
 
-AID: Final = re.compile(r"[A-Za-z0-9]{12}")
 NODE_STATES: Final = {
     "UNINITIALIZED", "INITIALIZED", "RUNNING", "PAUSE_REQUESTED", "PAUSED", "STOPPING", "FINISHED",
     "BYPASSED", "ERROR",
@@ -46,9 +51,6 @@ _ACTION_FIELDS: Final = {
     "output_parameters", "parents", "children", "gui_attributes",
 }  # fmt: skip
 
-_ZERO: Final = Number("0")
-
-Extra: TypeAlias = list[tuple[str, str]]
 _Kind: TypeAlias = "Callable[[int, dict[str, Json], Extra], _Side]"
 _Name: TypeAlias = tuple[str, int]
 
@@ -105,9 +107,9 @@ class _Reader:
         extra: Extra = []
         if "graph_name" not in file:
             self.report("graph-name-missing", "", "The graph has no name; the engine refuses it.")
-        name = _text(file, "graph_name", extra)
-        description = _text(file, "graph_description", extra)
-        ours, rest = _graph_attributes(file)
+        name = text_of(file, "graph_name", extra)
+        description = text_of(file, "graph_description", extra)
+        ours, rest = graph_attributes(file)
         if rest is not None:
             extra.append(("gui_attributes", rest))
         notes = ours.get("notes")
@@ -122,8 +124,8 @@ class _Reader:
             description=description,
             actions=tuple(self.actions),
             relations=tuple(relations),
-            entry_position=_position(ours.get("entry")),
-            exit_position=_position(ours.get("exit")),
+            entry_position=position_of(ours.get("entry")),
+            exit_position=position_of(ours.get("exit")),
             notes=tuple((k, dump(v)) for k, v in notes.items()) if isinstance(notes, dict) else (),
             extra=tuple(extra),
         )
@@ -173,7 +175,7 @@ class _Reader:
     def _read_action(self, item: dict[str, Json], path: str, used: set[str]) -> None:
         extra: Extra = []
         index = len(self.actions)
-        position, key, rest = _action_attributes(item)
+        position, key, rest = action_attributes(item)
         if rest is not None:
             extra.append(("gui_attributes", rest))
         if key is None or key in used:
@@ -182,18 +184,18 @@ class _Reader:
         if "type" not in item:
             message = "The action has no type; the engine refuses the file. “sync” is assumed."
             self.report("type-missing", path, message)
-        name = _text(item, "name", extra)
-        instance_id = _whole(item, extra)
+        name = text_of(item, "name", extra)
+        instance_id = number_of(item, extra)
         twins = self.by_name.setdefault((name, instance_id), [])
         action = Action(
             key=key,
             name=name,
             instance_id=instance_id,
-            type=_text(item, "type", extra, "sync"),
-            actor=_text(item, "actor", extra),
-            description=_text(item, "description", extra),
-            inputs=_parameters(item, "input_parameters", extra),
-            outputs=_parameters(item, "output_parameters", extra),
+            type=text_of(item, "type", extra, "sync"),
+            actor=text_of(item, "actor", extra),
+            description=text_of(item, "description", extra),
+            inputs=parameters_of(item, "input_parameters", extra),
+            outputs=parameters_of(item, "output_parameters", extra),
             position=position,
             twin=bool(twins),
         )
@@ -207,7 +209,7 @@ class _Reader:
     def _read_run_state(self, item: dict[str, Json], key: Key, path: str) -> None:
         if state := self._state(item, "state", path):
             self.states[key] = state
-        if "runtime" in item and not _is_runtime(item["runtime"]):
+        if "runtime" in item and not is_runtime(item["runtime"]):
             message = "The run log of the action is malformed; the engine refuses the file."
             self.report("runtime-illegal", path + "/runtime", message)
 
@@ -233,7 +235,7 @@ class _Reader:
                 continue
             extra: Extra = []
             name = str(item["name"])
-            found.append(_Item(owner, name, _whole(item, extra), kind(index, item, extra)))
+            found.append(_Item(owner, name, number_of(item, extra), kind(index, item, extra)))
         return found
 
     @staticmethod
@@ -350,81 +352,3 @@ class _Reader:
             owner = self.actions[item.owner]
             return back.get((name, (owner.name, owner.instance_id)), found[0])
         return found[0]
-
-
-def _text(item: dict[str, Json], field: str, extra: Extra, default: str = "") -> str:
-    value = item.get(field, default)
-    if isinstance(value, str):
-        return value
-    extra.append((field, dump(value)))
-    return default
-
-
-def _whole(item: dict[str, Json], extra: Extra) -> int:
-    value = item.get("instance_id", _ZERO)
-    number, fits = whole_of(value)
-    if not fits:
-        extra.append(("instance_id", dump(value)))
-    return number
-
-
-def _parameters(item: dict[str, Json], field: str, extra: Extra) -> tuple[Parameter, ...]:
-    value = item.get(field, {})
-    if isinstance(value, dict):
-        return flatten(value)
-    extra.append((field, dump(value)))
-    return ()
-
-
-def _is_runtime(value: Json) -> bool:
-    messages = value.get("messages") if isinstance(value, dict) else None
-    return isinstance(messages, list) and all(
-        isinstance(message, dict)
-        and isinstance(message.get("timestamp"), Number)
-        and isinstance(message.get("message"), str)
-        for message in messages
-    )
-
-
-def _graph_attributes(file: dict[str, Json]) -> tuple[dict[str, Json], str | None]:
-    """Our part of a graph's `gui_attributes`, and the text of the rest."""
-    if "gui_attributes" not in file:
-        return {}, None
-    value = file["gui_attributes"]
-    ours = value.get("action_assistant") if isinstance(value, dict) else None
-    if not isinstance(value, dict) or not isinstance(ours, dict):
-        return {}, dump(value)
-    rest = {key: member for key, member in value.items() if key != "action_assistant"}
-    return ours, dump(rest) if rest else None
-
-
-def _action_attributes(
-    item: dict[str, Json],
-) -> tuple[Position | None, str | None, str | None]:
-    """Position and identity out of an action's `gui_attributes`, and the text of the rest."""
-    if "gui_attributes" not in item:
-        return None, None, None
-    value = item["gui_attributes"]
-    if not isinstance(value, dict):
-        return None, None, dump(value)
-    ours, point = value.get("action_assistant"), value.get("position")
-    aid = ours.get("aid") if isinstance(ours, dict) else None
-    position = _position(point)
-    rest = dict(value)
-    if isinstance(ours, dict):
-        del rest["action_assistant"]
-    if position is not None and isinstance(point, dict):
-        rest["position"] = {key: member for key, member in point.items() if key not in "xy"}
-        if not rest["position"]:
-            del rest["position"]
-    known = aid if isinstance(aid, str) and AID.fullmatch(aid) else None
-    return position, known, dump(rest) if rest or not value else None
-
-
-def _position(value: Json) -> Position | None:
-    if not isinstance(value, dict):
-        return None
-    x, y = value.get("x"), value.get("y")
-    if not isinstance(x, Number) or not isinstance(y, Number):
-        return None
-    return x.value, y.value

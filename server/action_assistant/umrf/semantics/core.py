@@ -1,16 +1,13 @@
 """The engine's clockwork: what one action's end sets in motion (SPEC 2.3, 2.4, 2.9)."""
 
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
-from heapq import heappop, heappush
 from math import inf
-from typing import TypeAlias
 
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics.clock import Clock, Task
 from action_assistant.umrf.semantics.parts import (
-    ACTIVE,
     HELD,
     Edge,
     Link,
@@ -24,16 +21,10 @@ from action_assistant.umrf.semantics.trace import (
     Dispatch,
     EdgeEval,
     GraphResult,
-    GraphState,
-    Hazard,
     NodeResult,
-    NodeState,
     NotReady,
-    Trace,
 )
 from action_assistant.umrf.semantics.values import RemapUnknown, fill_outputs, hand_over
-
-Task: TypeAlias = Callable[[], None]
 
 #: A node that starts so often at one instant runs in a loop without time.
 INSTANT_LAPS = 3
@@ -46,104 +37,16 @@ _OUTCOMES: dict[str, Outcome] = {
 assert set(_OUTCOMES) == set(OUTCOMES)
 
 
-class Core:
-    """Time, states, and the propagation of results. `Engine` adds the commands."""
+class Core(Clock):
+    """The propagation of results and the life of actions. `Engine` adds the commands."""
 
     def __init__(
         self, facts: EngineFacts, script: Script, library: Mapping[str, Graph], actor: str
     ) -> None:
-        self.facts = facts
+        super().__init__(facts)
         self.script = script
         self.library = library
         self.actor = actor
-        self.graphs: dict[str, Running] = {}
-        self.now = 0.0
-        #: Code of the hazard that ended the process, if one did.
-        self.crashed: str | None = None
-        #: Whether the engine's lock is held for ever: no command is answered any more.
-        self.locked = False
-        self._heap: list[tuple[float, int, Task]] = []
-        self._order = 0
-        self._tasks: deque[Task] = deque()
-        self._out: list[Trace] = []
-        self._touched: set[Running] = set()
-
-    # Time
-
-    def _at(self, t_ms: float, task: Task) -> None:
-        self._order += 1
-        heappush(self._heap, (t_ms, self._order, task))
-
-    def _soon(self, task: Task) -> None:
-        self._tasks.append(task)
-
-    def _run_until(self, to_ms: float) -> None:
-        self._settle()
-        while self._heap and self._heap[0][0] <= to_ms:
-            t_ms, _, task = heappop(self._heap)
-            self.now = max(self.now, t_ms)
-            task()
-            self._settle()
-        self.now = max(self.now, to_ms) if to_ms != inf else self.now
-
-    def _settle(self) -> None:
-        """Carries out everything that happens at this instant."""
-        while self._tasks:
-            self._tasks.popleft()()
-        for graph in self._touched:
-            self._notice_stuck(graph)
-        self._touched.clear()
-
-    # States
-
-    def _state(self, graph: Running, node: Node, state: str) -> None:
-        graph.count(node.state, -1)
-        graph.count(state, 1)
-        node.state = state
-        self._out.append(NodeState(self._t(), graph.name, node.full_name, state))
-        if state not in ACTIVE or state in HELD:
-            self._touched.add(graph)
-
-    def _graph_state(self, graph: Running, state: str) -> None:
-        graph.state = state
-        self._out.append(GraphState(self._t(), graph.name, state))
-        self._touched.add(graph)
-
-    def _t(self) -> float:
-        return round(self.now, 3)
-
-    def _hazard(
-        self, graph: Running, code: str, effect: str, message: str, node: Node | None = None
-    ) -> None:
-        name = node.full_name if node else None
-        self._out.append(Hazard(self._t(), graph.name, code, effect, name, message))
-
-    def _crash(self, graph: Running, code: str, message: str, node: Node | None = None) -> None:
-        """The engine's process ends here, with every graph in it."""
-        self._hazard(graph, code, "crash", message, node)
-        self.crashed = code
-        self._halt_time()
-
-    def _halt_time(self) -> None:
-        self._heap.clear()
-        self._tasks.clear()
-        self._touched.clear()
-
-    def _lock(self, graph: Running, code: str, message: str, node: Node | None = None) -> None:
-        self._hazard(graph, code, "hang", message, node)
-        self.locked = True
-
-    def _notice_stuck(self, graph: Running) -> None:
-        if graph.state != "RUNNING" or graph.stuck or graph.active > graph.held:
-            return
-        if graph.pausing or self.locked:
-            return
-        graph.stuck = True
-        if graph.held:
-            message = "Only paused actions are left; a pause and a resume of the graph wake them."
-        else:
-            message = "Nothing runs and nothing will: the graph stays RUNNING for ever."
-        self._hazard(graph, "H8", "goes on", message)
 
     # Results
 

@@ -8,10 +8,10 @@ from typing import Final, TypeAlias
 import msgspec
 
 from action_assistant.umrf.facts import SIMULATED, EngineFacts
-from action_assistant.umrf.jsontext import parse_small
-from action_assistant.umrf.model import ENTRY, EXIT, Graph, Key, Parameter
-from action_assistant.umrf.parameters import flat_name
-from action_assistant.umrf.semantics.core import Core, Task
+from action_assistant.umrf.model import Graph, Key
+from action_assistant.umrf.semantics.clock import Task
+from action_assistant.umrf.semantics.core import Core
+from action_assistant.umrf.semantics.matching import fits
 from action_assistant.umrf.semantics.parts import (
     Node,
     Outcome,
@@ -180,7 +180,7 @@ class Engine(Core):
         taken = running.own_names()
         for node in running.nodes.values():
             sub = self.library.get(node.name)
-            if sub is not None and node.name not in taken and _fits(node, sub):
+            if sub is not None and node.name not in taken and fits(node, sub):
                 node.subgraph = sub
         return running
 
@@ -380,27 +380,3 @@ class Engine(Core):
         above.sub = None
         if above.state in ("RUNNING", "STOPPING", "PAUSED", "PAUSE_REQUESTED"):
             self._ended(home, above, result)
-
-
-def _fits(node: Node, sub: Graph) -> bool:
-    """Whether an indexed graph has the signature that a node expects (SPEC 2.1)."""
-    entries = {r.child for r in sub.relations if r.parent == ENTRY}
-    exits = sorted((r.child_order, r.parent) for r in sub.relations if r.child == EXIT)
-    inputs: set[str] = set()
-    outputs: set[str] = set()
-    for action in sub.actions:
-        if action.key in entries:
-            inputs |= {name for name, has_value in _leaves(action.inputs) if not has_value}
-    for _, key in exits:
-        own = {name for a in sub.actions if a.key == key for name, _ in _leaves(a.outputs)}
-        outputs = own or outputs
-    return set(node.inputs) == inputs and set(node.outputs) == outputs
-
-
-def _leaves(parameters: tuple[Parameter, ...]) -> list[tuple[str, bool]]:
-    found = []
-    for parameter in parameters:
-        leaf = parse_small(parameter.text)
-        if isinstance(leaf, dict) and "pvf_type" in leaf:
-            found.append((flat_name(parameter.path), "pvf_value" in leaf))
-    return found
