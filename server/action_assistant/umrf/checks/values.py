@@ -74,39 +74,42 @@ def _check_inputs(
 ) -> None:
     """Required inputs for which there is no value."""
     known = (library or {}).get(action.name)
+    incoming = subject.incoming.get(action.key, [])
     for name, slot in inputs[action.key].items():
         if not slot.required or slot.has_value() or (known and name in known.optional):
             continue
-        incoming = [r for r in subject.incoming.get(action.key, []) if r.parent != ENTRY]
-        wrong: set[str] = set()
-        given = False
-        for relation in incoming:
-            own = outputs[relation.parent]
-            try:
-                place = renamed(own, relation.remap, {name: slot}).get(name)
-            except RemapUnknown:
-                continue
-            if place is None:
-                continue
-            if own[place].type == slot.type:
-                given = slot.updatable
-            else:
-                wrong.add(f"{relation.parent}: {own[place].type}")
-        starts = any(r.parent == ENTRY for r in subject.incoming.get(action.key, []))
         member = f"/input_parameters/{path_of(action, name)}"
-        if starts:
+        if any(relation.parent == ENTRY for relation in incoming):
             message = (
                 f"{action.full_name} is an entry and its input “{name}” has no value: the engine "
                 "silently never starts the graph, and says nothing. (As a sub-graph it may get one.)"
             )
             subject.report("H7", "error", message, action=action, member=member)
-        elif not given and subject.incoming.get(action.key):
-            kinds = " The type of what a parent hands over differs." if wrong else ""
+            continue
+        kinds = _given_kinds(incoming, outputs, name, slot)
+        if incoming and slot.type not in kinds:
+            wrong = " The type of what a parent hands over differs." if kinds else ""
             message = (
                 f"Nobody gives {action.full_name} its input “{name}”: it never runs and the graph "
-                f"stays RUNNING for ever.{kinds}"
+                f"stays RUNNING for ever.{wrong}"
             )
             subject.report("H8", "error", message, action=action, member=member)
+
+
+def _given_kinds(
+    incoming: list[Relation], outputs: Mapping[Key, _Slots], name: str, slot: Slot
+) -> set[str]:
+    """The types of what parents hand over to one input; none for a locked one."""
+    kinds: set[str] = set()
+    for relation in incoming if slot.updatable else []:
+        own = outputs[relation.parent]
+        try:
+            place = renamed(own, relation.remap, {name: slot}).get(name)
+        except RemapUnknown:
+            continue
+        if place is not None:
+            kinds.add(own[place].type)
+    return kinds
 
 
 def _check_static(subject: Subject, action: Action, inputs: _Slots) -> None:

@@ -148,9 +148,14 @@ class Running:
         self.linked: dict[Node, list[Node] | None] = {}
 
     def own_names(self) -> set[str]:
-        """What this graph and those it runs inside call themselves."""
-        found = {self.own}
-        return found if self.home is None else found | self.home.own_names()
+        """What this graph and those it runs inside call themselves, and are called."""
+        found, graph = set[str](), self
+        while True:
+            found.add(graph.own)
+            if graph.above is None or graph.home is None:
+                return found
+            found.add(graph.above.name)
+            graph = graph.home
 
     def count(self, state: str, by: int) -> None:
         """Keeps the sums of states."""
