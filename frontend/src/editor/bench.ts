@@ -74,12 +74,14 @@ export function selectedRelations(bench: Bench): Relation[] {
   return bench.graph.relations.filter((relation) => bench.selection.has(relationId(relation)));
 }
 
-/** How a person calls an end of a relation. */
+/** How a person calls an end of a relation: with the number only where the name is not enough. */
 export function endName(graph: Graph, key: Key): string {
   if (key === ENTRY) return "Entry";
   if (key === EXIT) return "Exit";
   const action = graph.actions.find((candidate) => candidate.key === key);
-  return action ? `${action.name} ${action.instanceId}` : "something deleted";
+  if (!action) return "something deleted";
+  const shared = graph.actions.some((other) => other !== action && other.name === action.name);
+  return shared ? `${action.name} ${action.instanceId}` : action.name;
 }
 
 /**

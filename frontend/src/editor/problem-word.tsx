@@ -21,7 +21,7 @@ export function ProblemWord({ problems }: { problems: Problems | undefined }) {
     >
       <IconAlertTriangle size={13} aria-hidden />
       {count}
-      <span> {count === 1 ? "problem" : "problems"}</span>
+      <span>{count === 1 ? "problem" : "problems"}</span>
     </button>
   );
 }

@@ -4,7 +4,7 @@ import { IconArrowDown, IconTrash, IconX } from "@tabler/icons-react";
 import { useState } from "react";
 import { removeRelation, setRemap, setRequired, setResponse } from "../../graph/edit";
 import { relationId } from "../../graph/layout";
-import { ENTRY, RESPONSES, type Relation, type Response } from "../../graph/model";
+import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../../graph/model";
 import { relationWords } from "../../graph/words";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
 import { endName, useBench } from "../bench";
@@ -143,8 +143,8 @@ export function RelationForm({ relation }: { relation: Relation }) {
             label={`${child} waits for this`}
             description={
               relation.required
-                ? "It runs only after all that it waits for have reported."
-                : "Optional: it may run without this one."
+                ? `It ${relation.child === EXIT ? "ends the graph" : "runs"} only after all that it waits for have reported.`
+                : "Optional: it need not report."
             }
             checked={relation.required}
             onChange={(event) => setRequired(doc, id, event.currentTarget.checked)}

@@ -15,7 +15,7 @@ import {
 } from "../../graph/model";
 import { OUTCOMES } from "../outcome";
 import { CARD, PILL, type Places } from "./arrange";
-import { type Box, laneFor, MOST_CARDS } from "./lanes";
+import { type Box, laneBack, laneFor, MOST_CARDS } from "./lanes";
 
 export interface ProblemCount {
   readonly error: number;
@@ -148,6 +148,7 @@ function laneOf(relation: Relation, outcome: Precondition, boxes: Map<Key, Box>)
   const others = [...boxes]
     .filter(([key]) => key !== relation.parent && key !== relation.child)
     .map(([, box]) => box);
+  if (to.y < start.y + 10) return laneBack(from, to, others) - LANE_WIDTH * at;
   const lane = laneFor(start, { x: to.x + to.width / 2, y: to.y }, others);
   if (lane === null) return null;
   return lane + Math.sign(lane - to.x) * LANE_WIDTH * at;

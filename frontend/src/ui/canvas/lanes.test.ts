@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { laneFor } from "./lanes";
+import { laneBack, laneFor } from "./lanes";
 
 const card = (x: number, y: number) => ({ x, y, width: 208, height: 80 });
 
@@ -14,4 +14,10 @@ test("a card in the way is passed on its nearer side", () => {
 
 test("a way back up is no matter of lanes", () => {
   expect(laneFor({ x: 30, y: 400 }, { x: 104, y: 0 }, [card(0, 200)])).toBeNull();
+});
+
+test("the way back goes through the gap, or round the left", () => {
+  expect(laneBack(card(0, 0), card(300, 0), [])).toBe(254);
+  expect(laneBack(card(0, 400), card(20, 0), [])).toBeLessThan(-30);
+  expect(laneBack(card(0, 400), card(20, 0), [card(-60, 200)])).toBeLessThan(-90);
 });

@@ -35,6 +35,23 @@ function curve(from: Point, to: Point): Point[] {
   });
 }
 
+/**
+ * The x of the lane for an arrow that leads back up: through the gap when the cards stand side by
+ * side, else round the left of everything on the way.
+ */
+export function laneBack(from: Box, to: Box, others: readonly Box[]): number {
+  if (from.x + from.width < to.x) return (from.x + from.width + to.x) / 2;
+  if (to.x + to.width < from.x) return (to.x + to.width + from.x) / 2;
+  const between = others.filter(
+    (box) =>
+      box.y < from.y + from.height &&
+      box.y + box.height > to.y &&
+      box.x < Math.max(from.x + from.width, to.x + to.width) &&
+      box.x + box.width > Math.min(from.x, to.x) - GAP,
+  );
+  return Math.min(from.x, to.x, ...between.map((box) => box.x)) - GAP - 12;
+}
+
 /** The x of the lane for an arrow from `from` down to `to`; null when its way is free. */
 export function laneFor(from: Point, to: Point, others: readonly Box[]): number | null {
   if (to.y < from.y + 8) return null;

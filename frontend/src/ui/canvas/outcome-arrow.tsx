@@ -9,23 +9,26 @@ interface Line {
   path: string;
   x: number;
   y: number;
+  anchor: "left" | "middle" | "right";
 }
 
-const ACROSS = 240; // px between handles of cards that stand side by side
-
-/** Up beside the target, so that loops and ways across can be told from the way down. */
-function backwards(sx: number, sy: number, tx: number, ty: number): Line {
-  const beside = Math.abs(tx - sx) > ACROSS;
-  const side = beside ? tx - Math.sign(tx - sx) * 132 : Math.min(sx, tx) - 150;
-  const [low, high] = [sy + 34, ty - 34];
+/** Back up on a lane beside the cards, so that loops can be told from the way down. */
+function backwards(sx: number, sy: number, tx: number, ty: number, side: number): Line {
+  const [low, high] = [sy + 30, ty - 30];
   const out = Math.sign(side - sx) || 1;
   const back = Math.sign(tx - side) || -1;
-  const r = Math.min(18, Math.abs(side - sx) / 2, (low - high) / 2);
+  const r = Math.max(0, Math.min(16, Math.abs(side - sx) / 2, Math.abs(tx - side) / 2));
   const path =
     `M${sx} ${sy}V${low - r}Q${sx} ${low} ${sx + out * r} ${low}H${side - out * r}` +
     `Q${side} ${low} ${side} ${low - r}V${high + r}Q${side} ${high} ${side + back * r} ${high}` +
     `H${tx - back * r}Q${tx} ${high} ${tx} ${high + r}V${ty}`;
-  return { path, x: side, y: (low + high) / 2 };
+  return { path, x: side, y: (low + high) / 2, anchor: anchorOf(side, sx, tx) };
+}
+
+/** A label on a lane hangs on the side that is away from the cards. */
+function anchorOf(lane: number, sx: number, tx: number): Line["anchor"] {
+  if (lane < Math.min(sx, tx)) return "right";
+  return lane > Math.max(sx, tx) ? "left" : "middle";
 }
 
 /** Down a lane beside the cards that stand in the way. */
@@ -39,15 +42,17 @@ function round(sx: number, sy: number, tx: number, ty: number, lane: number): Li
     `M${sx} ${sy}V${high - v}Q${sx} ${high} ${sx + out * r} ${high}H${lane - out * r}` +
     `Q${lane} ${high} ${lane} ${high + v}V${low - v}Q${lane} ${low} ${lane + back * r} ${low}` +
     `H${tx - back * r}Q${tx} ${low} ${tx} ${low + v}V${ty}`;
-  return { path, x: lane, y: (high + low) / 2 };
+  return { path, x: lane, y: (high + low) / 2, anchor: anchorOf(lane, sx, tx) };
 }
 
 function lineOf(props: EdgeProps<Arrow>): Line {
   const { sourceX, sourceY, targetX, targetY } = props;
   const from = sourceY + 1;
   const to = targetY - 2;
-  if (to < from + 8) return backwards(sourceX, from, targetX, to);
   const lane = props.data?.lane ?? null;
+  if (to < from + 8) {
+    return backwards(sourceX, from, targetX, to, lane ?? Math.min(sourceX, targetX) - 150);
+  }
   if (lane !== null && to > from + 60) return round(sourceX, from, targetX, to, lane);
   const [path, x, y] = getBezierPath({
     sourceX,
@@ -58,7 +63,7 @@ function lineOf(props: EdgeProps<Arrow>): Line {
     targetPosition: props.targetPosition,
     curvature: 0.3,
   });
-  return { path, x, y };
+  return { path, x, y, anchor: "middle" };
 }
 
 export function answerWords(answer: Answer): string {
@@ -82,9 +87,11 @@ function AnswerLine({ answer, optional }: { answer: Answer; optional: boolean })
   );
 }
 
+const SHIFTS = { left: "-10px", middle: "-50%", right: "calc(-100% + 10px)" } as const;
+
 export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) {
   const { id, data, selected } = props;
-  const { path, x, y } = lineOf(props);
+  const { path, x, y, anchor } = lineOf(props);
   if (!data) return null;
   const color = data.entry
     ? "var(--ink3)"
@@ -112,7 +119,7 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
             data-selected={selected || undefined}
             data-plain={isPlain(data.answers) || undefined}
             data-relation={data.relation}
-            style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
+            style={{ transform: `translate(${SHIFTS[anchor]}, -50%) translate(${x}px, ${y}px)` }}
           >
             {data.answers.map((answer, i) => (
               <AnswerLine
