@@ -99,6 +99,11 @@ def wall() -> int:
     return EPOCH + round(anyio.current_time() * 1e6)
 
 
+async def at_once(work: Callable[[], Any]) -> Any:
+    """Threads know nothing of virtual time."""
+    return work()
+
+
 class MemoryLedger:
     """A journal in memory, with the real tables. `down` makes it fail, `slow` makes it late;
     `forgetful` makes it commit and then say that it failed."""
@@ -279,7 +284,9 @@ class World:
     @asynccontextmanager
     async def runner(self) -> AsyncIterator[Control]:
         """A runner, up to its end."""
-        async with Control.opened(self.ledger, Robots(self.links), wall=wall) as control:
+        async with Control.opened(
+            self.ledger, Robots(self.links), wall=wall, aside=at_once
+        ) as control:
             control.watch(self._saw)
             yield control
 

@@ -5,9 +5,9 @@ All of it lives on one event loop. Runs that are not over are in memory; the jou
 
 import logging
 import secrets
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, TypeVar
 from weakref import WeakValueDictionary
 
 import anyio
@@ -39,6 +39,7 @@ from action_assistant.umrf import codec
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.semantics import Engine
 
+T = TypeVar("T")
 log: Final = logging.getLogger(__name__)
 
 _PREFLIGHT_S: Final = 2.0
@@ -56,6 +57,17 @@ class Ledger(Store, Protocol):
         ...
 
 
+Work = Callable[[], T]
+
+
+class Aside(Protocol):
+    """A way to do work that takes long without holding up a Stop."""
+
+    def __call__(self, work: Work[T], /) -> Awaitable[T]:
+        """The outcome of the work."""
+        ...
+
+
 class Started(msgspec.Struct, frozen=True):
     """The answer to a start. `fresh` is false when the request had been carried out before."""
 
@@ -66,12 +78,15 @@ class Started(msgspec.Struct, frozen=True):
 class Control:
     """Everything that goes on. `opened` gives it, with its tasks running."""
 
-    def __init__(self, ledger: Ledger, robots: Robots, *, wall: Clock, tasks: TaskGroup) -> None:
+    def __init__(
+        self, ledger: Ledger, robots: Robots, *, wall: Clock, tasks: TaskGroup, aside: Aside
+    ) -> None:
         self.robots = robots
         self.open: dict[str, OpenRun] = {}
         self._ledger = ledger
         self._wall = wall
         self._tasks = tasks
+        self._aside = aside
         self._watchers: list[Callable[[OpenRun], None]] = []
         self._news = anyio.Event()
         self._asking: WeakValueDictionary[str, anyio.Lock] = WeakValueDictionary()
@@ -83,11 +98,16 @@ class Control:
     @classmethod
     @asynccontextmanager
     async def opened(
-        cls, ledger: Ledger, robots: Robots, *, wall: Clock
+        cls,
+        ledger: Ledger,
+        robots: Robots,
+        *,
+        wall: Clock,
+        aside: Aside = anyio.to_thread.run_sync,
     ) -> "AsyncIterator[Control]":
         """The service, after it has taken up what an earlier process left."""
         async with anyio.create_task_group() as tasks:
-            control = cls(ledger, robots, wall=wall, tasks=tasks)
+            control = cls(ledger, robots, wall=wall, tasks=tasks, aside=aside)
             await control._take_up()
             try:
                 yield control
@@ -111,13 +131,13 @@ class Control:
             if known is not None:
                 return Started(known, fresh=False)
             if asked.engine == SIMULATOR:
-                admitted = admit(asked, SIMULATED)
+                admitted = await self._aside(lambda: admit(asked, SIMULATED))
                 engine = Engine(facts=SIMULATED, script=admitted.script)
                 link = SimulatorLink(engine, wall=self._wall)
                 return Started(await self._begin(asked, admitted, author, link, own=True), True)
             robot = self.robots.reachable(asked.engine)
             async with self._places.setdefault(asked.engine, anyio.Lock()):
-                admitted = admit(asked, PINNED)
+                admitted = await self._aside(lambda: admit(asked, PINNED))
                 self._check_free(asked.engine)
                 return Started(await self._begin(asked, admitted, author, robot, own=False), True)
 
@@ -147,7 +167,11 @@ class Control:
     ) -> Run:
         stops = self._stops
         incarnation = await self._answering(link, asked.engine)
-        requested, order = self._order(asked, admitted, author, simulated=own)
+        self._number += 1
+        number = self._number
+        requested, order = await self._aside(
+            lambda: self._order(asked, admitted, author, number, simulated=own)
+        )
         with anyio.CancelScope(shield=True):
             run = await self._store(requested)
             opened = self._opened(run, link, own=own, seq=1)
@@ -170,15 +194,20 @@ class Control:
             ) from nothing
 
     def _order(
-        self, asked: StartRequest, admitted: Admitted, author: Author, *, simulated: bool
+        self,
+        asked: StartRequest,
+        admitted: Admitted,
+        author: Author,
+        number: int,
+        *,
+        simulated: bool,
     ) -> tuple[Requested, Order]:
-        self._number += 1
         run, graph = secrets.token_urlsafe(9), admitted.graph
         umrf = codec.write(graph, codec.Stamp(admitted.graph_id, asked.version, run))
         requested = Requested(
             at=self._wall(),
             run=run,
-            number=self._number,
+            number=number,
             request_id=asked.request_id,
             author=author,
             graph=admitted.graph_id,
@@ -352,7 +381,7 @@ class Control:
 
     async def _read(self, run: str) -> tuple[Run | None, int]:
         events = await self._ledger.read(stream_of(run))
-        found = replay(decode(each.kind, each.body) for each in events)
+        found = await self._aside(lambda: replay(decode(each.kind, each.body) for each in events))
         return found, events[-1].seq if events else 0
 
     # --- after a restart ----------------------------------------------------------------------

@@ -9,6 +9,8 @@ from sqlalchemy import Row
 from action_assistant.runner.events import Author, Override
 from action_assistant.runner.runs import ActionRun, Desired, How, Outcome, Run, State
 
+_LIVE: Final = 3_000  # visits in one live message, over all actions
+_WHOLE: Final = 20_000
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -99,14 +101,14 @@ def summary(run: Run, *, recorded: bool = True) -> Summary:
 
 
 def shown(run: Run, *, recorded: bool = True) -> RunShown:
-    """A run with its actions."""
-    actions = {name: _action(action) for name, action in run.actions.items()}
+    """A run with its actions and their newest visits."""
+    actions = _actions(run, _LIVE)
     return RunShown(**_fields(run, recorded), actions=actions)
 
 
 def whole(run: Run, umrf: str, *, recorded: bool = True) -> RunWhole:
     """All there is."""
-    actions = {name: _action(action) for name, action in run.actions.items()}
+    actions = _actions(run, _WHOLE)
     raw = msgspec.Raw(umrf.encode())
     return RunWhole(**_fields(run, recorded), actions=actions, umrf=raw, override=run.override)
 
@@ -168,7 +170,13 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
     }
 
 
-def _action(action: ActionRun) -> ActionShown:
+def _actions(run: Run, visits: int) -> dict[str, ActionShown]:
+    """Encoding holds up everything else, a Stop too, so very many visits are not shown."""
+    most = max(1, visits // max(1, len(run.actions)))
+    return {name: _action(action, most) for name, action in run.actions.items()}
+
+
+def _action(action: ActionRun, most: int) -> ActionShown:
     visits = [
         VisitShown(
             time(each.start),
@@ -178,10 +186,11 @@ def _action(action: ActionRun) -> ActionShown:
             each.result,
             each.how,
         )
-        for each in action.visits
+        for each in action.visits[-most:]
     ]
     messages = [MessageShown(time(each.at), each.text) for each in action.messages]
-    return ActionShown(action.aid, action.state, visits, action.older, messages)
+    older = action.older + len(action.visits) - len(visits)
+    return ActionShown(action.aid, action.state, visits, older, messages)
 
 
 def _time(us: int | None) -> datetime | None:
