@@ -8,7 +8,7 @@ from action_assistant.umrf.model import PRECONDITIONS, Action
 from action_assistant.umrf.semantics import Behaviour, Hazard, NotReady, Script, simulate
 
 #: Actions that all trials together may run, so that checking stays quick.
-BUDGET: Final = 4_000
+BUDGET: Final = 2_000
 _BLOCKED: Final = {"H2", "H6", "H7", "H8", "H9", "no-entry", "ghost", "actors"}
 
 

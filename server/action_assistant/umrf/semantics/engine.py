@@ -3,15 +3,16 @@
 from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import inf
 from typing import Final, TypeAlias
 
 import msgspec
 
 from action_assistant.umrf.facts import SIMULATED, EngineFacts
-from action_assistant.umrf.model import Graph, Key
+from action_assistant.umrf.model import Graph, Key, Signature
 from action_assistant.umrf.semantics.clock import Task
 from action_assistant.umrf.semantics.core import Core
-from action_assistant.umrf.semantics.matching import fits
+from action_assistant.umrf.semantics.matching import fits, has_action
 from action_assistant.umrf.semantics.parts import (
     Node,
     Outcome,
@@ -21,7 +22,7 @@ from action_assistant.umrf.semantics.parts import (
     restructure,
 )
 from action_assistant.umrf.semantics.script import Script
-from action_assistant.umrf.semantics.trace import GraphState, Hazard, Trace
+from action_assistant.umrf.semantics.trace import GraphState, Hazard, NodeState, Trace
 
 _Deed: TypeAlias = Callable[[Running], None]
 
@@ -48,7 +49,8 @@ class Engine(Core):
     """One engine with its graphs and sub-graphs. Deterministic: same calls, same trace.
 
     `library`: graphs that can be sub-graphs, by name. `actor`: the engine's name; without one it
-    plays the only actor that a graph names. `serial`: commands wait for each other as they do over
+    plays the only actor that a graph names. `signatures`: the actions that it has; without them it
+    has every action with any parameters. `serial`: commands wait for each other as they do over
     ROS; otherwise a second stop during a stop reaches the engine and kills it.
     """
 
@@ -59,9 +61,11 @@ class Engine(Core):
         script: Script | None = None,
         library: Mapping[str, Graph] | None = None,
         actor: str = "",
+        signatures: Mapping[str, Signature] | None = None,
         serial: bool = True,
     ) -> None:
         super().__init__(facts, script or Script(), library or {}, actor)
+        self.signatures = signatures
         self.serial = serial
         self._busy = False
         self._waiting: deque[Task] = deque()
@@ -109,12 +113,22 @@ class Engine(Core):
             state = (states or {}).get(node.key, "UNINITIALIZED")
             running.count(state, 1)
             node.state = state
-        if old is None or not any(node.active for node in old.nodes.values()):
-            if old is not None:
-                self._clear(old)
+        if old is None:
+            if not self._resolves(running):
+                raise EngineRefused(f"Could not resolve graph '{graph.name}'")
             self._begin_graph(running)
-        else:
+        elif any(node.busy_until == inf for node in old.nodes.values()):
+            self._graph_state(old, "CLEARING")
+            message = (
+                "A thread of the graph's last run never ended: the engine waits for it for ever."
+            )
+            self._lock(old, "H5", message)
+        elif any(node.active for node in old.nodes.values()):
             self._command(partial(self._replace, old, running))
+        else:
+            self._clear(old)
+            self._refuse_unmatched(running)
+            self._begin_graph(running)
         return self._taken()
 
     def stop(self, graph_name: str, at_ms: float) -> list[Trace]:
@@ -179,10 +193,43 @@ class Engine(Core):
         build(running, behaviours)
         taken = running.own_names()
         for node in running.nodes.values():
+            known = (self.signatures or {}).get(node.name)
+            if known is not None:
+                for slot in node.inputs.values():
+                    slot.required = slot.name not in known.optional
+                continue
             sub = self.library.get(node.name)
             if sub is not None and node.name not in taken and fits(node, sub):
                 node.subgraph = sub
         return running
+
+    def _resolves(self, graph: Running) -> bool:
+        """Whether the engine has every action that it shall run itself."""
+        if self.signatures is None:
+            return True
+        own = {"", self.actor}
+        return all(
+            node.subgraph is not None
+            or node.actor not in own
+            or has_action(node, self.signatures.get(node.name))
+            for node in graph.nodes.values()
+        )
+
+    def _refuse_unmatched(self, graph: Running) -> None:
+        """A graph that the engine holds already is not matched again: it loses its sub-graphs."""
+        lost = [node for node in graph.nodes.values() if node.subgraph is not None]
+        if self.facts.restart_matches or not lost:
+            return
+        self.graphs[graph.name] = graph
+        failed = [NodeState(self._t(), "", node.full_name, "ERROR") for node in lost]
+        self._out += failed
+        self._graph_state(graph, "UNINITIALIZED")
+        self._out += failed
+        message = (
+            "Started again by its JSON, the graph loses its sub-graphs, and a broken one stays."
+        )
+        self._hazard(graph, "H6", "goes on", message, lost[0])
+        raise EngineRefused("map::at")
 
     def _clear(self, old: Running) -> None:
         self._graph_state(old, "CLEARING")

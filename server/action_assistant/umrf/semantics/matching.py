@@ -1,9 +1,18 @@
-"""Which indexed graph a node stands for (SPEC 2.1)."""
+"""Which indexed action or graph a node stands for (SPEC 2.1)."""
 
 from action_assistant.umrf.jsontext import parse_small
-from action_assistant.umrf.model import ENTRY, EXIT, Graph, Parameter
+from action_assistant.umrf.model import ENTRY, EXIT, Graph, Parameter, Signature
 from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.semantics.parts import Node
+
+
+def has_action(node: Node, known: Signature | None) -> bool:
+    """Whether an indexed action has exactly the parameters of a node."""
+    return (
+        known is not None
+        and set(node.inputs) == set(known.inputs)
+        and set(node.outputs) == set(known.outputs)
+    )
 
 
 def fits(node: Node, sub: Graph) -> bool:
