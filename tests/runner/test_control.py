@@ -453,6 +453,24 @@ async def test_pausing_is_refused_where_it_is_not_safe() -> None:
             await control.pause(run.id, ANN)
 
 
+@virtual
+async def test_an_engine_that_hangs_is_unknown_and_stop_says_why_it_is_unconfirmed() -> None:
+    """H5: an action without onPause holds the engine's lock for ever."""
+    world = World()
+    script = {"*": [{"pauses": False, "never": True}]}
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), script=script), ANN)).run
+        await anyio.sleep(1)
+        await control.pause(run.id, ANN)
+        await anyio.sleep(5)
+        assert control.open[run.id].run.state == "unknown"
+        await control.stop(run.id, ANN)
+        await anyio.sleep(5)
+        alarms = {each.code: each.text for each in control.open[run.id].run.alarms}
+        assert "hangs (H5)" in alarms["stop_unconfirmed"]
+        assert await ended(control, run.id) == "lost"
+
+
 # --- restarts ---------------------------------------------------------------------------------
 
 

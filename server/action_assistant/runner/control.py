@@ -123,6 +123,7 @@ class Control:
     async def start(self, asked: StartRequest, author: Author) -> Started:
         """Carry out a start, at most once per request. Raises Refused of many kinds; then nothing
         was sent. Returns after the one message has left."""
+        stops = self._stops
         lock = self._asking.get(asked.request_id)
         if lock is None:
             lock = self._asking[asked.request_id] = anyio.Lock()
@@ -134,12 +135,14 @@ class Control:
                 admitted = await self._aside(lambda: admit(asked, SIMULATED))
                 engine = Engine(facts=SIMULATED, script=admitted.script)
                 link = SimulatorLink(engine, wall=self._wall)
-                return Started(await self._begin(asked, admitted, author, link, own=True), True)
+                run = await self._begin(asked, admitted, author, link, stops, own=True)
+                return Started(run, fresh=True)
             robot = self.robots.reachable(asked.engine)
             async with self._places.setdefault(asked.engine, anyio.Lock()):
                 admitted = await self._aside(lambda: admit(asked, PINNED))
                 self._check_free(asked.engine)
-                return Started(await self._begin(asked, admitted, author, robot, own=False), True)
+                run = await self._begin(asked, admitted, author, robot, stops, own=False)
+                return Started(run, fresh=True)
 
     async def _known(self, asked: StartRequest) -> Run | None:
         rows = await self._ledger.query(archive.by_request(asked.request_id))
@@ -163,9 +166,15 @@ class Control:
                 )
 
     async def _begin(
-        self, asked: StartRequest, admitted: Admitted, author: Author, link: Link, *, own: bool
+        self,
+        asked: StartRequest,
+        admitted: Admitted,
+        author: Author,
+        link: Link,
+        stops: int,
+        *,
+        own: bool,
     ) -> Run:
-        stops = self._stops
         incarnation = await self._answering(link, asked.engine)
         self._number += 1
         number = self._number
@@ -176,7 +185,7 @@ class Control:
             run = await self._store(requested)
             opened = self._opened(run, link, own=own, seq=1)
             if self._stops != stops and self._last_stop is not None:
-                opened.stop(*self._last_stop)  # everything was stopped while this was stored
+                opened.stop(*self._last_stop)  # everything was stopped since this was asked for
             self._tasks.start_soon(self._drive, opened, order, incarnation)
         await opened.published.wait()
         return opened.run
