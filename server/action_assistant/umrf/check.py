@@ -10,7 +10,7 @@ from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.values import check_values
 from action_assistant.umrf.codec import Reading
 from action_assistant.umrf.facts import PINNED, EngineFacts
-from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem, Signature, Where
+from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem, Signature
 
 #: Codes of what makes the engine's parser refuse a text.
 REFUSED: Final = frozenset(
@@ -40,9 +40,8 @@ def check(
 def check_reading(
     reading: Reading, library: Mapping[str, Signature] | None = None, facts: EngineFacts = PINNED
 ) -> list[Problem]:
-    """Every problem of a file as it stands: of its text, of the run states that it carries, and of
-    the graph in it."""
-    problems = [*reading.problems, *_carried_states(reading), *check(reading.graph, library, facts)]
+    """Every problem of a file as it stands: of its text, and of the graph in it."""
+    problems = [*reading.problems, *check(reading.graph, library, facts)]
     return sorted(problems, key=lambda problem: problem.severity)
 
 
@@ -70,22 +69,6 @@ def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ())
         for problem in problems
         if problem.severity == "error"
         and (problem.code in STRUCTURAL or problem.code not in overridden)
-    ]
-
-
-def _carried_states(reading: Reading) -> list[Problem]:
-    places = Subject(reading.graph, PINNED).paths
-    names = {action.key: action.full_name for action in reading.graph.actions}
-    return [
-        Problem(
-            code="H1",
-            severity="error",
-            where=Where(path=f"{places.get(key, '')}/state", aid=key),
-            message=f"The file says that {names[key]} is {state}: started as it stands, the engine "
-            "aborts with every running graph, or the action never runs. Reading the file and writing "
-            "it again leaves the state out.",
-        )
-        for key, state in reading.states.items()
     ]
 
 

@@ -3,9 +3,9 @@
 import msgspec
 
 from action_assistant.umrf.dialects import dialect_of, translated
-from action_assistant.umrf.jsontext import Unreadable, parse
-from action_assistant.umrf.model import Graph, Key, Problem
-from action_assistant.umrf.reading import read_tree
+from action_assistant.umrf.jsontext import Unreadable, parse, pointer
+from action_assistant.umrf.model import Graph, Key, Problem, Where
+from action_assistant.umrf.reading import Tree, read_tree
 from action_assistant.umrf.writing import Stamp, write
 
 __all__ = ["Reading", "Stamp", "Unreadable", "read", "stamp_of", "write"]
@@ -15,7 +15,7 @@ class Reading(msgspec.Struct, frozen=True):
     """A graph, and what is to be said about the text it came from.
 
     `notes`: what was translated or has no place in D3. `problems`: what is wrong in the text as it
-    stands and cannot be seen in the graph any more; `check` finds the rest. `states`, `graph_state`:
+    stands and cannot be seen in the graph any more (H1 among it); `check` finds the rest. `states`, `graph_state`:
     run states that the text carries (other than UNINITIALIZED).
     """
 
@@ -40,9 +40,24 @@ def read(text: str | bytes) -> Reading:
         )
     file, notes, problems = translated(value, dialect)
     tree = read_tree(file)
-    return Reading(
-        tree.graph, dialect, notes, (*problems, *tree.problems), tree.states, tree.graph_state
-    )
+    found = (*problems, *tree.problems, *_carried_states(tree))
+    return Reading(tree.graph, dialect, notes, found, tree.states, tree.graph_state)
+
+
+def _carried_states(tree: Tree) -> list[Problem]:
+    """H1: an engine that is given a node's state takes the action for loaded."""
+    return [
+        Problem(
+            code="H1",
+            severity="error",
+            where=Where(path=pointer("actions", index, "state"), aid=action.key),
+            message=f"The file says that {action.full_name} is {tree.states[action.key]}: started as "
+            "it stands, the engine aborts with every running graph, or the action never runs. "
+            "Reading the file and writing it again leaves the state out.",
+        )
+        for index, action in enumerate(tree.graph.actions)
+        if action.key in tree.states
+    ]
 
 
 def stamp_of(text: str | bytes) -> Stamp:
