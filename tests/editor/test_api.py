@@ -65,6 +65,13 @@ def test_a_new_user_finds_examples(http: httpx.Client) -> None:
     assert len(names) >= 3
 
 
+def test_an_example_can_be_had_again(http: httpx.Client) -> None:
+    examples = http.get("/api/examples").json()
+    assert len(examples) >= 3
+    made = http.post("/api/graphs", json=examples[0]["umrf"])
+    assert made.json()["name"] == examples[0]["umrf"]["graph_name"]
+
+
 def test_an_imported_file_is_a_graph_that_means_the_same(http: httpx.Client) -> None:
     made = imported(http)
     assert (made["name"], made["description"], made["seq"]) == ("nav", "there and back", 1)

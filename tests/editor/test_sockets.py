@@ -1,6 +1,7 @@
 """The room over real sockets: stock clients, refusals, close codes, silence."""
 
 import asyncio
+import contextlib
 import json
 import socket
 from typing import Any
@@ -180,17 +181,8 @@ async def test_a_graph_that_is_deleted_sends_everyone_away(
 
 async def test_a_socket_that_vanishes_takes_its_entry_along(editor: Editor, graph: str) -> None:
     async with editor.socket(graph) as watcher:
-        raw = socket.create_connection(("127.0.0.1", editor.port))
-        raw.sendall(
-            f"GET /api/graphs/{graph}/room HTTP/1.1\r\nHost: 127.0.0.1:{editor.port}\r\n"
-            f"Authorization: {BEARER['authorization']}\r\nUpgrade: websocket\r\n"
-            "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-            "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
-        )
-        assert b"101" in raw.recv(200)
-        frame = wire.presence([wire.Entry(77, 1, b"{}")])
-        mask = b"\x00\x00\x00\x00"
-        raw.sendall(bytes((0x82, 0x80 | len(frame))) + mask + frame)
+        raw = upgraded(editor, graph)
+        raw.sendall(masked(wire.presence([wire.Entry(77, 1, b"{}")])))
         states: list[bytes] = []
         while b"null" not in states:
             message = wire.parse(await watcher.receive_bytes(timeout=5))
@@ -208,3 +200,51 @@ async def test_an_idle_socket_hears_something_every_fifteen_seconds(
         await session.receive_bytes(timeout=5)
         for _ in range(2):
             assert await session.receive_bytes(timeout=15) == wire.BEAT
+
+
+async def test_a_frozen_reader_is_dropped_while_others_go_on(editor: Editor, graph: str) -> None:
+    frozen = upgraded(editor, graph, receive_buffer=4096)
+    frozen.sendall(masked(wire.question(b"\x00")))
+    writer, reader = Doc[Any](), Doc[Any]()
+    made: list[bytes] = []
+    subscription = writer.observe(lambda event: made.append(event.update))
+    async with editor.socket(graph, "?acks=1") as session, editor.joined(graph, reader):
+        await session.send_bytes(wire.question(b"\x00"))
+        for n in range(40):
+            writer.get("positions", type=Map)[f"k{n}"] = "x" * 500_000
+            await session.send_bytes(wire.change(made[-1]))
+            await acks(session, n + 1)
+        await eventually(lambda: len(reader.get("positions", type=Map)) == 40)
+    writer.unobserve(subscription)
+    frozen.settimeout(10)
+    received = 0
+    with contextlib.suppress(ConnectionResetError):
+        while data := await asyncio.to_thread(frozen.recv, 1 << 20):
+            received += len(data)
+    frozen.close()
+    assert received < 40 * 500_000
+
+
+def upgraded(editor: Editor, graph: str, *, receive_buffer: int | None = None) -> socket.socket:
+    """A bare socket that has become a WebSocket."""
+    raw = socket.socket()
+    if receive_buffer is not None:
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+    raw.connect(("127.0.0.1", editor.port))
+    raw.sendall(
+        f"GET /api/graphs/{graph}/room HTTP/1.1\r\nHost: 127.0.0.1:{editor.port}\r\n"
+        f"Authorization: {BEARER['authorization']}\r\nUpgrade: websocket\r\n"
+        "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+    )
+    answer = b""
+    while b"\r\n\r\n" not in answer:
+        answer += raw.recv(1)
+    assert b" 101 " in answer
+    return raw
+
+
+def masked(frame: bytes) -> bytes:
+    """A short binary frame as clients send it."""
+    assert len(frame) < 126
+    return bytes((0x82, 0x80 | len(frame))) + bytes(4) + frame

@@ -28,7 +28,9 @@ T = TypeVar("T")
 
 SNAPSHOT_EVERY: Final = 1000  # events
 _BATCH: Final = 200  # items of one commit
+_BATCH_BYTES: Final = 512 * 1024
 _MERGED: Final = 50  # updates merged at once; merging more costs their square
+_MERGED_BYTES: Final = 128 * 1024
 _CLOSING: Final = "This graph is being closed; try again."
 
 
@@ -190,7 +192,7 @@ class Room:
             self._end(reason)
 
     async def _handle(self) -> None:
-        batch, self._waiting = self._waiting[:_BATCH], self._waiting[_BATCH:]
+        batch, self._waiting = _batch(self._waiting)
         self._in_hand = batch
         taken = self._take(batch)
         if taken.news:
@@ -338,9 +340,25 @@ def _refuse(offer: Offer, code: int, reason: Refused) -> None:
         offer.done.set_exception(reason)
 
 
+def _batch(items: list[Item]) -> tuple[list[Item], list[Item]]:
+    """What one commit takes, and the rest. Small enough for readers that keep up."""
+    size = count = 0
+    for item in items[:_BATCH]:
+        size += len(item.update) if isinstance(item, Offer) else 0
+        if count and size > _BATCH_BYTES:
+            break
+        count += 1
+    return items[:count], items[count:]
+
+
 def _merged(updates: list[bytes]) -> list[bytes]:
-    """The same changes in few updates."""
-    if len(updates) < 2:
-        return updates
-    groups = [updates[n : n + _MERGED] for n in range(0, len(updates), _MERGED)]
-    return [merge_updates(*group) for group in groups]
+    """The same changes in few updates; none so large that a client that echoes would be refused."""
+    groups: list[list[bytes]] = []
+    size = 0
+    for update in updates:
+        size += len(update)
+        if not groups or len(groups[-1]) >= _MERGED or size > _MERGED_BYTES:
+            groups.append([])
+            size = len(update)
+        groups[-1].append(update)
+    return [merge_updates(*group) if len(group) > 1 else group[0] for group in groups]

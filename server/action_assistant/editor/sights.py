@@ -74,6 +74,11 @@ class Sights:
         known = self._moments.get((graph, seq))
         if known is not None:
             return known
+        room = self._rooms.open_room(graph_stream(graph))
+        if room is not None and room.seq == seq:
+            found = await self.now(graph)
+            if found.seq == seq:
+                return found
         newest = await self._newest(graph)
         if not 1 <= seq <= newest:
             raise Conflict(

@@ -5,11 +5,13 @@ from collections.abc import AsyncIterator
 from datetime import datetime
 from typing import Any, Final
 
+import anyio
 import msgspec
 from litestar import Request, get
 from litestar.response import ServerSentEvent, ServerSentEventMessage
 from litestar.types import ControllerRouterHandler
 
+from action_assistant import places
 from action_assistant.editor import happenings as h
 from action_assistant.editor.house import Door
 from action_assistant.editor.presence import colour_of
@@ -42,6 +44,13 @@ class Happened(msgspec.Struct, frozen=True, omit_defaults=True):
     graph: str | None = None
 
 
+class Example(msgspec.Struct, frozen=True):
+    """A graph that comes with the program. Posting `umrf` makes it one of yours."""
+
+    name: str
+    umrf: Any
+
+
 class Participant(msgspec.Struct, frozen=True):
     """Somebody who acted here."""
 
@@ -66,6 +75,20 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         return [Participant(p.id, p.name, colour_of(p.id)) for p in everyone]
 
     @get(
+        "/api/examples",
+        summary="The graphs that come with the program, as UMRF",
+        operation_id="listExamples",
+    )
+    async def list_examples() -> list[Example]:
+        files = [path async for path in anyio.Path(places.examples()).glob("*.umrf.graph.json")]
+        return [
+            Example(
+                path.name.removesuffix(".umrf.graph.json"), msgspec.Raw(await path.read_bytes())
+            )
+            for path in sorted(files)
+        ]
+
+    @get(
         "/api/events",
         summary="What is stored, as server-sent events; `after` and Last-Event-ID are positions",
         operation_id="followEvents",
@@ -81,7 +104,7 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
             after = int(last)
         return ServerSentEvent(_told(door, after))
 
-    return [get_config, list_people, follow_events]
+    return [get_config, list_people, list_examples, follow_events]
 
 
 async def _told(door: Door, after: int | None) -> AsyncIterator[ServerSentEventMessage]:
