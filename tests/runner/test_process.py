@@ -31,11 +31,11 @@ def test_a_runner_that_has_worked_has_no_crdt_in_its_memory(own_process: RunnerP
     assert "pycrdt" not in Path(f"/proc/{own_process.pid}/maps").read_text()
 
 
-def test_its_arguments_never_say_editor(own_process: RunnerProcess) -> None:
-    command = Path(f"/proc/{own_process.pid}/cmdline")
+def test_its_arguments_never_say_editor(process: RunnerProcess) -> None:
+    command = Path(f"/proc/{process.pid}/cmdline")
     if not command.exists():
         pytest.skip("needs /proc")
-    arguments = command.read_bytes().replace(os.fsencode(own_process.data), b"")
+    arguments = command.read_bytes().replace(os.fsencode(process.data), b"")
     assert b"editor" not in arguments
 
 

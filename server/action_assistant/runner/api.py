@@ -110,12 +110,12 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
         query = archive.listed(
             graph=graph, engine=robot, state=run_state, before=before, limit=limit
         )
-        found = [_listed(house, row) for row in await house.control.rows(query)]
+        found = [_listed(house, row) for row in await house.control.history.rows(query)]
         return [each for each in found if run_state is None or each.state == run_state]
 
     @get("/api/runs/{run:str}", summary="A run, and the graph as it was sent")
     async def one(run: str) -> shapes.RunWhole:
-        umrf = await house.control.umrf(run)
+        umrf = await house.control.history.umrf(run)
         found = await house.control.find(run)
         opened = house.control.open.get(run)
         recorded = opened is None or opened.recorder.recorded
@@ -125,7 +125,7 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
     async def events(run: str, request: _Asking) -> Stream | Response[None]:
         after = _last_event_id(request)
         found = await house.control.find(run)
-        if found.end is not None and not await house.control.events(run, after, 1):
+        if found.end is not None and not await house.control.history.events(run, after, 1):
             return Response(None, status_code=204)  # tells an EventSource not to come again
         return Stream(
             _tail(house.control, run, after),
@@ -203,7 +203,7 @@ async def _tail(control: Control, run: str, after: int) -> AsyncIterator[bytes]:
     while True:
         opened = control.open.get(run)
         revision = opened.revision if opened is not None else 0
-        found = await control.events(run, after, _PAGE)
+        found = await control.history.events(run, after, _PAGE)
         for event in found:
             after = event.seq
             body = msgspec.json.encode(

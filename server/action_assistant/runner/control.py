@@ -5,26 +5,26 @@ All of it lives on one event loop. Runs that are not over are in memory; the jou
 
 import logging
 import secrets
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import Any, Final, Protocol, TypeVar
+from typing import Final
 from weakref import WeakValueDictionary
 
 import anyio
 import msgspec
 from anyio.abc import TaskGroup
-from sqlalchemy import Row, Select
 
-from action_assistant.errors import Conflict, NotFound, Refused, Unavailable
+from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.runner import archive
 from action_assistant.runner.admission import Admitted, StartRequest, admit
 from action_assistant.runner.driving import Clock, OpenRun
-from action_assistant.runner.events import Author, Ended, Requested, decode, encode
+from action_assistant.runner.events import Author, Ended, Requested, encode
+from action_assistant.runner.history import Aside, History, Ledger
 from action_assistant.runner.links.absent import AbsentLink
 from action_assistant.runner.links.port import Link, NoAnswer, NotSent, Order
 from action_assistant.runner.links.simulator import SimulatorLink
-from action_assistant.runner.recorder import Store, stream_of
+from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.robots import (
     SIMULATOR,
     STREAM,
@@ -34,12 +34,11 @@ from action_assistant.runner.robots import (
     Robots,
     check_registration,
 )
-from action_assistant.runner.runs import ENDED, Run, begin, replay
+from action_assistant.runner.runs import ENDED, Run, begin
 from action_assistant.umrf import codec
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.semantics import Engine
 
-T = TypeVar("T")
 log: Final = logging.getLogger(__name__)
 
 _PREFLIGHT_S: Final = 2.0
@@ -47,25 +46,6 @@ _LOST: Final = (
     "The runner ended while this simulation went on, and the simulated engine with it. Nothing "
     "shows how it would have ended."
 )
-
-
-class Ledger(Store, Protocol):
-    """What the service asks of the runner's journal."""
-
-    async def query(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Rows of the tables. Raises Unavailable."""
-        ...
-
-
-Work = Callable[[], T]
-
-
-class Aside(Protocol):
-    """A way to do work that takes long without holding up a Stop."""
-
-    def __call__(self, work: Work[T], /) -> Awaitable[T]:
-        """The outcome of the work."""
-        ...
 
 
 class Started(msgspec.Struct, frozen=True):
@@ -82,6 +62,7 @@ class Control:
         self, ledger: Ledger, robots: Robots, *, wall: Clock, tasks: TaskGroup, aside: Aside
     ) -> None:
         self.robots = robots
+        self.history = History(ledger, aside)
         self.open: dict[str, OpenRun] = {}
         self._ledger = ledger
         self._wall = wall
@@ -358,26 +339,7 @@ class Control:
         opened = self.open.get(run)
         if opened is not None:
             return opened.run
-        found, _ = await self._read(run)
-        if found is None:
-            raise NotFound("There is no such run.")
-        return found
-
-    async def umrf(self, run: str) -> str:
-        """The graph as it was sent. Raises NotFound."""
-        first = await self._ledger.read(stream_of(run), limit=1)
-        event = decode(first[0].kind, first[0].body) if first else None
-        if not isinstance(event, Requested):
-            raise NotFound("There is no such run.")
-        return event.umrf
-
-    async def events(self, run: str, after: int, limit: int) -> Sequence[Any]:
-        """Stored events of a run with `seq > after`."""
-        return await self._ledger.read(stream_of(run), after=after, limit=limit)
-
-    async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Rows of the tables."""
-        return await self._ledger.query(statement)
+        return await self.history.run(run)
 
     async def register(self, asked: Registration, author: Author) -> Robot:
         """Take a robot into the registry. Raises BadInput, Conflict, Unavailable."""
@@ -387,11 +349,6 @@ class Control:
         await self._ledger.append(STREAM, [draft])
         self.robots.add(asked)
         return next(each for each in self.robots.all() if each.name == asked.name)
-
-    async def _read(self, run: str) -> tuple[Run | None, int]:
-        events = await self._ledger.read(stream_of(run))
-        found = await self._aside(lambda: replay(decode(each.kind, each.body) for each in events))
-        return found, events[-1].seq if events else 0
 
     # --- after a restart ----------------------------------------------------------------------
 
@@ -410,7 +367,7 @@ class Control:
             )
         for row in await self._ledger.query(archive.open_runs()):
             try:
-                run, seq = await self._read(row.id)
+                run, seq = await self.history.replayed(row.id)
             except msgspec.DecodeError:
                 log.exception("run %s cannot be read; it is left as it is", row.id)
                 continue

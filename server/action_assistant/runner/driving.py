@@ -42,7 +42,7 @@ from action_assistant.runner.links.port import (
     Transitions,
 )
 from action_assistant.runner.recorder import Recorder, Store
-from action_assistant.runner.runs import Run, follow
+from action_assistant.runner.runs import Run, follow, is_news
 from action_assistant.runner.seen import TERMINAL, Hazard, Seen, Snapshot
 
 log: Final = logging.getLogger(__name__)
@@ -58,6 +58,8 @@ _SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobod
 _REST_S: Final = 1.0  # a graph that never began is believed only after it was seen so for this long
 _TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
 _ONE_PRESS_S: Final = 1.0
+
+_RESULTS: Final = {"HALTED": "on_halted", "STOPPED": "on_stopped", "ERROR": "on_error"}
 
 Clock = Callable[[], int]
 
@@ -294,22 +296,10 @@ class OpenRun:
         """Keep what an answer says beyond what is known already."""
         since, self._seen_wall = self._seen_wall, shown[0].at
         news = tuple(
-            msgspec.structs.replace(each, since=since) for each in shown if self._is_news(each)
+            msgspec.structs.replace(each, since=since) for each in shown if is_news(self.run, each)
         )
         if news:
             self._observe(news)
-
-    def _is_news(self, shown: Snapshot) -> bool:
-        run, own = self.run, shown.graph == self.run.graph_name
-        if shown.state != (run.graph_state if own else run.parts.get(shown.graph)):
-            return True
-        for node, state in shown.nodes.items():
-            action = run.actions.get(node if own else f"{shown.graph}/{node}")
-            if action is None or action.state != state:
-                return True
-            if len(shown.messages.get(node, ())) != action.heard:
-                return True
-        return False
 
     def _missing(self, other: Snapshot | None, answer: Answer) -> None:
         """The answer does not show this run."""
@@ -404,11 +394,7 @@ class OpenRun:
     # --- ends ---------------------------------------------------------------------------------
 
     def _end(self, state: End, detail: str) -> None:
-        result = self.run.result
-        if state == "halted":
-            result = result or "on_halted"
-        if self.run.graph_state == "STOPPED":
-            result = result or "on_stopped"
+        result = self.run.result or _RESULTS.get(self.run.graph_state or "")
         if self.run.end is None:
             self.tell(Ended(self._wall(), state, result, detail))
 

@@ -255,6 +255,20 @@ def follow(run: Run, event: RunEvent) -> Run:
             assert_never(event)
 
 
+def is_news(run: Run, shown: Snapshot) -> bool:
+    """Whether a snapshot says anything that is not known yet."""
+    own = shown.graph == run.graph_name
+    if shown.state != (run.graph_state if own else run.parts.get(shown.graph)):
+        return True
+    for node, state in shown.nodes.items():
+        action = run.actions.get(_key(run, shown.graph, node))
+        if action is None or action.state != state:
+            return True
+        if len(shown.messages.get(node, ())) != action.heard:
+            return True
+    return False
+
+
 def _end(run: Run, event: Ended) -> Run:
     """An end that nothing proves leaves the actions as they were seen last, without an end."""
     return replace(
