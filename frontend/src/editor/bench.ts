@@ -33,6 +33,8 @@ export interface View {
   zoomIn(): void;
   zoomOut(): void;
   show(keys: readonly Key[]): void;
+  /** Moves the view only if this is not in it. */
+  reveal(at: Position): void;
   /** The middle of what is seen, on the canvas. */
   middle(): Position;
   screenOf(at: Position): Position;
@@ -95,9 +97,10 @@ export function freePlace(bench: Bench): Position {
   let [x, y] = at ? [at[0], at[1] + 180] : bench.view.middle();
   if (!at) x -= CARD.width / 2;
   const isTaken = () =>
-    [...places.values()].some(
-      ([px, py]) => Math.abs(px - x) < CARD.width + 16 && Math.abs(py - y) < CARD.height + 16,
-    );
+    bench.graph.actions.some(({ key }) => {
+      const [px, py] = places.get(key) ?? [Number.POSITIVE_INFINITY, 0];
+      return Math.abs(px - x) < CARD.width + 16 && Math.abs(py - y) < CARD.height + 16;
+    });
   for (let i = 0; i < 60 && isTaken(); i += 1) x += CARD.width / 2;
   return [Math.round(x), Math.round(y)];
 }

@@ -130,7 +130,10 @@ export function Canvas({ bench, canvas, me, map }: Props) {
           const id = edge.data?.relation;
           if (id) bench.select(event.shiftKey ? [...bench.selection, id] : [id]);
         }}
-        onNodeClick={() => bench.setPanel("details")}
+        onNodeClick={(event) => {
+          const onHandle = (event.target as Element).closest(".react-flow__handle") !== null;
+          if (!onHandle) bench.setPanel("details");
+        }}
         onPaneClick={() => bench.select([])}
         selectionOnDrag={bench.tool === "select"}
         panOnDrag={bench.tool === "pan" ? true : [1, 2]}

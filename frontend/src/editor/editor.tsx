@@ -2,13 +2,14 @@
 import { ActionIcon, SegmentedControl } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
 import { IconLayoutSidebar, IconLayoutSidebarRight } from "@tabler/icons-react";
-import { type ReactNode, useCallback, useMemo, useState } from "react";
+import { type ReactNode, useCallback, useMemo, useState, useSyncExternalStore } from "react";
 import { type Problems, useProblems } from "../api/graphs";
 import type { Progress } from "../api/progress";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import { useLink } from "../room/use-room";
 import type { ProblemCount } from "../ui/canvas/elements";
+import { actionCarrier } from "../ui/carry";
 import type { Crumb } from "../ui/top-bar";
 import { type Bench, BenchContext, freePlace, type Panel, placeAction } from "./bench";
 import { useShortcuts } from "./deeds/keys";
@@ -96,8 +97,10 @@ export function Editor(props: Props) {
   const [left, setLeft] = useState(false);
   const [right, setRight] = useState(false);
   const [pane, setPane] = useState<Pane>("canvas");
+  const carrying = useSyncExternalStore(actionCarrier.subscribe, actionCarrier.now) !== null;
   const onPanel = useCallback((_: Panel) => {
     setRight(true);
+    setLeft(false);
     setPane((now) => (now === "outline" ? "details" : now));
   }, []);
   const { bench, panel, adding, sight, closeAdd } = useEditor(id, onPanel);
@@ -107,7 +110,9 @@ export function Editor(props: Props) {
   useShortcuts(bench);
 
   const place = (template: NewAction) => {
-    bench.select([placeAction(bench, template, freePlace(bench))]);
+    const at = freePlace(bench);
+    bench.select([placeAction(bench, template, at)]);
+    bench.view.reveal(at);
     setLeft(false);
   };
   const [selected = null] = bench.graph.actions
@@ -174,7 +179,11 @@ export function Editor(props: Props) {
         </main>
       ) : (
         <main className={style.editor} data-wide={wide || undefined}>
-          <aside className={style.left} data-open={wide || left || undefined} aria-label="Library">
+          <aside
+            className={style.left}
+            data-open={wide || (left && !carrying) || undefined}
+            aria-label="Library"
+          >
             {props.list(place)}
           </aside>
           <section className={style.canvas} aria-label="Graph">
@@ -187,7 +196,10 @@ export function Editor(props: Props) {
                   className={style.toLeft ?? ""}
                   aria-label="Graphs and actions"
                   aria-pressed={left}
-                  onClick={() => setLeft((was) => !was)}
+                  onClick={() => {
+                    setLeft(!left);
+                    setRight(false);
+                  }}
                 >
                   <IconLayoutSidebar size={18} />
                 </ActionIcon>
@@ -197,7 +209,10 @@ export function Editor(props: Props) {
                   className={style.toRight ?? ""}
                   aria-label="Details"
                   aria-pressed={right}
-                  onClick={() => setRight((was) => !was)}
+                  onClick={() => {
+                    setRight(!right);
+                    setLeft(false);
+                  }}
                 >
                   <IconLayoutSidebarRight size={18} />
                 </ActionIcon>

@@ -62,6 +62,7 @@ export function QuickAdd({ bench, request, known, onClose }: Props) {
   const choose = (template: NewAction | undefined) => {
     if (!template) return;
     bench.select([placed(bench, request, template)]);
+    bench.view.reveal([request.at[0] - CARD.width / 2, request.at[1]]);
     onClose();
   };
   const onKeyDown = (event: React.KeyboardEvent) => {

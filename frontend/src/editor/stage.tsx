@@ -2,10 +2,11 @@
 import { Button, Skeleton } from "@mantine/core";
 import { IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
-import { type ReactNode, useEffect } from "react";
+import { type ReactNode, useEffect, useRef } from "react";
 import type { Progress } from "../api/progress";
 import type { Key, Position } from "../graph/model";
 import { useLink } from "../room/use-room";
+import { CARD } from "../ui/canvas/arrange";
 import type { ProblemCount } from "../ui/canvas/elements";
 import { Empty } from "../ui/empty";
 import { useBench } from "./bench";
@@ -37,6 +38,7 @@ function Inside({ me, sight, progress, problems, compact, corner }: Props) {
     problems,
   });
   const { flow, places, sizes } = canvas;
+  const frame = useRef<HTMLDivElement>(null);
   useEffect(() => {
     sight.current = {
       places: () => places,
@@ -47,8 +49,18 @@ function Inside({ me, sight, progress, problems, compact, corner }: Props) {
         zoomOut: () => void flow.zoomOut({ duration: 120 }),
         show: (keys) =>
           void flow.fitView({ nodes: keys.map((id) => ({ id })), maxZoom: 1, duration: 250 }),
+        reveal: ([x, y]) => {
+          const box = frame.current?.getBoundingClientRect();
+          const a = flow.flowToScreenPosition({ x, y });
+          const b = flow.flowToScreenPosition({ x: x + CARD.width, y: y + CARD.height });
+          const inside =
+            box && a.x > box.left && b.x < box.right && a.y > box.top && b.y < box.bottom - 64;
+          if (inside) return;
+          const zoom = flow.getZoom();
+          void flow.setCenter(x + CARD.width / 2, y, { zoom, duration: 200 });
+        },
         middle: (): Position => {
-          const box = document.querySelector(`.${style.stage}`)?.getBoundingClientRect();
+          const box = frame.current?.getBoundingClientRect();
           const [x, y] = box ? [box.left + box.width / 2, box.top + box.height / 3] : [0, 0];
           const at = flow.screenToFlowPosition({ x, y });
           return [Math.round(at.x), Math.round(at.y)];
@@ -72,7 +84,7 @@ function Inside({ me, sight, progress, problems, compact, corner }: Props) {
   }, [arrived]);
 
   return (
-    <div className={style.stage}>
+    <div className={style.stage} ref={frame}>
       <Canvas
         bench={bench}
         canvas={canvas}

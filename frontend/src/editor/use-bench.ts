@@ -11,6 +11,7 @@ const BLIND: View = {
   zoomIn: () => {},
   zoomOut: () => {},
   show: () => {},
+  reveal: () => {},
   middle: () => [0, 0],
   screenOf: () => [0, 0],
 };
@@ -92,6 +93,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
         zoomIn: () => sight.current.view.zoomIn(),
         zoomOut: () => sight.current.view.zoomOut(),
         show: (keys) => sight.current.view.show(keys),
+        reveal: (at) => sight.current.view.reveal(at),
         middle: () => sight.current.view.middle(),
         screenOf: (at) => sight.current.view.screenOf(at),
       },
