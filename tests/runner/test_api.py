@@ -257,3 +257,20 @@ def test_the_end_of_a_graph_is_the_graphs_own_result(process: RunnerProcess) -> 
         assert done["result"] == "on_error"
         assert done["actions"]["Work_0"]["messages"][0]["text"] == "gripper jammed"
         assert done["actions"]["Work_0"]["visits"][0]["result"] == "error"
+
+
+def test_the_routes_are_described(process: RunnerProcess) -> None:
+    with process.client() as client:
+        answer = client.get("/schema/openapi.json")
+        assert answer.status_code == 200, answer.text
+        paths = answer.json()["paths"]
+        assert "post" in paths["/api/runs"]
+        assert "requestBody" in paths["/api/runs"]["post"]
+        visit = answer.json()["components"]["schemas"]["VisitShown"]["properties"]
+        assert "from" in visit
+
+
+def test_health_and_measures(process: RunnerProcess) -> None:
+    with process.client() as client:
+        assert client.get("/readyz").json()["ready"] is True
+        assert "action_assistant_runs_open" in client.get("/metrics").text

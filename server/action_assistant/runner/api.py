@@ -18,6 +18,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive, shapes
 from action_assistant.runner.admission import read_request
 from action_assistant.runner.control import Control
+from action_assistant.runner.described import StartOperation, StopOperation
 from action_assistant.runner.events import Author
 from action_assistant.runner.live import Hub, Stopping, attend
 from action_assistant.runner.robots import Registration, Robot
@@ -59,7 +60,11 @@ def routes(house: House) -> list[ControllerRouterHandler]:
 
 
 def _starts(house: House) -> list[ControllerRouterHandler]:
-    @post("/api/runs", summary="Start a version, at most once per request_id")
+    @post(
+        "/api/runs",
+        summary="Start a version, at most once per request_id",
+        operation_class=StartOperation,
+    )
     async def start(request: _Asking) -> Response[shapes.RunShown]:
         asked = read_request(await request.body())
         started = await house.control.start(asked, _author(request))
@@ -73,12 +78,17 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
 
 
 def _moves(house: House) -> list[ControllerRouterHandler]:
-    @post("/api/stop", status_code=202, summary="Stop everything")
+    @post("/api/stop", status_code=202, summary="Stop everything", operation_class=StopOperation)
     async def stop_all(request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
         return Stopping(stop_id, house.control.stop_all(_author(request), stop_id))
 
-    @post("/api/runs/{run:str}/stop", status_code=202, summary="Stop a run")
+    @post(
+        "/api/runs/{run:str}/stop",
+        status_code=202,
+        summary="Stop a run",
+        operation_class=StopOperation,
+    )
     async def stop(run: str, request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
         return Stopping(stop_id, await house.control.stop(run, _author(request), stop_id))

@@ -244,8 +244,6 @@ class OpenRun:
                 place = f" at {item.node}" if item.node else ""
                 self._alarm(item.code, f"{item.code}{place}: {item.message or item.effect}")
 
-    # --- asking -------------------------------------------------------------------------------
-
     async def _watch(self) -> None:
         wait = 0.0
         while True:
@@ -390,8 +388,6 @@ class OpenRun:
         except TimeoutError:
             return "the message could not be handed over within a second"
         return ""
-
-    # --- ends ---------------------------------------------------------------------------------
 
     def _end(self, state: End, detail: str) -> None:
         result = self.run.result or _RESULTS.get(self.run.graph_state or "")

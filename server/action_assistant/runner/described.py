@@ -1,0 +1,72 @@
+"""What OpenAPI says of bodies that are read by hand: bytes that must stay as they were sent."""
+
+from dataclasses import dataclass, field
+from typing import Final
+
+from litestar.openapi.spec import (
+    OpenAPIMediaType,
+    OpenAPIType,
+    Operation,
+    Reference,
+    RequestBody,
+    Schema,
+)
+
+_TEXT: Final = Schema(type=OpenAPIType.STRING)
+_ANY: Final = Schema(type=OpenAPIType.OBJECT)
+
+
+def _body(schema: Schema, *, required: bool) -> RequestBody:
+    return RequestBody(content={"application/json": OpenAPIMediaType(schema)}, required=required)
+
+
+def _start() -> RequestBody:
+    codes = Schema(type=OpenAPIType.ARRAY, items=_TEXT)
+    override = Schema(
+        type=OpenAPIType.OBJECT,
+        properties={"codes": codes, "reason": _TEXT},
+        required=["codes", "reason"],
+    )
+    fields: dict[str, Schema | Reference] = {
+        "version": _TEXT,
+        "digest": _TEXT,
+        "umrf": Schema(type=OpenAPIType.OBJECT, description="The UMRF graph itself, as approved"),
+        "engine": Schema(type=OpenAPIType.STRING, description="`simulator`, or a robot's name"),
+        "request_id": Schema(type=OpenAPIType.STRING, description="Made once per intended start"),
+        "graph": _TEXT,
+        "script": _ANY,
+        "override": override,
+    }
+    needed = ["version", "digest", "umrf", "engine", "request_id"]
+    whole = Schema(
+        type=OpenAPIType.OBJECT,
+        properties=fields,
+        required=needed,
+        additional_properties=False,
+    )
+    return _body(whole, required=True)
+
+
+def _stop() -> RequestBody:
+    press = Schema(type=OpenAPIType.OBJECT, properties={"stop_id": _TEXT})
+    return _body(press, required=False)
+
+
+@dataclass
+class StartOperation(Operation):
+    """A start."""
+
+    request_body: RequestBody | Reference | None = field(default_factory=_start)
+
+    def __post_init__(self) -> None:
+        self.request_body = _start()  # Litestar passes None for handlers that read by themselves
+
+
+@dataclass
+class StopOperation(Operation):
+    """A stop."""
+
+    request_body: RequestBody | Reference | None = field(default_factory=_stop)
+
+    def __post_init__(self) -> None:
+        self.request_body = _stop()
