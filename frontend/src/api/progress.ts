@@ -96,6 +96,10 @@ export function progressByAid(run: Run | null, unsure: boolean): Map<string, Pro
   return found;
 }
 
+function clockOf(text: string): string {
+  return new Date(text).toLocaleTimeString(undefined, { hour12: false });
+}
+
 const runWords: Record<Run["state"], { tone: Tone; word: string }> = {
   requested: { tone: "run", word: "requested" },
   published: { tone: "run", word: "starting" },
@@ -113,6 +117,9 @@ const runWords: Record<Run["state"], { tone: Tone; word: string }> = {
 
 /** The run's state, with the result where it has one that says more. */
 export function runWord(run: Run): { tone: Tone; word: string } {
+  if (run.state === "unknown" && run.unknown_since) {
+    return { tone: "unknown", word: `unknown since ${clockOf(run.unknown_since)}` };
+  }
   if (run.state === "finished" && run.result && run.result !== "on_true") {
     const word = run.result.replace(/^on_/, "");
     return { tone: resultTone[run.result] ?? "done", word: `finished: ${word}` };

@@ -54,9 +54,19 @@ export function happenings(run: Run, version: string): Happening[] {
       });
     }
   }
+  for (const alarm of run.alarms) {
+    const at = instant(alarm.at);
+    if (at !== null) all.push({ at, tone: "error", name: null, aid: null, text: alarm.text });
+  }
   const end = instant(run.ended_at);
   if (end !== null)
-    all.push({ at: end, tone: "idle", name: null, aid: null, text: `Run ${endWords(run)}` });
+    all.push({
+      at: end,
+      tone: "idle",
+      name: null,
+      aid: null,
+      text: `Run ${endWords(run)}${run.detail ? `: ${run.detail}` : ""}`,
+    });
   return all.sort((a, b) => a.at - b.at);
 }
 

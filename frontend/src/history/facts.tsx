@@ -27,6 +27,8 @@ export function Facts({ run, version, by }: Props) {
     ["Took", start !== null && end !== null ? duration(end - start) : "—"],
     ["End", end === null ? "goes on" : endWords(run)],
     ["Result", run.result?.replace(/^on_/, "") ?? "—"],
+    ["Why", run.detail || "—"],
+    ["Recorded", run.recorded ? "all of it" : "NOT all of it: the journal could not be written"],
     ["Last proof", moment(instant(run.proof_at))],
   ];
   return (

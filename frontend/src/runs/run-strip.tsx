@@ -43,6 +43,7 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick }: Props) 
   const start = instant(run.started_at) ?? present;
   const until = down ? now.since : present;
   const { tone, word } = runWord(run);
+  const alarm = run.alarms.at(-1);
   const unsure = down && goes;
   return (
     <section className={style.strip} aria-label="Run">
@@ -60,6 +61,13 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick }: Props) 
           {stopwatch((instant(run.ended_at) ?? until) - start)}
         </Text>
         <span className={style.gap} />
+        {alarm && <span className={style.alarm}>{alarm.text}</span>}
+        {!run.recorded && <span className={style.alarm}>not recorded</span>}
+        {run.ended_at !== null && run.detail !== "" && (
+          <Text span size="xs" truncate title={run.detail}>
+            {run.detail}
+          </Text>
+        )}
         <Button component={Link} to={`/runs/${run.id}`} size="compact-xs" variant="subtle">
           Open run
         </Button>

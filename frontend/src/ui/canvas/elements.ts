@@ -13,7 +13,7 @@ import {
   type Response,
   spoken,
 } from "../../graph/model";
-import { OUTCOMES } from "../outcome";
+import { OUTCOMES, outcomeWord } from "../outcome";
 import { CARD, PILL, type Places } from "./arrange";
 import { type Box, laneBack, laneFor, MOST_CARDS } from "./lanes";
 
@@ -95,6 +95,7 @@ export function nodesOf(graph: Graph, options: NodeOptions): CanvasNode[] {
     (end): EndNode => ({
       ...place(end, options),
       type: "end",
+      ariaLabel: end === ENTRY ? "Entry of the graph" : "Exit of the graph",
       data: { end: end as "entry" | "exit", progress: null },
       deletable: false,
     }),
@@ -103,6 +104,7 @@ export function nodesOf(graph: Graph, options: NodeOptions): CanvasNode[] {
     (action): CardNode => ({
       ...place(action.key, options),
       type: "action",
+      ariaLabel: cardWords(action, options.progress.get(action.key)),
       data: {
         action,
         progress: options.progress.get(action.key) ?? null,
@@ -154,7 +156,34 @@ function laneOf(relation: Relation, outcome: Precondition, boxes: Map<Key, Box>)
   return lane + Math.sign(lane - to.x) * LANE_WIDTH * at;
 }
 
-function arrowsOf(relation: Relation, options: NodeOptions, boxes: Map<Key, Box>): Arrow[] {
+function cardWords(action: Action, progress: Progress | undefined): string {
+  const robot = action.actor === "" ? "" : `, robot ${action.actor}`;
+  return `${action.name} ${action.instanceId}${robot}${progress ? `, ${progress.word}` : ""}`;
+}
+
+type Names = ReadonlyMap<Key, string>;
+
+function namesOf(graph: Graph): Names {
+  const names = new Map<Key, string>([
+    [ENTRY, "entry"],
+    [EXIT, "exit"],
+  ]);
+  for (const { key, name, instanceId } of graph.actions) names.set(key, `${name} ${instanceId}`);
+  return names;
+}
+
+function arrowWords(relation: Relation, outcome: Precondition, names: Names): string {
+  const [from, to] = [names.get(relation.parent) ?? "", names.get(relation.child) ?? ""];
+  if (relation.parent === ENTRY) return `Arrow from entry to ${to}`;
+  return `Arrow from ${from}, when ${outcomeWord[outcome]}: ${relation.conditions[outcome]} ${to}`;
+}
+
+interface Around {
+  readonly boxes: Map<Key, Box>;
+  readonly names: Names;
+}
+
+function arrowsOf(relation: Relation, options: NodeOptions, { boxes, names }: Around): Arrow[] {
   const id = relationId(relation);
   const outcomes = spoken(relation.conditions);
   const shown: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
@@ -162,6 +191,7 @@ function arrowsOf(relation: Relation, options: NodeOptions, boxes: Map<Key, Box>
   return shown.map((outcome, i) => ({
     id: `${id}|${outcome}`,
     type: "outcome",
+    ariaLabel: arrowWords(relation, outcome, names),
     source: relation.parent,
     target: relation.child,
     sourceHandle: entry ? "start" : outcome,
@@ -183,10 +213,10 @@ function arrowsOf(relation: Relation, options: NodeOptions, boxes: Map<Key, Box>
 
 export function edgesOf(graph: Graph, options: NodeOptions): Arrow[] {
   const there = new Set<Key>([ENTRY, EXIT, ...graph.actions.map((action) => action.key)]);
-  const boxes = boxesOf(graph, options);
+  const around = { boxes: boxesOf(graph, options), names: namesOf(graph) };
   return graph.relations
     .filter(({ parent, child }) => there.has(parent) && there.has(child))
-    .flatMap((relation) => arrowsOf(relation, options, boxes));
+    .flatMap((relation) => arrowsOf(relation, options, around));
 }
 
 /** `next`, with every element of `before` that says the same in its place. */

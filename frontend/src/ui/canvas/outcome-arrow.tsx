@@ -1,5 +1,11 @@
 /** An arrow from one outcome to what answers it, with the relation's answers in words. */
-import { BaseEdge, EdgeLabelRenderer, type EdgeProps, getBezierPath } from "@xyflow/react";
+import {
+  BaseEdge,
+  EdgeLabelRenderer,
+  type EdgeProps,
+  getBezierPath,
+  useStoreApi,
+} from "@xyflow/react";
 import { memo } from "react";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../outcome";
 import type { Answer, Arrow } from "./elements";
@@ -91,6 +97,7 @@ const SHIFTS = { left: "-10px", middle: "-50%", right: "calc(-100% + 10px)" } as
 
 export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) {
   const { id, data, selected } = props;
+  const store = useStoreApi();
   const { path, x, y, anchor } = lineOf(props);
   if (!data) return null;
   const color = data.entry
@@ -114,8 +121,11 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
       />
       {data.answers && (
         <EdgeLabelRenderer>
-          <div
+          <button
+            type="button"
+            tabIndex={-1}
             className={style.label}
+            onClick={() => store.getState().addSelectedEdges([id])}
             data-selected={selected || undefined}
             data-plain={isPlain(data.answers) || undefined}
             data-relation={data.relation}
@@ -129,7 +139,7 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
               />
             ))}
             {data.answers.length === 0 && <span className={style.response}>ignores all</span>}
-          </div>
+          </button>
         </EdgeLabelRenderer>
       )}
     </>
