@@ -8,7 +8,7 @@ import { join, resolve } from "node:path";
 import type { Browser, BrowserContext, Page } from "@playwright/test";
 
 const COMMAND = resolve(import.meta.dirname, "../../.venv/bin/action-assistant");
-const TOKEN = "browser-test-token-0123456789abcdef0123456789";
+export const TOKEN = "browser-test-token-0123456789abcdef0123456789";
 
 /** A running editor and runner with a data folder of their own. */
 export class Product {
@@ -87,7 +87,7 @@ export class Product {
     const failures: string[] = [];
     page.on("pageerror", (error) => failures.push(error.message));
     await page.goto(`${this.url}/#t=${TOKEN}`);
-    const field = page.getByRole("textbox", { name: /your name/i });
+    const field = page.getByRole("textbox", { name: /others see you/i });
     await field.fill(name);
     await field.press("Enter");
     await field.waitFor({ state: "detached" });

@@ -1,0 +1,147 @@
+/** What a person does on the canvas and beside it, as a hand on the mouse does it. */
+
+import { expect, type Locator, type Page } from "@playwright/test";
+
+export type Outcome = "true" | "false" | "error" | "stopped";
+
+/** The card of an action. */
+export function card(page: Page, name: string, instance = 0): Locator {
+  return page.locator(".react-flow__node-action").filter({
+    has: page.getByLabel(`Input of ${name} ${instance}`, { exact: true }),
+  });
+}
+
+/** Adds an action that nobody knows yet by typing its name. */
+export async function add(page: Page, name: string): Promise<void> {
+  await page.getByRole("button", { name: "Add an action" }).first().click();
+  const field = page.getByRole("combobox", { name: "Name of an action" });
+  await field.fill(name);
+  await page.getByRole("option", { name: `New action “${name}”` }).click();
+  await expect(card(page, name)).toBeVisible();
+}
+
+/** Drags an arrow from one of the four outcomes of an action to another one, or to the exit. */
+export async function connect(
+  page: Page,
+  from: string,
+  outcome: Outcome,
+  to: string,
+): Promise<void> {
+  const source = card(page, from).getByLabel(`When ${outcome}`, { exact: true });
+  await drag(page, source, to === "exit" ? exit(page) : card(page, to));
+}
+
+/** Draws the arrow from the entry. */
+export async function enter(page: Page, to: string): Promise<void> {
+  await drag(page, page.getByLabel("Start with", { exact: true }), card(page, to));
+}
+
+function entry(page: Page): Locator {
+  return page.locator(".react-flow__node").filter({ has: page.getByLabel("Start with") });
+}
+
+function exit(page: Page): Locator {
+  return page.locator(".react-flow__node").filter({ has: page.getByLabel("End with") });
+}
+
+/** Moves a card to a place seen from another card, in its own pixels; the canvas may be zoomed. */
+export async function move(
+  page: Page,
+  name: string,
+  [dx, dy]: readonly [number, number],
+  anchor: string,
+): Promise<void> {
+  await page.getByRole("button", { name: "Fit", exact: true }).click();
+  const origin = await boxOf(anchor === "entry" ? entry(page) : card(page, anchor));
+  const box = await boxOf(card(page, name));
+  const zoom = box.width / CARD_WIDTH;
+  const from = [box.x + box.width / 4, box.y + box.height / 3] as const; // beside the input
+  const x = from[0] + middle(origin) + dx * zoom - middle(box);
+  const y = from[1] + origin.y + dy * zoom - box.y;
+  await page.mouse.move(...from);
+  await page.mouse.down();
+  await page.mouse.move((from[0] + x) / 2, (from[1] + y) / 2, { steps: 6 });
+  await page.mouse.move(x, y, { steps: 6 });
+  await page.mouse.up();
+  await page.getByRole("button", { name: "Fit", exact: true }).click();
+}
+
+const CARD_WIDTH = 208; // px at zoom 1
+
+function middle(box: { x: number; width: number }): number {
+  return box.x + box.width / 2;
+}
+
+async function drag(page: Page, from: Locator, to: Locator): Promise<void> {
+  const start = await boxOf(from);
+  const end = await boxOf(to);
+  const arrows = await page.locator(".react-flow__edge").count();
+  await page.mouse.move(start.x + start.width / 2, start.y + start.height / 2);
+  await page.mouse.down();
+  const target = [end.x + end.width / 2, end.y + 8] as const;
+  await page.mouse.move(target[0], target[1] - 20, { steps: 8 });
+  await page.mouse.move(...target, { steps: 4 });
+  await page.mouse.up();
+  await expect.poll(() => page.locator(".react-flow__edge").count()).toBeGreaterThan(arrows);
+}
+
+/** Where something is once it has come to rest: the canvas glides when it shows all. */
+async function boxOf(locator: Locator) {
+  await locator.scrollIntoViewIfNeeded();
+  let before = "";
+  for (;;) {
+    const box = await locator.boundingBox();
+    if (box === null) throw new Error(`${locator} is not on screen`);
+    const now = JSON.stringify(box);
+    if (now === before) return box;
+    before = now;
+    await locator.page().waitForTimeout(80);
+  }
+}
+
+/** Waits until everything is on disk. */
+export async function saved(page: Page): Promise<void> {
+  await expect(page.getByText("Saved", { exact: true })).toBeVisible();
+}
+
+/** Holds Start for as long as it asks for. */
+export async function start(page: Page): Promise<void> {
+  const button = page.getByRole("button", { name: /^Start v\d+ in the simulator/ });
+  await expect(button).toBeEnabled();
+  const box = await boxOf(button);
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.mouse.down();
+  await page.waitForTimeout(900);
+  await page.mouse.up();
+}
+
+/** Gives an action a parameter of text with a value. */
+export async function give(page: Page, to: string, name: string, value: string): Promise<void> {
+  await card(page, to).click({ position: { x: 50, y: 30 } });
+  await page.getByRole("button", { name: "Add", exact: true }).first().click();
+  const field = page.getByRole("textbox", { name: "Name of the parameter" });
+  await field.fill(name);
+  await field.press("Enter");
+  const input = page.getByRole("textbox", { name: new RegExp(`^${name}`) });
+  await input.fill(value);
+  await input.press("Enter");
+}
+
+/** Notes from now on which actions the page shows as running, however short that is. */
+export async function watch(page: Page): Promise<void> {
+  await page.evaluate(() => {
+    const seen = new Set<string>();
+    Object.assign(window, { seenRunning: seen });
+    setInterval(() => {
+      for (const node of document.querySelectorAll(".react-flow__node-action")) {
+        const [, name] = /^([A-Za-z]+)\d+.*running/.exec(node.textContent ?? "") ?? [];
+        if (name !== undefined) seen.add(name);
+      }
+    }, 20);
+  });
+}
+
+/** The actions that the page has shown as running since `watch`. */
+export function seenRunning(page: Page): Promise<string[]> {
+  return page.evaluate(() => [...(Reflect.get(window, "seenRunning") as Set<string>)].sort());
+}
