@@ -102,3 +102,14 @@ test("a run that ended while the link was down is asked for", async () => {
   expect(live.now.runs.get("r")?.state).toBe("lost");
   live.close();
 });
+
+test("a new name dials anew without a moment of doubt", () => {
+  const live = new Live("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  live.redial();
+  expect(Wire.all.length).toBe(2);
+  expect(Wire.all[0]?.readyState).toBe(3);
+  expect(live.now.link).toBe("live");
+  live.close();
+});

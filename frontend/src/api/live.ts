@@ -61,6 +61,15 @@ export class Live {
     this.#socket = null;
   }
 
+  /** A fresh socket in place of the old one: the runner knows a socket by the session it opened with. */
+  redial(): void {
+    const old = this.#socket;
+    if (old === null || this.#closed) return;
+    this.#socket = null;
+    old.close();
+    this.#connect();
+  }
+
   subscribe = (listener: () => void): (() => void) => {
     this.#listeners.add(listener);
     return () => this.#listeners.delete(listener);

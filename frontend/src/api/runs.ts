@@ -129,6 +129,19 @@ export function getRun(runner: string, id: string, signal?: AbortSignal): Promis
   return ask(`${runner}/api/runs/${encodeURIComponent(id)}`, signal ? { signal } : {});
 }
 
+/** The newest run of a graph, whole; null when it never ran. */
+export function useLastRun(runner: string | undefined, graph: string) {
+  return useQuery({
+    queryKey: ["runs", "last", graph],
+    queryFn: async ({ signal }) => {
+      const path = `${runner}/api/runs?limit=1&graph=${encodeURIComponent(graph)}`;
+      const [newest] = await ask<Run[]>(path, { signal });
+      return newest ? getRun(runner ?? "", newest.id, signal) : null;
+    },
+    enabled: runner !== undefined,
+  });
+}
+
 export function useRun(runner: string | undefined, id: string) {
   return useQuery({
     queryKey: ["runs", "one", id],

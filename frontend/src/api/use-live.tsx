@@ -4,6 +4,7 @@ import {
   type ReactNode,
   use,
   useEffect,
+  useRef,
   useState,
   useSyncExternalStore,
 } from "react";
@@ -18,8 +19,8 @@ interface LiveHold {
 
 const Context = createContext<LiveHold>({ live: null, runner: undefined });
 
-/** Holds the page's one socket to the runner. */
-export function LiveProvider({ children }: { children: ReactNode }) {
+/** Holds the page's one socket to the runner. `who` is who speaks: another name dials anew. */
+export function LiveProvider({ who, children }: { who: string; children: ReactNode }) {
   const runner = useConfig().data?.runner_url;
   const [live, setLive] = useState<Live | null>(null);
   useEffect(() => {
@@ -29,6 +30,12 @@ export function LiveProvider({ children }: { children: ReactNode }) {
     setLive(fresh);
     return () => fresh.close();
   }, [runner]);
+  const known = useRef(who);
+  useEffect(() => {
+    if (known.current === who) return;
+    known.current = who;
+    live?.redial();
+  }, [who, live]);
   return <Context value={{ live, runner }}>{children}</Context>;
 }
 

@@ -2,9 +2,11 @@
 import { MantineProvider } from "@mantine/core";
 import { Notifications } from "@mantine/notifications";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
+import type { ReactNode } from "react";
 import { Route, Switch } from "wouter";
 import { AskName } from "../account/ask-name";
 import { Gate } from "../account/gate";
+import { usePerson } from "../account/person";
 import { Refusal } from "../api/http";
 import { LiveProvider } from "../api/use-live";
 import { StopNotice } from "../runs/stop-notice";
@@ -25,13 +27,19 @@ const client = new QueryClient({
   },
 });
 
+/** The runner hears of a new name by a new socket. */
+function Live({ children }: { children: ReactNode }) {
+  const { person } = usePerson();
+  return <LiveProvider who={`${person.id} ${person.name}`}>{children}</LiveProvider>;
+}
+
 export function App() {
   return (
     <MantineProvider theme={theme} cssVariablesResolver={variables} defaultColorScheme="auto">
       <Notifications position="bottom-right" zIndex={350} />
       <QueryClientProvider client={client}>
         <Gate>
-          <LiveProvider>
+          <Live>
             <DropFiles>
               <Switch>
                 <Route path="/" component={HomeScreen} />
@@ -44,7 +52,7 @@ export function App() {
               <StopNotice />
               <CarriedGhost carrier={actionCarrier} />
             </DropFiles>
-          </LiveProvider>
+          </Live>
         </Gate>
       </QueryClientProvider>
     </MantineProvider>

@@ -1,18 +1,18 @@
 /** The editor of a graph with the list on its left and its runs below. */
 import { Button } from "@mantine/core";
 import { IconMapOff } from "@tabler/icons-react";
-import { type ReactNode, useMemo } from "react";
+import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import { Link } from "wouter";
 import { usePerson } from "../account/person";
 import { useVersions, versionName } from "../api/graphs";
 import { progressByAid } from "../api/progress";
-import type { Run } from "../api/runs";
+import { type Run, useLastRun } from "../api/runs";
 import { newestRun, useLive } from "../api/use-live";
 import { Editor, type Shown } from "../editor/editor";
 import { useKnownActions } from "../library/known";
 import { Sidebar } from "../library/sidebar";
 import { roomUrl } from "../room/connect";
-import { RoomProvider, useLink } from "../room/use-room";
+import { RoomProvider, useLink, useRoom } from "../room/use-room";
 import { DraftWord } from "../runs/draft-word";
 import { LiveWord } from "../runs/live-word";
 import { RunStrip } from "../runs/run-strip";
@@ -22,12 +22,23 @@ import { useNewGraphs } from "./files";
 import { Bar, Frame } from "./frame";
 import { useTitle } from "./title";
 
-function useRunHere(id: string): { run: Run | null; label: string; unsure: boolean } {
-  const { now } = useLive();
-  const run = newestRun(now, id);
+interface RunHere {
+  /** What goes on, or has ended while this page was open: shown on the canvas. */
+  live: Run | null;
+  /** The newest run, also of last week: shown in the strip. Undefined until that is known. */
+  run: Run | null | undefined;
+  label: string;
+  unsure: boolean;
+}
+
+function useRunHere(id: string): RunHere {
+  const { now, runner } = useLive();
+  const live = newestRun(now, id);
+  const last = useLastRun(runner, id).data;
+  const run = live ?? last;
   const versions = useVersions(id, run?.version ?? null).data;
   const label = versionName(versions, run?.version ?? null) || run?.digest.slice(0, 7) || "";
-  return { run, label, unsure: now.link === "down" && run?.ended_at === null };
+  return { live, run, label, unsure: now.link === "down" && live?.ended_at === null };
 }
 
 function Inside({ id }: { id: string }) {
@@ -35,9 +46,16 @@ function Inside({ id }: { id: string }) {
   const { create, choose } = useNewGraphs();
   const { actions } = useKnownActions();
   const known = useMemo(() => actions.map((action) => action.template), [actions]);
-  const { run, label, unsure } = useRunHere(id);
-  const progress = useMemo(() => progressByAid(run, unsure), [run, unsure]);
+  const { live, run, label, unsure } = useRunHere(id);
+  const progress = useMemo(() => progressByAid(live, unsure), [live, unsure]);
   const link = useLink();
+  const { room } = useRoom();
+  const entered = useRef(person.name);
+  useEffect(() => {
+    if (entered.current === person.name) return;
+    entered.current = person.name;
+    room.reconnect(); // the others see the name that the session had when the room was entered
+  }, [person.name, room]);
   if (link.state === "refused" && link.why === "no-such-graph" && link.seq === 0) return <Gone />;
   return (
     <Editor
@@ -48,7 +66,7 @@ function Inside({ id }: { id: string }) {
       bar={(parts) => <TitledBar id={id} {...parts} />}
       list={(place) => <Sidebar current={id} onNew={create} onImport={choose} onPlace={place} />}
       status={(shown: Shown) => (
-        <DraftWord run={run} label={label} graph={shown.graph} seq={shown.seq} />
+        <DraftWord run={live} label={label} graph={shown.graph} seq={shown.seq} />
       )}
       start={(shown: Shown) => (
         <StartControl

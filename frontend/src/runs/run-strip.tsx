@@ -11,11 +11,12 @@ import type { Graph } from "../graph/model";
 import { lanesOf } from "../ui/lanes";
 import { StateWord } from "../ui/state-word";
 import { Timeline } from "../ui/timeline";
-import { clock, instant, stopwatch, useNow } from "../ui/when";
+import { clock, day, instant, stopwatch, useNow } from "../ui/when";
 import style from "./run-strip.module.css";
 
 interface Props {
-  run: Run | null;
+  /** Undefined until it is known. */
+  run: Run | null | undefined;
   graph: Graph;
   versionLabel: string;
   selected: string | null;
@@ -24,9 +25,11 @@ interface Props {
 
 export function RunStrip({ run, graph, versionLabel, selected, onPick }: Props) {
   const { now } = useLive();
-  const goes = run !== null && run.ended_at === null;
+  const goes = run?.ended_at === null;
   const present = useNow(250, goes);
   const lanes = useMemo(() => (run ? lanesOf(run, graph) : []), [run, graph]);
+  if (run === undefined)
+    return <section className={style.strip} aria-busy="true" aria-label="Run" />;
   if (run === null) {
     return (
       <section className={style.strip} aria-label="Run">
@@ -42,6 +45,8 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick }: Props) 
   const down = now.link === "down";
   const start = instant(run.started_at) ?? present;
   const until = down ? now.since : present;
+  const when = day(start, present);
+  const started = when === "today" ? `at ${clock(start)}` : `${when} ${clock(start)}`;
   const { tone, word } = runWord(run);
   const alarm = run.alarms.at(-1);
   const unsure = down && goes;
@@ -57,7 +62,7 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick }: Props) 
         />
         <Text span c="dimmed" size="xs" truncate>
           {run.simulated && "simulated · "}
-          started by {authorName(run.author)} at {clock(start)} ·{" "}
+          started by {authorName(run.author)} {started} ·{" "}
           {stopwatch((instant(run.ended_at) ?? until) - start)}
         </Text>
         <span className={style.gap} />
