@@ -15,6 +15,7 @@ from action_assistant.journal import tables
 from action_assistant.journal.events import Draft, Event
 
 UPDATED: Final = "graph.updated.v1"  # the body is the Yjs update as it came
+DEFERRED: Final = "graph.deferred.v1"  # one that waits for others, which come later in the log
 CREATED: Final = "graph.created.v1"
 IMPORTED: Final = "graph.imported.v1"  # the body is the file as it came
 DESCRIBED: Final = "graph.described.v1"
@@ -99,7 +100,7 @@ def when(at: int) -> datetime:
 
 def fold(event: Event) -> Sequence[Executable]:
     """What an event means for the tables."""
-    if event.kind == UPDATED:
+    if event.kind in {UPDATED, DEFERRED}:
         return ()
     stream, _, name = event.stream.partition("/")
     if stream == "about":

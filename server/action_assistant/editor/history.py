@@ -94,9 +94,9 @@ def _entries(
         at = h.when(row.at)
         entry = Entry(kind="edited", author=people.person(row.author), at=at, until=at, seq=seq)
         match row.kind:
-            case h.UPDATED if row.seq == 1:
+            case h.UPDATED | h.DEFERRED if row.seq == 1:
                 continue  # what the graph was created with
-            case h.UPDATED:
+            case h.UPDATED | h.DEFERRED:
                 seq = row.seq
                 if seq in restored:
                     entry = replace(entry, kind="restored", seq=seq, restored=restored[seq])

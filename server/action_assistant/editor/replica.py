@@ -1,5 +1,7 @@
 """A document in memory that says what each update brought."""
 
+import itertools
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum
@@ -8,12 +10,15 @@ from typing import Any, Final
 import anyio
 import anyio.lowlevel
 import msgspec
-from pycrdt import Doc, get_update, merge_updates
+from pycrdt import Doc, get_update
 
-from action_assistant.editor.happenings import UPDATED
+from action_assistant.editor.happenings import DEFERRED, UPDATED
+from action_assistant.editor.scan import Outline, outline
 from action_assistant.editor.wire import NOTHING_NEW, Malformed, Reader
 from action_assistant.journal.events import Event
 from action_assistant.journal.journal import Journal
+
+log: Final = logging.getLogger(__name__)
 
 _SLICE: Final = 500  # events that are applied before others get a turn
 
@@ -23,7 +28,7 @@ class Brought(Enum):
 
     NEWS = "changed it"
     NOTHING = "was known"
-    WAITS = "waits, in part or whole, for an earlier one"
+    WAITS = "waits for an earlier one"
 
 
 class Panicked(Exception):
@@ -31,76 +36,92 @@ class Panicked(Exception):
 
 
 class Replica:
-    """A Yjs document. Always `close` it: a document that is observed is never freed."""
+    """A Yjs document. Always `close` it: a document that is observed is never freed.
+
+    What waits for an earlier update is held back here: the library loses edits when it holds several
+    that wait. So the document never has anything pending.
+    """
 
     def __init__(self) -> None:
         self.doc: Final[Doc[Any]] = Doc()
+        self._known: dict[int, int] = {}
         self._fired = False
-        self._waiting: list[bytes] = []
+        self._waiting: dict[bytes, Outline] = {}
+        self._released: list[bytes] = []
         self._subscription = self.doc.observe(self._observed)
 
     def take(self, update: bytes) -> Brought:
         """Apply an update. Raises Malformed, Panicked; the document is then as before."""
-        check_counts(update)
         if update in self._waiting:
             return Brought.NOTHING
-        self._fired = False
-        self.apply(update)
-        if self.lacks_before(update):
-            self._waiting.append(update)
+        read = outline(update)
+        if not read.ready(self._known):
+            self._waiting[update] = read
             return Brought.WAITS
-        if not self._fired:
+        if not self._applied(update, read):
             return Brought.NOTHING
-        if self._waiting:
-            self._waiting = [each for each in self._waiting if self.lacks_before(each)]
+        while self._waiting and self._release():
+            pass
         return Brought.NEWS
 
-    def apply(self, *updates: bytes) -> None:
-        """Apply updates without asking what they brought. Raises Malformed, Panicked."""
+    def replay(self, updates: list[bytes]) -> None:
+        """Apply updates that once were news, in that order. Raises Malformed, Panicked."""
+        if self._waiting:
+            for update in updates:
+                self.take(update)
+            return
+        self._apply(*updates)
+        self._known = clocks(self.doc.get_state())
+
+    def released(self) -> list[bytes]:
+        """Updates that waited and do not any more, since this was asked last."""
+        released, self._released = self._released, []
+        return released
+
+    @property
+    def waiting(self) -> tuple[bytes, ...]:
+        """Updates that wait for earlier ones."""
+        return tuple(self._waiting)
+
+    def _applied(self, update: bytes, read: Outline) -> bool:
+        """Apply what is ready; whether it changed anything."""
+        self._fired = False
+        self._apply(update)
+        for client, _, end in read.brings:
+            self._known[client] = max(end, self._known.get(client, 0))
+        return self._fired
+
+    def _release(self) -> bool:
+        """Apply what has become ready; whether there was any."""
+        ready = [each for each, read in self._waiting.items() if read.ready(self._known)]
+        for update in ready:
+            read = self._waiting.pop(update)
+            try:
+                if self._applied(update, read):
+                    self._released.append(update)
+            except Malformed as error:
+                log.warning("an update that waited brings nothing: %s", error)
+        return bool(ready)
+
+    def _apply(self, *updates: bytes) -> None:
         with _guarded(), self.doc.transaction():
             for update in updates:
                 self.doc.apply_update(update)
-
-    def lacks_before(self, update: bytes) -> bool:
-        """Whether something that an applied update builds on has not come yet."""
-        rest = Reader(get_update(update, self.doc.get_state()))
-        if rest.number() > 0:  # clients whose structs could not be placed
-            return True
-        clients = rest.number()  # of the delete set
-        if clients == 0:
-            return False
-        known = clocks(self.doc.get_state())
-        for _ in range(clients):
-            end = known.get(rest.number(), 0)
-            for _ in range(rest.number()):
-                if rest.number() + rest.number() > end:
-                    return True
-        return False
 
     def adds_nothing(self, update: bytes) -> bool:
         """Whether an update that was not applied would leave the document as it is."""
         if update == NOTHING_NEW:
             return True
-        check_counts(update)
+        outline(update)
         with _guarded():
             return bool(get_update(update, self.doc.get_state()) == NOTHING_NEW)
 
     def lacking(self, state: bytes) -> bytes:
-        """What somebody with this state vector lacks, with what waits. Raises Malformed, Panicked."""
+        """What somebody with this state vector lacks. Raises Malformed, Panicked."""
         if Reader(state).number() * 2 > len(state):
             raise Malformed("more clients than bytes")
         with _guarded():
-            update: bytes = self.doc.get_update(state)
-            return merge_updates(update, *self._waiting) if self._waiting else update
-
-    @property
-    def waiting(self) -> tuple[bytes, ...]:
-        """Updates that wait for earlier ones. They are in no state that the document gives out."""
-        return tuple(self._waiting)
-
-    def wait_for_missing(self, updates: list[bytes]) -> None:
-        """Of updates applied in bulk, remember those that wait."""
-        self._waiting += [each for each in updates if self.lacks_before(each)]
+            return self.doc.get_update(state)
 
     def close(self) -> None:
         """Let the document be freed."""
@@ -134,53 +155,44 @@ class Loaded(msgspec.Struct, frozen=True):
 
 
 async def load(journal: Journal, stream: str, upto: int | None = None) -> Loaded:
-    """The document of a stream, now or after its event `upto`: snapshot and tail, in slices."""
+    """The document of a stream, now or after its event `upto`: snapshot and tail, in slices.
+
+    Raises Malformed when the log holds what cannot be applied.
+    """
     kept = await journal.snapshot(stream)
     replica = Replica()
     seq = start = 0
     if kept is not None and (upto is None or kept.seq <= upto):
         try:
-            replica.apply(kept.state)
+            replica.replay([kept.state])
             seq = start = kept.seq
         except (Malformed, Panicked):  # a snapshot is only a cache
             replica.close()
             replica = Replica()
-    tail: list[bytes] = []
     while events := await journal.read(stream, after=seq, upto=upto, limit=_SLICE):
-        updates = [event.body for event in events if event.kind == UPDATED]
-        _replay(replica, updates, events)
-        tail += updates
+        try:
+            _replay(replica, events)
+        except (Malformed, Panicked) as error:
+            replica.close()
+            first, last = events[0].seq, events[-1].seq
+            raise Malformed(f"{stream} {first}…{last} is damaged: {error}") from error
         seq = events[-1].seq
         await anyio.lowlevel.checkpoint()
-    for n in range(0, len(tail), _SLICE):
-        replica.wait_for_missing(tail[n : n + _SLICE])
-        await anyio.lowlevel.checkpoint()
+    replica.released()
     return Loaded(replica, seq, start)
 
 
-def _replay(replica: Replica, updates: list[bytes], events: list[Event]) -> None:
-    try:
-        replica.apply(*updates)
-    except Malformed as error:
-        replica.close()
-        first, last = events[0], events[-1]
-        raise Malformed(f"{first.stream} {first.seq}…{last.seq} is damaged: {error}") from error
+def _replay(replica: Replica, events: list[Event]) -> None:
+    for kind, group in itertools.groupby(events, key=lambda event: event.kind):
+        bodies = [event.body for event in group]
+        if kind == UPDATED:
+            replica.replay(bodies)
+        elif kind == DEFERRED:
+            for body in bodies:
+                replica.take(body)
 
 
 def clocks(state: bytes) -> dict[int, int]:
     """A state vector as numbers: what is known of each client."""
     reader = Reader(state)
     return {reader.number(): reader.number() for _ in range(reader.number())}
-
-
-def check_counts(update: bytes) -> None:
-    """Refuse counts that the bytes cannot hold: the library allocates before it reads.
-
-    Raises Malformed.
-    """
-    reader = Reader(update)
-    clients = reader.number()
-    if clients * 3 > reader.left:
-        raise Malformed("more clients than bytes")
-    if clients and reader.number() > reader.left:
-        raise Malformed("more structs than bytes")

@@ -13,7 +13,7 @@ import msgspec
 from pycrdt import merge_updates
 
 from action_assistant.editor import wire
-from action_assistant.editor.happenings import UPDATED
+from action_assistant.editor.happenings import DEFERRED, UPDATED
 from action_assistant.editor.member import Member
 from action_assistant.editor.presence import Attendance
 from action_assistant.editor.replica import Brought, Loaded, Panicked, Replica, load
@@ -196,7 +196,7 @@ class Room:
         self._in_hand = batch
         taken = self._take(batch)
         if taken.news:
-            drafts = [Draft(UPDATED, offer.author, offer.update) for offer in taken.news]
+            drafts = [Draft(kind, offer.author, offer.update) for offer, kind in taken.news]
             self.seq = await self._journal.append(self.stream, drafts, expected=self.seq)
         self._in_hand = []
         self._tell(taken)
@@ -235,8 +235,13 @@ class Room:
             if brought is None:
                 continue
             taken.handled.append(item)
-            if brought is not Brought.NOTHING:
-                taken.news.append(item)
+            if brought is Brought.WAITS:
+                taken.news.append((item, DEFERRED))
+            elif brought is Brought.NEWS:
+                taken.news.append((item, UPDATED))
+                released = self._replica.released()
+                taken.shown += [item.update, *released]
+                taken.for_all = taken.for_all or bool(released)
         return taken
 
     def _brought(self, offer: Offer) -> Brought | None:
@@ -255,10 +260,10 @@ class Room:
 
     def _tell(self, taken: "Taken") -> None:
         """What is committed: to the others as news, to those who sent it as an acknowledgement."""
-        frames = [wire.change(update) for update in _merged([o.update for o in taken.news])]
-        own = {offer.member for offer in taken.news}
+        frames = [wire.change(update) for update in _merged(taken.shown)]
+        own = {offer.member for offer, _ in taken.news}
         for member in self.members:
-            if member.synced and (own != {member}):
+            if member.synced and (taken.for_all or own != {member}):
                 for frame in frames:
                     member.post(frame)
         heard = {offer.member for offer in taken.handled}
@@ -272,7 +277,7 @@ class Room:
                 member.post_ack(self.seq)
 
     def _answer(self, ask: Ask) -> None:
-        """Sync step 2: what the client lacks, also of what waits for an earlier update."""
+        """Sync step 2: what the client lacks."""
         try:
             lacking = self._replica.lacking(ask.state)
         except Malformed:
@@ -326,7 +331,9 @@ class Taken:
     """What became of a batch."""
 
     def __init__(self) -> None:
-        self.news: list[Offer] = []
+        self.news: list[tuple[Offer, str]] = []  # to be stored, as which kind
+        self.shown: list[bytes] = []  # what the others can make use of
+        self.for_all = False  # something that waited is among it
         self.handled: list[Offer] = []
         self.asks: list[Ask] = []
         self.looks: list[Look] = []

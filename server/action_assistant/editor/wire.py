@@ -105,6 +105,24 @@ class Reader:
         self._at += length
         return self._data[self._at - length : self._at]
 
+    def byte(self) -> int:
+        """One byte."""
+        if self._at >= len(self._data):
+            raise Malformed("the message ends early")
+        self._at += 1
+        return self._data[self._at - 1]
+
+    def skip(self, count: int) -> None:
+        """Pass over bytes."""
+        if count > self.left:
+            raise Malformed("the message ends early")
+        self._at += count
+
+    def skip_signed(self) -> None:
+        """Pass over a varInt."""
+        while self.byte() & 0x80:
+            pass
+
     @property
     def left(self) -> int:
         """Bytes that were not read."""
