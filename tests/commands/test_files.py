@@ -3,6 +3,7 @@
 import json
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,7 +36,7 @@ def written(folder: Path, value: object) -> str:
     return str(path)
 
 
-TWO = {
+TWO: dict[str, Any] = {
     "graph_name": "two",
     "graph_entry": [{"name": "A"}],
     "graph_exit": [{"name": "B"}],
@@ -155,6 +156,41 @@ def test_a_stop_at_a_time_stops(tmp_path: Path) -> None:
     events = [json.loads(line) for line in answer.stdout.splitlines()]
     graph = [event["state"] for event in events if event["kind"] == "graph_state"]
     assert graph[-1] == "STOPPED"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"graph_entry": {"actions": [{"name": "A"}]}},
+        {"graph_entry": [{"name": "Missing"}]},
+        {"actions": [{"name": "A"}]},
+    ],
+)
+def test_what_the_engines_parser_refuses_is_not_simulated(
+    tmp_path: Path, change: dict[str, object]
+) -> None:
+    answer = run("simulate", "--trace", written(tmp_path, {**TWO, **change}))
+    assert answer.returncode == 1
+    assert answer.stdout == ""
+    assert "the engine refuses it" in answer.stderr
+
+
+def test_a_run_state_in_the_file_is_an_error_and_kills_the_simulated_engine(tmp_path: Path) -> None:
+    first, second = TWO["actions"]
+    path = written(tmp_path, {**TWO, "actions": [{**first, "state": "FINISHED"}, second]})
+    (verdict,) = json.loads(run("check", "--json", path).stdout)
+    assert "H1" in {problem["code"] for problem in verdict["problems"]}
+    answer = run("simulate", "--trace", path)
+    assert answer.returncode == 0
+    last = json.loads(answer.stdout.splitlines()[-1])
+    assert (last["kind"], last["code"]) == ("hazard", "H1")
+
+
+def test_simulate_tells_a_person_what_the_engine_would_do_wrong(tmp_path: Path) -> None:
+    graph = {**TWO, "actions": [TWO["actions"][0], {"name": "B", "type": "sync"}]}
+    answer = run("simulate", written(tmp_path, graph))
+    assert answer.returncode == 0
+    assert "hazard H2: The child in “A_0 => B_0” does not list it" in answer.stdout
 
 
 def test_a_script_that_makes_no_sense_is_wrong_use(tmp_path: Path) -> None:

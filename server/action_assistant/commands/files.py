@@ -3,7 +3,7 @@
 import argparse
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -117,7 +117,7 @@ def _verdict(path: Path, facts: EngineFacts) -> Verdict:
             code=error.code, severity="error", where=Where(path=error.path), message=error.message
         )
         return Verdict(str(path), None, (problem,))
-    found = [*reading.problems, *checks.check(reading.graph, None, facts)]
+    found = checks.check_reading(reading, None, facts)
     return Verdict(str(path), reading.dialect, tuple(dict.fromkeys(found)))
 
 
@@ -160,6 +160,9 @@ def _through_document(graph: Graph) -> Graph:
 def _simulate(options: argparse.Namespace) -> int:
     try:
         reading = codec.read(_text(options.file))
+        if refusals := checks.refused_by_parser(reading):
+            _print_refusals(options.file, refusals)
+            return 1
         script = _script(options.script) if options.script else semantics.Script({})
         trace = semantics.simulate(
             reading.graph,
@@ -176,10 +179,13 @@ def _simulate(options: argparse.Namespace) -> int:
     except codec.Unreadable as error:
         print(_refusal(options.file, error), file=sys.stderr)
         return 1
-    except semantics.EngineRefused as error:
-        print(f"{options.file}: the engine refuses it: {error}", file=sys.stderr)
-        return 1
     return 0
+
+
+def _print_refusals(path: Path, refusals: Sequence[Problem]) -> None:
+    for problem in refusals:
+        place = f" ({problem.where.path})" if problem.where.path else ""
+        print(f"{path}: the engine refuses it: {problem.message}{place}", file=sys.stderr)
 
 
 def _script(path: Path) -> semantics.Script:
@@ -194,11 +200,14 @@ def _library(folder: Path | None) -> Mapping[str, Graph]:
     found: dict[str, Graph] = {}
     for path in sorted(folder.rglob("*graph.json")) if folder else ():
         try:
-            graph = codec.read(_text(path)).graph
+            reading = codec.read(_text(path))
         except codec.Unreadable as error:
             print(f"left out {_refusal(path, error)}", file=sys.stderr)
             continue
-        found.setdefault(graph.name, graph)
+        if refusals := checks.refused_by_parser(reading):
+            print(f"left out {path}: {refusals[0].message}", file=sys.stderr)
+            continue
+        found.setdefault(reading.graph.name, reading.graph)
     return found
 
 
@@ -215,7 +224,8 @@ def _report(event: semantics.Trace, *, as_json: bool) -> None:
             print(f"{at / 1000:10.3f} s  {graph}: {state}")
         case semantics.GraphResult(t_ms=at, graph=graph, value=value):
             print(f"{at / 1000:10.3f} s  {graph} ends with {value}")
-        case semantics.Hazard(t_ms=at, graph=graph, code=code):
-            print(f"{at / 1000:10.3f} s  {graph}: hazard {code}")
+        case semantics.Hazard(t_ms=at, graph=graph, code=code, node=node, message=message):
+            who = f"  {node}" if node else ""
+            print(f"{at / 1000:10.3f} s  {graph}{who}: hazard {code}: {message}")
         case _:
             pass

@@ -47,13 +47,15 @@ def check_reading(
 
 def refused_by_parser(reading: Reading) -> list[Problem]:
     """Why the engine's parser refuses a file as it stands; nothing of such a file can run."""
+    subject = Subject(reading.graph, PINNED)
+    check_structure(subject)
     ends = {ENTRY, EXIT}
     at_ends = {
         f"{r.parent}>{r.child}" for r in reading.graph.relations if {r.parent, r.child} & ends
     }
     return [
         problem
-        for problem in check_reading(reading)
+        for problem in (*reading.problems, *subject.problems)
         if problem.severity == "error"
         and (
             problem.code in REFUSED
