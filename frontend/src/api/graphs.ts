@@ -79,7 +79,8 @@ export function useVersions(graph: string, wanted: string | null = null) {
   const versions = useQuery({
     enabled: graph !== "",
     queryKey: keys.versions(graph),
-    queryFn: ({ signal }) => ask<Version[]>(`/api/graphs/${graph}/versions`, { signal }),
+    queryFn: ({ signal }) =>
+      ask<Version[]>(`/api/graphs/${encodeURIComponent(graph)}/versions`, { signal }),
   });
   const missing =
     wanted !== null && versions.data?.every((version) => version.id !== wanted) === true;
@@ -93,7 +94,8 @@ export function useVersions(graph: string, wanted: string | null = null) {
 export function useProblems(graph: string, seq: number) {
   return useQuery({
     queryKey: keys.problems(graph, seq),
-    queryFn: ({ signal }) => ask<Problems>(`/api/graphs/${graph}/problems?seq=${seq}`, { signal }),
+    queryFn: ({ signal }) =>
+      ask<Problems>(`/api/graphs/${encodeURIComponent(graph)}/problems?seq=${seq}`, { signal }),
     enabled: seq > 0,
     placeholderData: (before) => before,
     staleTime: Number.POSITIVE_INFINITY,
@@ -110,21 +112,24 @@ export function importGraph(text: string): Promise<GraphSummary> {
 }
 
 export function deleteGraph(id: string): Promise<void> {
-  return ask(`/api/graphs/${id}`, { method: "DELETE" });
+  return ask(`/api/graphs/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 
 /** Brings a deleted graph back. */
 export function recoverGraph(id: string): Promise<unknown> {
-  return ask(`/api/graphs/${id}/recover`, { method: "POST" });
+  return ask(`/api/graphs/${encodeURIComponent(id)}/recover`, { method: "POST" });
 }
 
 export function graphText(id: string): Promise<string> {
-  return askText(`/api/graphs/${id}/umrf`);
+  return askText(`/api/graphs/${encodeURIComponent(id)}/umrf`);
 }
 
 /** The version of what the page shows at `seq`, as text, because its numbers must stay as written. */
 export function publish(graph: string, seq: number): Promise<string> {
-  return askText(`/api/graphs/${graph}/versions`, { method: "POST", body: { seq } });
+  return askText(`/api/graphs/${encodeURIComponent(graph)}/versions`, {
+    method: "POST",
+    body: { seq },
+  });
 }
 
 export function authorName(author: Author | null | undefined): string {

@@ -33,7 +33,7 @@ export interface EditorState {
 
 function download(id: string, name: string): void {
   const link = document.createElement("a");
-  link.href = `/api/graphs/${id}/umrf`;
+  link.href = `/api/graphs/${encodeURIComponent(id)}/umrf`;
   link.download = `${name || "graph"}.umrf.graph.json`;
   link.click();
 }

@@ -84,7 +84,7 @@ function CardMenu({ graph }: { graph: GraphSummary }) {
       <Menu.Dropdown>
         <Menu.Item
           component="a"
-          href={`/api/graphs/${graph.id}/umrf`}
+          href={`/api/graphs/${encodeURIComponent(graph.id)}/umrf`}
           download={`${graph.name || "graph"}.umrf.graph.json`}
           leftSection={<IconShare3 size={15} />}
         >

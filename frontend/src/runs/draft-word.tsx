@@ -20,7 +20,8 @@ export function DraftWord({ run, label, graph, seq }: Props) {
   const goes = run !== null && run.ended_at === null;
   const version = useQuery({
     queryKey: keys.version(run?.version ?? ""),
-    queryFn: ({ signal }) => ask<Version>(`/api/versions/${run?.version}`, { signal }),
+    queryFn: ({ signal }) =>
+      ask<Version>(`/api/versions/${encodeURIComponent(run?.version ?? "")}`, { signal }),
     enabled: goes && run.version !== null,
     staleTime: Number.POSITIVE_INFINITY,
   }).data;
