@@ -44,7 +44,8 @@ async def open_house(settings: EditorSettings) -> AsyncIterator[House]:
 
 
 def create_app(settings: EditorSettings) -> ASGIApp:
-    """The whole editor process. Raises CannotStart when its lifespan begins."""
+    """The whole editor process. Raises CannotStart."""
+    Journal.prepare(settings.database, "editor")
     keys = Keys.of(settings.data)
     door = Door()
 

@@ -42,6 +42,15 @@ class Journal:
         self._followers: set[_Follower] = set()
         self._closed = False
 
+    @staticmethod
+    def prepare(url: str, branch: Branch) -> None:
+        """Raise CannotStart if `open` would: to be called before a server is begun."""
+        lock = _own(file_of(url))
+        try:
+            migrate(url, branch)
+        finally:
+            _disown(lock)
+
     @classmethod
     async def open(cls, url: str, *, branch: Branch, fold: Fold) -> "Journal":
         """Open, and bring the tables to this version. `url` is `sqlite:///PATH`.
