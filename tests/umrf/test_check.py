@@ -163,6 +163,15 @@ def test_two_branches_of_a_decision_that_the_exit_both_requires_are_found() -> N
     assert problems(graph) == []
 
 
+@pytest.mark.parametrize("response", ["stop", "pause", "restart"])
+def test_a_response_that_does_nothing_leaves_the_graph_running_for_ever(response: str) -> None:
+    ask = {"name": "A", "conditions": [f"on_false -> {response}", *SAFE]}
+    messages = [p.message for p in problems(file(A, action("B", parents=[ask]))) if p.code == "H8"]
+    assert messages == [
+        "If A_0 ends with on_false, the graph stays RUNNING for ever: nothing runs any more."
+    ]
+
+
 def test_a_spontaneous_action_before_a_loop_is_an_error() -> None:
     back = {"name": "C", "required": False, "conditions": SAFE}
     graph = file(

@@ -37,7 +37,7 @@ def _trials(subject: Subject) -> Iterator[tuple[Action | None, str]]:
         outgoing = subject.outgoing.get(action.key, [])
         answers = {o: [r.conditions.answer(o) for r in outgoing] for o in PRECONDITIONS}
         for outcome in ("on_false", "on_error"):
-            asked = any(answer in ("run", "bypass") for answer in answers[outcome])
+            asked = any(answer != "ignore" for answer in answers[outcome])
             if asked and answers[outcome] != answers["on_true"]:
                 yield action, outcome
 

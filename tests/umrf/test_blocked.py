@@ -1,0 +1,136 @@
+"""What `check` blocks of real graphs and of recorded ones, and what the engine does with just those.
+
+`blocked.json` names every blocked graph with its codes, the engine's behaviour and the evidence.
+"""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from action_assistant.umrf.check import blocking, check_reading, refused_by_parser
+from action_assistant.umrf.codec import read
+from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.model import Signature
+from action_assistant.umrf.semantics import GraphState, Hazard, simulate
+
+ROOT = Path(__file__).parents[2]
+SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf"
+CORPUS = SHARED / "corpus"
+TRACES = SHARED / "traces"
+KNOWN: dict[str, Any] = json.loads((Path(__file__).parent / "blocked.json").read_text())
+#: What is in a recording that did not go well.
+BAD_ENDS = {"crash", "std::terminate", "timeout", "throw", "final_hang", "final_throw"}
+
+
+def accepted() -> list[str]:
+    """Files of current graphs in the corpus that the engine's parser accepts."""
+    verdicts = CORPUS / "verdicts.jsonl"
+    lines = verdicts.read_text().splitlines() if verdicts.exists() else []
+    found = [json.loads(line) for line in lines]
+    return [v["file"] for v in found if v["accepted"] and v["file"].startswith("graphs/")]
+
+
+def blocked(path: Path, facts: Any = PINNED) -> list[str]:
+    """Codes that forbid a start."""
+    return sorted({p.code for p in blocking(check_reading(read(path.read_bytes()), None, facts))})
+
+
+def behaviour(path: Path) -> str:
+    """What the engine does with a graph, by the rules that the recordings confirm."""
+    reading = read(path.read_bytes())
+    states: list[str] = []
+    for trace in simulate(reading.graph, facts=PINNED, states=reading.states, max_events=3_000):
+        match trace:
+            case Hazard(code="refused"):
+                return "refuses"
+            case Hazard(effect="crash"):
+                return "aborts"
+            case Hazard(effect="hang"):
+                return "hangs"
+            case GraphState(graph=name, state=state) if name == reading.graph.name:
+                states.append(state)
+            case _:
+                pass
+    return "runs" if "RUNNING" in states else "never starts"
+
+
+needs_corpus = pytest.mark.skipif(not accepted(), reason=f"there is no corpus in {CORPUS}")
+
+
+@needs_corpus
+def test_each_blocked_real_graph_is_known_with_its_reason() -> None:
+    found = {file: codes for file in accepted() if (codes := blocked(CORPUS / file))}
+    assert found == {file: known["codes"] for file, known in KNOWN["graphs"].items()}
+
+
+@needs_corpus
+@pytest.mark.parametrize("file", KNOWN["graphs"], ids=lambda file: file.rpartition("/")[2])
+def test_the_engine_does_not_run_a_real_graph_that_is_blocked(file: str) -> None:
+    assert behaviour(CORPUS / file) == KNOWN["graphs"][file]["engine"] != "runs"
+
+
+@needs_corpus
+def test_at_most_one_real_graph_in_twenty_is_blocked_although_the_engine_runs_it() -> None:
+    files = accepted()
+    wrong = [
+        file for file in files if blocked(CORPUS / file) and behaviour(CORPUS / file) == "runs"
+    ]
+    assert len(wrong) <= 0.05 * len(files), wrong
+
+
+@needs_corpus
+def test_a_real_graph_that_is_not_blocked_runs() -> None:
+    for file in accepted():
+        if not blocked(CORPUS / file):
+            assert behaviour(CORPUS / file) == "runs", file
+
+
+@needs_corpus
+def test_graphs_of_several_actors_are_blocked_only_where_engines_do_not_synchronise() -> None:
+    facts = msgspec.structs.replace(PINNED, synchronises=True)
+    only_actors = [file for file, known in KNOWN["graphs"].items() if known["codes"] == ["actors"]]
+    assert len(only_actors) == 2
+    assert [blocked(CORPUS / file, facts) for file in only_actors] == [[], []]
+
+
+def went_well(name: str) -> bool:
+    """Whether all runs of a recording ended without a crash, a hang or a refusal."""
+    runs = sorted((TRACES / "bypass_fixed").glob(f"{name}.trace*.jsonl"))
+    for path in runs or sorted(TRACES.glob(f"{name}.trace*.jsonl")):
+        lines = [json.loads(line) for line in path.read_text().splitlines() if line]
+        if any(line["kind"] in BAD_ENDS or line.get("rc") in (-6, -11) for line in lines):
+            return False
+    return True
+
+
+def recordings() -> list[str]:
+    return sorted(
+        name
+        for path in TRACES.glob("*.graph.json")
+        if (TRACES / f"{(name := path.name.removesuffix('.graph.json'))}.trace.jsonl").exists()
+    )
+
+
+@pytest.mark.skipif(not recordings(), reason=f"there are no recordings in {TRACES}")
+def test_recorded_graphs_that_went_well_are_not_blocked() -> None:
+    found = {}
+    for name in recordings():
+        reading = read((TRACES / f"{name}.graph.json").read_bytes())
+        if not refused_by_parser(reading) and went_well(name):
+            codes = blocked(TRACES / f"{name}.graph.json")
+            found |= {name: codes} if codes else {}
+    assert found == {name: known["codes"] for name, known in KNOWN["recordings"].items()}
+
+
+@pytest.mark.skipif(not recordings(), reason=f"there are no recordings in {TRACES}")
+def test_with_the_files_of_the_actions_an_optional_input_blocks_nothing() -> None:
+    library = {
+        "OxWork": Signature(inputs={"delay": "number", "result": "string"}),
+        "OxOptional": Signature(inputs={"text": "string"}, optional=frozenset({"text"})),
+    }
+    reading = read((TRACES / "param_optional.graph.json").read_bytes())
+    assert blocking(check_reading(reading, library)) == []
