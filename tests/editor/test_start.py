@@ -25,8 +25,7 @@ def settings(tmp_path: Path) -> EditorSettings:
 def stopped(tmp_path: Path) -> Path:
     """The data folder of an editor that has ended."""
     with running(tmp_path / "data") as editor:
-        data = editor.data
-    return data
+        return editor.data
 
 
 def started(data: Path) -> "subprocess.CompletedProcess[str]":
