@@ -61,6 +61,11 @@ e2e: setup ## tests in Chromium against the real processes
 	@echo "» Playwright"
 	@$(NPM) run --silent e2e
 
+.PHONY: pictures
+pictures: setup ## take the pictures of the documentation from the running product
+	@scripts/need chromium=chromium
+	@PICTURES=1 $(NPM) run --silent e2e -- e2e/pictures.spec.ts
+
 .PHONY: bench
 bench: setup ## measure speed; prints tables
 	@$(BIN)/python bench/run.py $(ARGS)
