@@ -279,31 +279,28 @@ def _watch(server: Server, run: str) -> int:
 
 
 def _stop(options: argparse.Namespace) -> int:
+    """Want it stopped, then wait for what proves that nothing moves."""
     with _server(options) as server:
         try:
             path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
-            server.runner("POST", path)
+            stopping: list[str] = server.runner("POST", path).json()["runs"]
             deadline = time.monotonic() + options.wait
             while True:
-                left = _unproven(server, options.run)
-                if not left:
-                    print("stopped")
-                    return 0
+                runs = [server.runner("GET", f"/api/runs/{run}").json() for run in stopping]
+                unproven = [run for run in runs if run["state"] not in _ENDED - {"lost"}]
+                if all(run["state"] in _ENDED for run in runs):
+                    break
                 if time.monotonic() > deadline:
-                    raise _No(
-                        f"STOP UNCONFIRMED for {', '.join(left)}: nothing proves that the robot "
-                        "stands still. Use its hardware stop."
-                    )
+                    break
                 time.sleep(_POLL)
         except _No as error:
             return _refused(error)
-
-
-def _unproven(server: Server, run: str | None) -> list[str]:
-    """Runs that are not proven to have ended."""
-    runs = (
-        [server.runner("GET", f"/api/runs/{run}").json()]
-        if run
-        else server.runner("GET", "/api/runs").json()
-    )
-    return [found["id"] for found in runs if found["state"] not in _ENDED]
+    for run in unproven:
+        print(
+            f"STOP UNCONFIRMED for run {run['number']} of {run['graph_name']}: it is "
+            f"{run['state']}. {run['detail']} Look at the robot; use its hardware stop.",
+            file=sys.stderr,
+        )
+    if not unproven:
+        print("stopped" if stopping else "nothing was running")
+    return 1 if unproven else 0
