@@ -163,6 +163,18 @@ def test_two_branches_of_a_decision_that_the_exit_both_requires_are_found() -> N
     assert problems(graph) == []
 
 
+def test_a_loop_is_told_once_that_it_must_take_time() -> None:
+    back = {"name": "B", "required": False, "conditions": ["on_false -> ignore", *SAFE]}
+    graph = file(
+        action("A", parents=[back], children=["B"]), action("B", parents=["A"], children=["A"])
+    )
+    (problem,) = [p for p in problems(graph) if p.code == "H5"]
+    assert problem.severity == "warning"
+    assert problem.message.startswith("A_0, B_0 are a loop. If all of them end at once")
+    back["conditions"] = ["on_true -> ignore", "on_false -> ignore", *SAFE]
+    assert "H5" not in found(graph)
+
+
 @pytest.mark.parametrize("response", ["stop", "pause", "restart"])
 def test_a_response_that_does_nothing_leaves_the_graph_running_for_ever(response: str) -> None:
     ask = {"name": "A", "conditions": [f"on_false -> {response}", *SAFE]}

@@ -1,7 +1,6 @@
 """What is wrong with a graph, in words that say what would happen (SPEC 3)."""
 
 from collections.abc import Collection, Mapping
-from typing import Final
 
 from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
@@ -9,19 +8,11 @@ from action_assistant.umrf.checks.scenarios import check_scenarios
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.values import check_values
 from action_assistant.umrf.codec import Reading
+from action_assistant.umrf.codes import REFUSED, STRUCTURAL
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem, Signature
 
-#: Codes of what makes the engine's parser refuse a text.
-REFUSED: Final = frozenset(
-    {
-        "action-illegal", "condition-illegal", "dialect-old", "entry-exit-missing",
-        "graph-name-missing", "name-empty", "parameter-illegal", "relation-unnamed", "remap-illegal",
-        "runtime-illegal", "state-illegal", "type-empty", "type-missing", "value-type",
-    }
-)  # fmt: skip
-#: Codes that block every engine and cannot be overridden.
-STRUCTURAL: Final[frozenset[str]] = REFUSED | {"ghost", "H6", "instance-id"}
+__all__ = ["REFUSED", "STRUCTURAL", "blocking", "check", "check_reading", "refused_by_parser"]
 
 
 def check(

@@ -2,6 +2,7 @@
 H12)."""
 
 from collections import deque
+from collections.abc import Callable, Iterator
 
 from action_assistant.umrf.checks.places import Subject, joined
 from action_assistant.umrf.model import (
@@ -36,6 +37,7 @@ def check_flow(subject: Subject) -> None:
     _check_waiting(subject, reach)
     _check_exit(subject, reach)
     _check_spontaneous(subject)
+    _check_instant_loops(subject, reach)
     _check_stragglers(subject)
 
 
@@ -268,7 +270,7 @@ def _check_spontaneous(subject: Subject) -> None:
         if action.type != "spontaneous":
             continue
         if looping is None:
-            looping = loops(subject)
+            looping = set().union(*loops(subject))
         if action.key in looping or not looping.isdisjoint(_reachable(subject, action.key)):
             message = (
                 f"{action.full_name} is spontaneous and leads into a loop: at its first end the "
@@ -277,31 +279,35 @@ def _check_spontaneous(subject: Subject) -> None:
             subject.report("H9", "error", message, action=action, member="/type")
 
 
-def loops(subject: Subject) -> set[Key]:
-    """All actions that lie on some loop (Tarjan's components, iterative)."""
+def loops(
+    subject: Subject, follows: Callable[[Relation], bool] = lambda _: True
+) -> list[list[Key]]:
+    """Actions that lie on loops, by loop or net of loops (Tarjan's components, iterative), along
+    the relations that it `follows`."""
+
+    def ways(key: Key) -> Iterator[Key]:
+        return (r.child for r in subject.outgoing.get(key, []) if follows(r))
+
     index: dict[Key, int] = {}
     low: dict[Key, int] = {}
     on_stack: set[Key] = set()
     stack: list[Key] = []
-    found: set[Key] = set()
+    found: list[list[Key]] = []
     for action in subject.real:
         if action.key in index:
             continue
-        work = [(action.key, iter(subject.outgoing.get(action.key, [])))]
+        work = [(action.key, ways(action.key))]
         index[action.key] = low[action.key] = len(index)
         stack.append(action.key)
         on_stack.add(action.key)
         while work:
-            key, relations = work[-1]
-            for relation in relations:
-                child = relation.child
-                if child == key:
-                    found.add(key)
+            key, children = work[-1]
+            for child in children:
                 if child not in index:
                     index[child] = low[child] = len(index)
                     stack.append(child)
                     on_stack.add(child)
-                    work.append((child, iter(subject.outgoing.get(child, []))))
+                    work.append((child, ways(child)))
                     break
                 if child in on_stack:
                     low[key] = min(low[key], index[child])
@@ -311,20 +317,35 @@ def loops(subject: Subject) -> set[Key]:
                     above = work[-1][0]
                     low[above] = min(low[above], low[key])
                 if low[key] == index[key]:
-                    _take_component(key, stack, on_stack, found)
+                    component = [stack.pop()]
+                    while component[-1] != key:
+                        component.append(stack.pop())
+                    component.reverse()
+                    on_stack.difference_update(component)
+                    if len(component) > 1 or key in ways(key):
+                        found.append(component)
     return found
 
 
-def _take_component(key: Key, stack: list[Key], on_stack: set[Key], found: set[Key]) -> None:
-    component: list[Key] = []
-    while True:
-        member = stack.pop()
-        on_stack.discard(member)
-        component.append(member)
-        if member == key:
-            break
-    if len(component) > 1:
-        found.update(component)
+def _check_instant_loops(subject: Subject, reach: Reach) -> None:
+    if "H5" not in subject.facts.hazards:
+        return
+
+    def goes_round(relation: Relation) -> bool:
+        answers = {relation.conditions.answer(outcome) for outcome in ENDS}
+        return relation.parent != relation.child and bool(answers & {"run", "bypass"})
+
+    for loop in loops(subject, goes_round):
+        members = [subject.actions[key] for key in loop if key in reach.runs]
+        if len(members) < len(loop):
+            continue
+        names = [member.full_name for member in members]
+        shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+        message = (
+            f"{shown} are a loop. If all of them end at once, the engine blocks itself within "
+            "milliseconds and obeys no stop any more; let at least one take some time."
+        )
+        subject.report("H5", "warning", message, action=members[0])
 
 
 def _check_stragglers(subject: Subject) -> None:

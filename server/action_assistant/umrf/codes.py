@@ -1,0 +1,170 @@
+"""The codes of problems: what each means, how sure it is, what happens, what mends it.
+
+Checks may report only these; the table in the documentation is made from them.
+"""
+
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.umrf.model import Severity
+
+#: `unreadable`: no graph at all; `refused`: the engine's parser refuses the text; `structural`: its
+#: parser takes it, its start does not; `hazard`: of SPEC 3; `other`: the rest.
+Kind: TypeAlias = Literal["unreadable", "refused", "structural", "hazard", "other"]
+
+
+class Code(msgspec.Struct, frozen=True):
+    """One kind of problem. `fixes`: names of what `fixes.fix` does about it."""
+
+    kind: Kind
+    severities: tuple[Severity, ...]
+    meaning: str
+    consequence: str
+    fixes: tuple[str, ...] = ()
+
+
+_ERROR: Final[tuple[Severity, ...]] = ("error",)
+_WARNING: Final[tuple[Severity, ...]] = ("warning",)
+_BOTH: Final[tuple[Severity, ...]] = ("error", "warning")
+_REFUSES: Final = "the engine refuses the graph"
+_NO_GRAPH: Final = "nothing is read"
+
+
+def _unreadable(meaning: str) -> Code:
+    return Code("unreadable", _ERROR, meaning, _NO_GRAPH)
+
+
+def _refused(meaning: str, *fixes: str) -> Code:
+    return Code("refused", _ERROR, meaning, _REFUSES, fixes)
+
+
+CODES: Final[dict[str, Code]] = {
+    # The text
+    "not-json": _unreadable("the text is not JSON (NaN and Infinity are not JSON either)"),
+    "not-utf-8": _unreadable("the text is not UTF-8"),
+    "not-umrf": _unreadable("JSON without anything of UMRF"),
+    "double-key": _unreadable("an object names a key twice"),
+    "lone-surrogate": _unreadable("half of a character pair in a text"),
+    "number-too-big": _unreadable("a number that no double can hold"),
+    "too-deep": _unreadable("more than 64 levels"),
+    "too-large": _unreadable("more than 10 MB, or more than a million values"),
+    # What the engine's parser refuses
+    "dialect-old": _refused("the form of an earlier engine, or of the designer"),
+    "graph-name-missing": _refused("no `graph_name`"),
+    "entry-exit-missing": _refused("several actions without `graph_entry` or `graph_exit`"),
+    "action-illegal": _refused("an item of `actions` that is no object"),
+    "name-empty": _refused("an action without a name"),
+    "type-missing": _refused("an action without `type`"),
+    "type-empty": _refused("an action with an empty `type`", "type-sync"),
+    "value-type": _refused("a field of the wrong JSON type"),
+    "state-illegal": _refused("a `state` or `graph_state` that the engine does not know"),
+    "runtime-illegal": _refused("a `runtime` without messages as the engine writes them"),
+    "relation-unnamed": _refused("a relation without a name"),
+    "condition-illegal": _refused("a condition that is not `precondition -> response`"),
+    "remap-illegal": _refused("a renaming that repeats a `from` or lacks an end"),
+    "parameter-illegal": _refused("a parameter whose members do not fit its `pvf_type`"),
+    # What it cannot start
+    "ghost": Code(
+        "structural", _ERROR, "a relation with an action that does not exist",
+        "at the entry or exit the engine refuses the graph, elsewhere it aborts or never starts it",
+        ("remove-relation",),
+    ),
+    "instance-id": Code(
+        "structural", _ERROR, "a number that relations cannot refer to (0 to 65,535)",
+        "the engine cuts it in relations, which then miss the action", ("renumber",),
+    ),
+    "H6": Code(
+        "structural", _ERROR, "two actions with one full name, or one called like an end",
+        "the start throws, and a broken graph stays in the engine", ("renumber",),
+    ),
+    # Hazards
+    "H1": Code(
+        "hazard", _ERROR, "the file carries a run state",
+        "the engine aborts with every running graph, or the action never runs",
+    ),
+    "H2": Code(
+        "hazard", _ERROR, "a child that does not list its parent, or a renamed output that is none",
+        "the engine aborts with every running graph when the parent ends", ("mirror-relation",),
+    ),
+    "H2b": Code(
+        "hazard", _BOTH, "a parent that does not list its child",
+        "the child is never started (error if it needs this parent)", ("mirror-relation",),
+    ),
+    "H3": Code(
+        "hazard", _WARNING, "`bypass` to an action, also the default of `on_error`",
+        "this build reads freed memory and may abort with every running graph",
+    ),
+    "H4": Code(
+        "hazard", _WARNING, "`run` may reach an action that is being paused or stopped",
+        "the engine aborts with every running graph",
+    ),
+    "H5": Code(
+        "hazard", _WARNING, "`pause` and `stop` of one action, a pause that nothing ends, a loop that takes no time",
+        "the action ends in ERROR, stays PAUSED, or the engine blocks itself",
+    ),
+    "H7": Code(
+        "hazard", _ERROR, "an entry action whose required input has no value",
+        "the engine says nothing and never starts the graph",
+    ),
+    "H8": Code(
+        "hazard", _BOTH, "something waits for what may never come (error: never comes)",
+        "the graph stays RUNNING for ever", ("not-required",),
+    ),
+    "H9": Code(
+        "hazard", _ERROR, "a spontaneous action that leads into a loop",
+        "the engine recurses until it dies with every running graph",
+    ),
+    "H12": Code(
+        "hazard", _WARNING, "the graph can be FINISHED while actions still run",
+        "the engine ignores every stop of the graph",
+    ),
+    "actors": Code(
+        "hazard", _ERROR, "several actors, and an engine that cannot synchronise",
+        "the engine refuses to start the graph",
+    ),
+    # The rest
+    "graph-name": Code("other", _ERROR, "control characters in the graph's name", "no topic, file or log can carry it"),
+    "graph-name-empty": Code("other", _WARNING, "an empty `graph_name`", "nobody can tell the graph from others"),
+    "instance-id-cut": Code("other", _WARNING, "a number with decimals", "the engine cuts them"),
+    "name-class": Code("other", _WARNING, "a name that no C++ class can have", "no action package can have it; a sub-graph may"),
+    "name-reserved": Code("other", _WARNING, "`graph_entry` or `graph_exit` with another number than 0", "the engine leaves the action out of what it prints"),
+    "type-unknown": Code("other", _WARNING, "a type other than sync, async, spontaneous", "treated like sync"),
+    "relation-repeated": Code("other", _WARNING, "the same pair listed more than once", "the engine looks at one of them", ("remove-relation",)),
+    "wrong-side": Code("other", _WARNING, "`conditions` or `required` at the parent, `remap` at the child", "ignored"),
+    "empty": Code("other", _WARNING, "no actions", "the graph ends as soon as it starts"),
+    "no-entry": Code("other", _ERROR, "nothing is connected to the entry", "HALTED as soon as it starts; nothing runs"),
+    "no-exit": Code("other", _WARNING, "nothing leads to the exit", "never FINISHED: HALTED, or no end"),
+    "unreachable": Code("other", _WARNING, "no way from the entry", "never runs"),
+    "never-run": Code("other", _WARNING, "no parent answers `run`", "never runs"),
+    "restart": Code("other", _WARNING, "the response `restart`", "does nothing in this engine"),
+    "self-loop": Code("other", _WARNING, "an action that is to run itself again", "it still runs when it is asked; nothing happens"),
+    "parameter-inside": Code("other", _WARNING, "a parameter inside another one", "not written"),
+    "parameter-name": Code("other", _WARNING, "an empty name, one with `:`, or two that are one for the engine", "the engine does not find the parameter again"),
+    "parameter-allowed": Code("other", _WARNING, "a value outside `pvf_allowed_values`", "the engine does not notice"),
+    "remap-target": Code("other", _WARNING, "an output renamed to an input that the child lacks", "the value is lost"),
+    "remap-order": Code("other", _BOTH, "a renaming that changes the order of several outputs", "the engine does not find them any more (error: the child then never runs)"),
+    "unknown-action": Code("other", _WARNING, "no library knows the action", "an engine that does not either refuses the graph"),
+    "signature": Code("other", _ERROR, "other parameters than the action's own file has", "the engine cannot resolve the graph"),
+    "parameter-type": Code("other", _ERROR, "another type than in the action's own file", "the action ends in ERROR"),
+}  # fmt: skip
+
+#: Codes of what makes the engine's parser refuse a text.
+REFUSED: Final = frozenset(name for name, code in CODES.items() if code.kind == "refused")
+#: Codes that block every engine and cannot be overridden.
+STRUCTURAL: Final[frozenset[str]] = REFUSED | {
+    name for name, code in CODES.items() if code.kind == "structural"
+}
+
+
+def table() -> str:
+    """All codes as a Markdown table."""
+    lines = [
+        "| code | severity | what it is | what happens | fix |",
+        "|---|---|---|---|---|",
+    ]
+    for name, code in CODES.items():
+        severity = " or ".join(code.severities)
+        fixes = ", ".join(f"`{fix}`" for fix in code.fixes)
+        lines.append(f"| `{name}` | {severity} | {code.meaning} | {code.consequence} | {fixes} |")
+    return "\n".join(lines) + "\n"
