@@ -310,3 +310,23 @@ def test_every_route_is_described(http: httpx.Client) -> None:
     assert all(
         operation.get("summary") for path in schema["paths"].values() for operation in path.values()
     )
+
+
+def test_a_preview_says_what_a_file_would_become_and_stores_nothing(http: httpx.Client) -> None:
+    before = http.get("/api/graphs").json()
+    answer = http.post("/api/graphs", params={"preview": "true"}, json=NAV)
+    assert answer.status_code == 200
+    found = answer.json()
+    assert (found["name"], found["actions"], found["dialect"]) == ("nav", 2, "D3")
+    assert {problem["code"] for problem in found["problems"]} >= {"H3"}
+    assert found["notes"] == []
+    assert http.get("/api/graphs").json() == before
+    for body, status in ((b"oops", 400), (b'{"hello": 1}', 422)):
+        assert_problem(http.post("/api/graphs?preview=true", content=body), status)
+
+
+def test_the_library_is_there_to_be_asked(http: httpx.Client) -> None:
+    made = imported(http)
+    go = next(each for each in http.get("/api/actions").json() if each["name"] == "Go")
+    assert made["id"] in go["used_in"]
+    assert {"path": "speed", "pvf_type": "number", "required": True} in go["inputs"]

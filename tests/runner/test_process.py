@@ -1,6 +1,7 @@
 """The runner as a process: what it never loads, and what a kill leaves behind."""
 
 import os
+import sqlite3
 import subprocess
 import sys
 import time
@@ -65,3 +66,23 @@ def test_nobody_without_credentials_gets_in(process: RunnerProcess) -> None:
         assert client.get("/api/runs").status_code == 401
         assert client.post("/api/stop").status_code == 401
         assert client.get("/healthz").status_code == 200
+
+
+def test_a_database_of_a_newer_version_is_one_clear_sentence(own_process: RunnerProcess) -> None:
+    own_process.end()
+    with sqlite3.connect(own_process.data / "runner.db") as database:
+        database.execute("UPDATE alembic_version SET version_num = 'runner_9999'")
+    database.close()
+    ended = subprocess.run(
+        [
+            *(sys.executable, "-m", "action_assistant", "runner"),
+            *("--data", str(own_process.data), "--port", str(own_process.port)),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert ended.returncode == 2
+    assert "newer version" in ended.stderr
+    assert len(ended.stderr.strip().splitlines()) == 1

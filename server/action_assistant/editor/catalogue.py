@@ -16,6 +16,7 @@ from action_assistant.journal import tables
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf import codec
+from action_assistant.umrf.check import check
 from action_assistant.umrf.model import Graph, Problem
 
 NAME_LIMIT: Final = 200  # characters
@@ -42,6 +43,16 @@ class Reading(msgspec.Struct, frozen=True):
     dialect: str
     notes: tuple[str, ...]
     problems: tuple[Problem, ...]
+
+
+class Preview(msgspec.Struct, frozen=True):
+    """What a file would become. `problems`: those of the file, then those of the graph."""
+
+    dialect: str
+    notes: tuple[str, ...]
+    problems: tuple[Problem, ...]
+    name: str
+    actions: int
 
 
 class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -186,6 +197,19 @@ def read(body: bytes) -> codec.Reading:
         }
         kind = {"not-umrf": NotUmrf, "too-large": TooLarge}.get(error.code, BadInput)
         raise kind(error.message, where=where) from error
+
+
+def preview(body: bytes) -> Preview:
+    """What importing a file would make. Raises as `read` does."""
+    reading = read(body)
+    graph = reading.graph
+    return Preview(
+        reading.dialect,
+        reading.notes,
+        (*reading.problems, *check(graph)),
+        graph.name,
+        sum(not action.missing for action in graph.actions),
+    )
 
 
 def _rows() -> Select[Any]:

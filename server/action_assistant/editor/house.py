@@ -2,6 +2,7 @@
 
 from action_assistant.editor.catalogue import Catalogue
 from action_assistant.editor.history import History
+from action_assistant.editor.library import Library
 from action_assistant.editor.people import People
 from action_assistant.editor.rooms import Rooms
 from action_assistant.editor.sights import Sights
@@ -21,6 +22,7 @@ class House:
         self.sights = Sights(journal, self.rooms)
         self.catalogue = Catalogue(journal, self.rooms, self.sights)
         self.versions = Versions(journal, self.sights)
+        self.library = Library(journal, self.sights)
         self.history = History(journal, people, self.versions)
 
     async def close(self) -> None:

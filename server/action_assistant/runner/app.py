@@ -29,8 +29,7 @@ def wall_clock() -> int:
 async def open_house(settings: RunnerSettings, house: House | None = None) -> AsyncIterator[House]:
     """Everything the routes need, working. Raises CannotStart."""
     house = house or House()
-    url = f"sqlite:///{settings.data / 'runner.db'}"
-    journal = await Journal.open(url, branch="runner", fold=archive.fold)
+    journal = await Journal.open(_database(settings), branch="runner", fold=archive.fold)
     try:
         async with Control.opened(journal, Robots(), wall=wall_clock) as control:
             house.control, house.hub = control, Hub(control, wall_clock)
@@ -40,8 +39,13 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
         await journal.close()
 
 
+def _database(settings: RunnerSettings) -> str:
+    return f"sqlite:///{settings.data / 'runner.db'}"
+
+
 def create_app(settings: RunnerSettings) -> ASGIApp:
-    """The runner as an ASGI application."""
+    """The runner as an ASGI application. Raises CannotStart."""
+    Journal.prepare(_database(settings), "runner")
     house = House()
 
     @asynccontextmanager

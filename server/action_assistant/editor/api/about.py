@@ -14,6 +14,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant import places
 from action_assistant.editor import happenings as h
 from action_assistant.editor.house import Door
+from action_assistant.editor.library import Known
 from action_assistant.editor.presence import colour_of
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
@@ -89,6 +90,14 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         ]
 
     @get(
+        "/api/actions",
+        summary="The actions that all graphs together know, by name",
+        operation_id="listActions",
+    )
+    async def list_actions() -> list[Known]:
+        return await door.house.library.all()
+
+    @get(
         "/api/events",
         summary="What is stored, as server-sent events; `after` and Last-Event-ID are positions",
         operation_id="followEvents",
@@ -104,7 +113,7 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
             after = int(last)
         return ServerSentEvent(_told(door, after))
 
-    return [get_config, list_people, list_examples, follow_events]
+    return [get_config, list_people, list_examples, list_actions, follow_events]
 
 
 async def _told(door: Door, after: int | None) -> AsyncIterator[ServerSentEventMessage]:

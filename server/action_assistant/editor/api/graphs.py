@@ -1,5 +1,6 @@
 """Routes of graphs: the catalogue, what a graph is or was, what is wrong with it, its past."""
 
+import asyncio
 from typing import Annotated, Any
 
 import msgspec
@@ -7,9 +8,9 @@ from litestar import Request, Response, delete, get, patch, post
 from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor import edits
+from action_assistant.editor import catalogue, edits
 from action_assistant.editor import happenings as h
-from action_assistant.editor.catalogue import GraphView, Reading
+from action_assistant.editor.catalogue import GraphView, Preview, Reading
 from action_assistant.editor.diff import Difference, difference
 from action_assistant.editor.history import Entry
 from action_assistant.editor.house import Door
@@ -59,10 +60,16 @@ def _catalogue(door: Door) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/graphs",
-        summary="Make a graph of a UMRF file of any dialect, or an empty one of {name}",
+        summary="Make a graph of a UMRF file of any dialect, or an empty one of {name}; "
+        "with `preview` only say what a file would become, and store nothing",
         operation_id="createGraph",
     )
-    async def create_graph(request: Asking) -> Response[MadeGraph]:
+    async def create_graph(
+        request: Asking, preview: bool = False
+    ) -> Response[MadeGraph] | Response[Preview]:
+        if preview:
+            content = await request.body()
+            return Response(await asyncio.to_thread(catalogue.preview, content), status_code=200)
         house, person = door.house, person_of(request)
         await house.people.seen(person)
         made, reading = await house.catalogue.create(await request.body(), person.id)

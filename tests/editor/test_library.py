@@ -1,0 +1,74 @@
+"""The library: every action that some graph uses, and what is said of it."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from action_assistant.editor.app import open_house
+from action_assistant.editor.library import Known
+from action_assistant.settings import EditorSettings
+
+
+def file(name: str, **inputs: dict[str, Any]) -> bytes:
+    """A graph of one action `Go` with these inputs."""
+    go = {
+        "name": "Go",
+        "instance_id": 0,
+        "type": "sync",
+        "description": f"goes as {name} says",
+        "input_parameters": inputs,
+        "output_parameters": {"place": {"x": {"pvf_type": "number"}}},
+    }
+    end = [{"name": "Go", "instance_id": 0}]
+    return msgspec.json.encode(
+        {"graph_name": name, "actions": [go], "graph_entry": end, "graph_exit": end}
+    )
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> EditorSettings:
+    return EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
+
+
+def only(known: list[Known], name: str) -> Known:
+    (found,) = [each for each in known if each.name == name]
+    return found
+
+
+async def test_an_action_of_two_graphs_is_known_once(settings: EditorSettings) -> None:
+    async with open_house(settings) as house:
+        speed = {"pvf_type": "number", "pvf_value": 1.5}
+        turn = {"pvf_type": "string", "pvf_required": False}
+        one, _ = await house.catalogue.bring(file("one", speed=speed), "ada")
+        two, _ = await house.catalogue.bring(file("two", speed=speed, turn=turn), "ada")
+        go = only(await house.library.all(), "Go")
+        assert go.used_in == (one.id, two.id)
+        assert go.first_seen == one.made_at
+        assert go.description == "goes as two says"
+        assert go.type == "sync"
+        inputs = {each.path: (each.pvf_type, each.required) for each in go.inputs}
+        assert inputs == {"speed": ("number", True), "turn": ("string", False)}
+        assert [each.path for each in go.outputs] == ["place/x"]
+
+
+async def test_what_a_graph_does_not_use_any_more_is_not_known_any_more(
+    settings: EditorSettings,
+) -> None:
+    async with open_house(settings) as house:
+        made, _ = await house.catalogue.bring(file("one"), "ada")
+        assert only(await house.library.all(), "Go").used_in == (made.id,)
+        await house.catalogue.delete(made.id, "ada")
+        assert "Go" not in {each.name for each in await house.library.all()}
+        await house.catalogue.recover(made.id, "ada")
+        assert only(await house.library.all(), "Go").used_in == (made.id,)
+
+
+async def test_a_graph_that_has_not_changed_is_not_read_again(settings: EditorSettings) -> None:
+    async with open_house(settings) as house:
+        made, _ = await house.catalogue.bring(file("one"), "ada")
+        first = await house.library.all()
+        assert await house.library.all() is first
+        await house.catalogue.describe(made.id, "ada", name="other", description=None)
+        assert await house.library.all() is not first
