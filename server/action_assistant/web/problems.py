@@ -1,6 +1,7 @@
 """How refusals look on the wire: RFC 9457 problem details, one shape for every route."""
 
 import logging
+from http import HTTPStatus
 from typing import Any, Final
 
 import msgspec
@@ -57,28 +58,39 @@ def _refused(_: Request[Any, Any, Any], error: Refused) -> Response[bytes]:
     )
 
 
-def _framework(_: Request[Any, Any, Any], error: HTTPException) -> Response[bytes]:
+def _framework(request: Request[Any, Any, Any], error: HTTPException) -> Response[bytes]:
     """What Litestar itself refuses: unknown routes, methods, malformed bodies, over-long ones."""
-    status = error.status_code
-    title = type(error).__doc__ or "Request refused"
-    detail = error.detail if status < 500 else "The server failed; its log says why."
-    where: dict[str, Any] | None = None
+    phrase = HTTPStatus(error.status_code).phrase
+    detail, where = _told(request, error)
+    if error.status_code >= 500:
+        log.error("request failed", exc_info=error)
+    slug = phrase.lower().replace(" ", "-")
+    details = ProblemDetails(slug, phrase, error.status_code, detail, where)
+    return _response(details, dict(error.headers or {}))
+
+
+def _told(
+    request: Request[Any, Any, Any], error: HTTPException
+) -> tuple[str, dict[str, Any] | None]:
+    """What was wrong in a sentence, and where in the body if that is known."""
     if isinstance(error, ValidationException) and isinstance(error.extra, list):
         wrong = [item for item in error.extra if isinstance(item, dict)]
-        detail = "; ".join(
+        said = [
             f"{item.get('key') or 'body'}: {item.get('message', 'not valid')}" for item in wrong
-        )
-        where = (
-            {"path": "".join(f"/{part}" for part in str(wrong[0].get("key", "")).split("."))}
-            if wrong
-            else None
-        )
-    if status >= 500:
-        log.error("request failed", exc_info=error)
-    name = type(error).__name__.removesuffix("Exception")
-    slug = "".join(f"-{c.lower()}" if c.isupper() else c for c in name).lstrip("-") or "refused"
-    details = ProblemDetails(slug, title.strip().splitlines()[0].rstrip("."), status, detail, where)
-    return _response(details, dict(error.headers or {}))
+        ]
+        keys = [str(item["key"]) for item in wrong if item.get("key")]
+        path = {"path": "/" + keys[0].replace(".", "/")} if keys else None
+        return "; ".join(said) or error.detail, path
+    match error.status_code:
+        case HTTPStatus.NOT_FOUND:
+            return f"There is nothing at {request.url.path}.", None
+        case HTTPStatus.METHOD_NOT_ALLOWED:
+            return f"{request.method} is not possible at {request.url.path}.", None
+        case HTTPStatus.REQUEST_ENTITY_TOO_LARGE:
+            return "At most 10 MB are read.", None
+        case status if status >= 500:
+            return "The server failed; its log says why.", None
+    return error.detail, None
 
 
 def _too_deep(_: Request[Any, Any, Any], __: RecursionError) -> Response[bytes]:
