@@ -1,25 +1,29 @@
 """Listening: sockets bound first, so that a taken port is one clear sentence; then uvicorn."""
 
+import asyncio
 import errno
 import os
 import socket
 import threading
-from typing import Final
+from typing import Any, Final
 
 import uvicorn
-from litestar.types import ASGIApp
+from litestar.enums import ScopeType
+from litestar.types import ASGIApp, Message, Receive, Scope, Send
 
 from action_assistant.errors import CannotStart
 
 WEBSOCKET_LIMIT: Final = 1_114_112  # bytes; an update of 1 MiB and its frame
 GRACE: Final = 5  # seconds that open requests get when the process is told to end
+UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it was sent is gone
 
 
 def serve(app: ASGIApp, *, host: str, port: int) -> None:
     """Serve until told to end. Raises CannotStart when the address is taken or unknown."""
     sockets = bound(host, port)
+    endings = Endings(app)
     config = uvicorn.Config(
-        app,
+        endings,
         lifespan="on",
         log_config=None,
         access_log=False,
@@ -32,11 +36,75 @@ def serve(app: ASGIApp, *, host: str, port: int) -> None:
         ws_ping_timeout=10,
         timeout_graceful_shutdown=GRACE,
     )
-    server = uvicorn.Server(config)
+    server = _Server(config, endings)
     _end_with_parent(server)
     server.run(sockets=sockets)
     if not server.started:
         raise CannotStart("The process could not be set up; the log above says why.")
+
+
+class Endings:
+    """Around an application: when the process is told to end, streams without an end get one.
+
+    A listener to server-sent events is told that its peer has gone, which is how it would end
+    anyway; requests that are being answered are left alone.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+        self._told = asyncio.Event()
+
+    def begin(self) -> None:
+        """End every stream."""
+        self._told.set()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on."""
+        if scope["type"] != ScopeType.HTTP:
+            await self._app(scope, receive, send)
+            return
+        asked = streaming = False
+
+        async def received() -> Any:
+            nonlocal asked
+            if not asked:
+                message = await receive()
+                asked = not message.get("more_body", False)
+                return message
+            return await self._next(receive)
+
+        async def sent(message: Message) -> None:
+            nonlocal streaming
+            streaming = bool(message.get("more_body", message["type"] == "http.response.start"))
+            await send(message)
+
+        await self._app(scope, received, sent)
+        if streaming and self._told.is_set():
+            await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+    async def _next(self, receive: Receive) -> Any:
+        """What comes after a request is only that the peer has gone; or that we go."""
+        gone = asyncio.ensure_future(receive())
+        told = asyncio.ensure_future(self._told.wait())
+        try:
+            await asyncio.wait({gone, told}, return_when=asyncio.FIRST_COMPLETED)
+            return gone.result() if gone.done() else {"type": "http.disconnect"}
+        finally:
+            gone.cancel()
+            told.cancel()
+
+
+class _Server(uvicorn.Server):
+    """Ends streams before it waits for them."""
+
+    def __init__(self, config: uvicorn.Config, endings: Endings) -> None:
+        super().__init__(config)
+        self._endings = endings
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Called once, when the process is told to end."""
+        self._endings.begin()
+        await super().shutdown(sockets)
 
 
 def bound(host: str, port: int) -> list[socket.socket]:
@@ -51,6 +119,7 @@ def bound(host: str, port: int) -> list[socket.socket]:
         except OSError:  # no IPv6 on this machine
             continue
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        _forget_silent_peers(listener)
         if family == socket.AF_INET6:
             listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
         try:
@@ -65,6 +134,17 @@ def bound(host: str, port: int) -> list[socket.socket]:
             raise CannotStart(_why(name, port, error)) from error
         found.append(listener)
     return found
+
+
+def _forget_silent_peers(listener: socket.socket) -> None:
+    """Have the kernel drop peers that vanished, and those that read nothing: what waits for them
+    would be kept for ever. Connections inherit this from the socket that accepts them."""
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    options = {"TCP_USER_TIMEOUT": UNHEARD * 1000, "TCP_KEEPIDLE": UNHEARD, "TCP_KEEPINTVL": 5}
+    for name, value in options.items():
+        number = getattr(socket, name, None)  # not every system has them
+        if number is not None:
+            listener.setsockopt(socket.IPPROTO_TCP, number, value)
 
 
 def _why(host: str, port: int, error: OSError) -> str:

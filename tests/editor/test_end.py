@@ -1,0 +1,50 @@
+"""How the editor ends: at once, whoever is listening."""
+
+import contextlib
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from action_assistant.editor import wire
+from editor.process import Editor, running
+
+SOON = 1.5  # seconds
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> "contextlib.AbstractContextManager[Editor]":
+    return running(tmp_path / "data")
+
+
+async def test_listeners_and_sockets_do_not_delay_the_end(
+    own: "contextlib.AbstractContextManager[Editor]",
+) -> None:
+    with own as editor:
+        with editor.client() as http:
+            graph = http.post("/api/graphs", json={"name": "task"}).json()["id"]
+        listening = threading.Event()
+        heard: list[str] = []
+
+        def listen() -> None:
+            with editor.client() as http, http.stream("GET", "/api/events?after=0") as events:
+                for line in events.iter_lines():
+                    heard.append(line)
+                    listening.set()
+
+        listeners = [threading.Thread(target=listen) for _ in range(3)]
+        for each in listeners:
+            each.start()
+        async with editor.socket(graph, "?acks=1") as session:
+            await session.send_bytes(wire.question(b"\x00"))
+            while (await session.receive_bytes(timeout=5))[0] != wire.ACKS:
+                pass
+            assert listening.wait(5)
+            begun = time.monotonic()
+            assert editor.end() in {0, -15}
+            taken = time.monotonic() - begun
+        for each in listeners:
+            each.join(5)  # the stream has ended in good order: iter_lines would have raised
+        assert taken < SOON
+        assert "ERROR" not in editor.log.read_text()
