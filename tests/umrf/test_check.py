@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from action_assistant.umrf.check import (
     STRUCTURAL,
@@ -225,6 +226,26 @@ def test_renaming_that_changes_the_order_of_outputs_loses_one() -> None:
         B | {"input_parameters": {"beta": TEXT, "aleph": TEXT}},
     )  # fmt: skip
     assert problems(fits) == []
+
+
+@given(st.dictionaries(st.sampled_from("abcdefg"), st.sampled_from("ABCDmnopqrst"), min_size=1))
+@settings(max_examples=60)
+def test_renamings_that_hide_outputs_from_the_engine_are_errors(renamings: dict[str, str]) -> None:
+    remap = [{"from": source, "to": target} for source, target in renamings.items()]
+    outputs = {name: TEXT for name in "abcdefg"}  # noqa: C420 - values of JSON
+    first = action("A", children=[{"name": "B", "remap": remap}], output_parameters=outputs)
+    graph = file(first, B)
+    trace = list(simulate(read(json.dumps(graph)).graph))
+    crashed = any(isinstance(t, Hazard) and t.effect == "crash" for t in trace)
+    assert ("H2" in found(graph)) == crashed
+
+
+def test_renaming_several_outputs_out_of_order_aborts_the_engine() -> None:
+    remap = [{"from": name, "to": f"z{name}"} for name in "abcd"]
+    outputs = {name: TEXT for name in "abcd"}  # noqa: C420 - values of JSON
+    first = action("A", children=[{"name": "B", "remap": remap}], output_parameters=outputs)
+    (problem,) = [p for p in problems(file(first, B)) if p.code == "H2"]
+    assert "does not find" in problem.message
 
 
 def test_a_library_knows_names_types_and_what_is_optional() -> None:

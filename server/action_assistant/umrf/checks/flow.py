@@ -194,6 +194,9 @@ def _first(relations: list[Relation]) -> list[Relation]:
 
 def _check_waiting(subject: Subject, reach: Reach) -> None:
     """Actions that never run, and why."""
+    net: dict[Key, int] = {}
+    for number, members in enumerate(loops(subject)):
+        net.update(dict.fromkeys(members, number))
     for action in subject.real:
         if action.key in reach.runs:
             continue
@@ -206,18 +209,20 @@ def _check_waiting(subject: Subject, reach: Reach) -> None:
             message = f"{action.full_name} cannot be reached from the entry; it never runs."
             subject.report("unreachable", "warning", message, action=action)
         elif missing:
-            _report_missed_join(subject, action.key, missing)
+            _report_missed_join(subject, action.key, missing, net)
         else:
             message = f"Nothing ever answers “run” for {action.full_name}; it never runs."
             subject.report("never-run", "warning", message, action=action)
 
 
-def _report_missed_join(subject: Subject, key: Key, missing: list[Relation]) -> None:
+def _report_missed_join(
+    subject: Subject, key: Key, missing: list[Relation], net: dict[Key, int]
+) -> None:
+    """`net`: the number of the net of loops in which an action lies."""
     action = subject.actions[key]
-    after = _reachable(subject, key)
     for relation in missing:
         parent = subject.name(relation.parent)
-        if relation.parent in after:
+        if key in net and net.get(relation.parent) == net[key]:
             message = (
                 f"{action.full_name} waits for {parent}, which comes after it: it never runs and the "
                 "graph stays RUNNING for ever. A way back must not be required."
@@ -233,15 +238,15 @@ def _report_missed_join(subject: Subject, key: Key, missing: list[Relation]) -> 
             subject.report("H8", "error", message, relation=relation, member="/required")
 
 
-def _reachable(subject: Subject, key: Key) -> set[Key]:
-    """Everything behind an action, itself included if it is in a loop."""
-    found: set[Key] = set()
-    stack = [key]
+def _leading_to(subject: Subject, keys: set[Key]) -> set[Key]:
+    """Everything from which there is a way to one of these, themselves included."""
+    found = set(keys)
+    stack = list(keys)
     while stack:
-        for relation in subject.outgoing.get(stack.pop(), []):
-            if relation.child not in found:
-                found.add(relation.child)
-                stack.append(relation.child)
+        for relation in subject.incoming.get(stack.pop(), []):
+            if relation.parent not in found:
+                found.add(relation.parent)
+                stack.append(relation.parent)
     return found
 
 
@@ -265,13 +270,12 @@ def _check_exit(subject: Subject, reach: Reach) -> None:
 
 
 def _check_spontaneous(subject: Subject) -> None:
-    looping: set[Key] | None = None
-    for action in subject.real:
-        if action.type != "spontaneous":
-            continue
-        if looping is None:
-            looping = set().union(*loops(subject))
-        if action.key in looping or not looping.isdisjoint(_reachable(subject, action.key)):
+    spontaneous = [action for action in subject.real if action.type == "spontaneous"]
+    if not spontaneous:
+        return
+    doomed = _leading_to(subject, set().union(*loops(subject)))
+    for action in spontaneous:
+        if action.key in doomed:
             message = (
                 f"{action.full_name} is spontaneous and leads into a loop: at its first end the "
                 "engine recurses until it dies, with every running graph."
@@ -352,7 +356,7 @@ def _check_stragglers(subject: Subject) -> None:
     """H12: ways to the exit that do not wait for what still runs."""
     if "H12" not in subject.facts.hazards:
         return
-    for relation in subject.incoming.get(EXIT, []):
+    for relation in _first(subject.incoming.get(EXIT, [])):
         siblings = {
             other.child
             for other in subject.outgoing.get(relation.parent, [])

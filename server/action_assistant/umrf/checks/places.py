@@ -15,6 +15,7 @@ from action_assistant.umrf.model import (
     Severity,
     Where,
 )
+from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.writing import name_order
 
 
@@ -30,6 +31,7 @@ class Subject:
         self.paths: dict[Key, str] = {
             action.key: pointer("actions", index) for index, action in enumerate(self.real)
         }
+        self._flat: dict[Key, dict[str, str]] = {}
         known = {ENTRY, EXIT, *self.actions}
         self.relations = [r for r in graph.relations if r.parent in known and r.child in known]
         by_child = sorted(self.relations, key=lambda r: (r.child_order, name_order(r)))
@@ -65,6 +67,13 @@ class Subject:
                 start = f"{self.paths.get(owner, '')}/{field}"
         paths[id(relation)] = f"{start}/{len(listed)}"
         listed.append(relation)
+
+    def path_of(self, action: Action, name: str) -> str:
+        """The path of a parameter by its flat name."""
+        if action.key not in self._flat:
+            every = (*action.inputs, *action.outputs)
+            self._flat[action.key] = {flat_name(p.path): p.path for p in reversed(every)}
+        return self._flat[action.key].get(name, name)
 
     def _is_sound(self, relation: Relation) -> bool:
         ends = [self.actions.get(key) for key in (relation.parent, relation.child)]

@@ -7,19 +7,19 @@ from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.model import PRECONDITIONS, Action
 from action_assistant.umrf.semantics import Behaviour, Hazard, NotReady, Script, simulate
 
-#: Actions that all trials together may run, so that checking stays quick.
+#: Actions and relations that all trials together may have, so that checking stays quick.
 BUDGET: Final = 2_000
 _BLOCKED: Final = {"H2", "H6", "H7", "H8", "H9", "no-entry", "ghost", "actors"}
 
 
 def check_scenarios(subject: Subject) -> None:
     """Tries every action with on_true, then one that ends otherwise at a time."""
-    count = len(subject.real)
-    if not count or count > BUDGET or any(p.code in _BLOCKED for p in subject.problems):
+    size = max(len(subject.real), len(subject.relations))
+    if not subject.real or size > BUDGET or any(p.code in _BLOCKED for p in subject.problems):
         return
     told: set[str] = set()
     for trial, (action, outcome) in enumerate(_trials(subject)):
-        if trial * count >= BUDGET:
+        if trial * size >= BUDGET:
             return
         stuck = _stuck(subject, action, outcome)
         if stuck is None or stuck in told:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 from action_assistant.umrf.checks.places import Subject, joined
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Key, Relation, Severity, Signature
-from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.semantics.values import RemapUnknown, Slot, renamed, slots_of
 
 
@@ -54,7 +53,16 @@ def _check_remap(
     if relation.parent == ENTRY:
         return
     meant = {name: name for name in own} | {r.source: r.target for r in relation.remap}
-    lost = set(meant.values()) & set(targets) - set(renamed(own, relation.remap, targets))
+    try:
+        found = renamed(own, relation.remap, targets)
+    except RemapUnknown as e:
+        message = (
+            f"The first renamings change the alphabetical order of {parent}'s outputs, in which the "
+            f"engine then does not find “{e}”: when {parent} ends, it aborts with every running graph."
+        )
+        subject.report("H2", "error", message, relation=relation, member="/remap")
+        return
+    lost = set(meant.values()) & set(targets) - set(found)
     if lost:
         message = (
             f"This renaming changes the alphabetical order of {parent}'s outputs, in which the "
@@ -75,18 +83,23 @@ def _check_inputs(
     """Required inputs for which there is no value."""
     known = (library or {}).get(action.name)
     incoming = subject.incoming.get(action.key, [])
-    for name, slot in inputs[action.key].items():
-        if not slot.required or slot.has_value() or (known and name in known.optional):
-            continue
-        member = f"/input_parameters/{path_of(action, name)}"
-        if any(relation.parent == ENTRY for relation in incoming):
+    needed = {
+        name: slot
+        for name, slot in inputs[action.key].items()
+        if slot.required and not slot.has_value() and not (known and name in known.optional)
+    }
+    is_entry = any(relation.parent == ENTRY for relation in incoming)
+    given = {} if is_entry or not needed else _given_kinds(incoming, outputs, needed)
+    for name, slot in needed.items():
+        member = f"/input_parameters/{subject.path_of(action, name)}"
+        if is_entry:
             message = (
                 f"{action.full_name} is an entry and its input “{name}” has no value: the engine "
                 "silently never starts the graph, and says nothing. (As a sub-graph it may get one.)"
             )
             subject.report("H7", "error", message, action=action, member=member)
             continue
-        kinds = _given_kinds(incoming, outputs, name, slot)
+        kinds = given.get(name, set())
         if incoming and slot.type not in kinds:
             wrong = " The type of what a parent hands over differs." if kinds else ""
             message = (
@@ -97,18 +110,19 @@ def _check_inputs(
 
 
 def _given_kinds(
-    incoming: list[Relation], outputs: Mapping[Key, _Slots], name: str, slot: Slot
-) -> set[str]:
-    """The types of what parents hand over to one input; none for a locked one."""
-    kinds: set[str] = set()
-    for relation in incoming if slot.updatable else []:
+    incoming: list[Relation], outputs: Mapping[Key, _Slots], needed: _Slots
+) -> dict[str, set[str]]:
+    """The types of what parents hand over to inputs that are not locked, by input."""
+    open_ = {name: slot for name, slot in needed.items() if slot.updatable}
+    kinds: dict[str, set[str]] = {}
+    for relation in incoming if open_ else []:
         own = outputs[relation.parent]
         try:
-            place = renamed(own, relation.remap, {name: slot}).get(name)
+            places = renamed(own, relation.remap, open_)
         except RemapUnknown:
             continue
-        if place is not None:
-            kinds.add(own[place].type)
+        for name, place in places.items():
+            kinds.setdefault(name, set()).add(own[place].type)
     return kinds
 
 
@@ -118,7 +132,7 @@ def _check_static(subject: Subject, action: Action, inputs: _Slots) -> None:
             message = (
                 f"The value of “{name}” is none of the allowed ones; the engine does not notice."
             )
-            member = f"/input_parameters/{path_of(action, name)}/pvf_value"
+            member = f"/input_parameters/{subject.path_of(action, name)}/pvf_value"
             subject.report("parameter-allowed", "warning", message, action=action, member=member)
 
 
@@ -154,13 +168,5 @@ def _check_signature(
                     f"“{name}” is a {ours[name].type} here and a {theirs[name]} in the action: "
                     "the action ends in ERROR."
                 )
-                member = f"/{side}_parameters/{path_of(action, name)}"
+                member = f"/{side}_parameters/{subject.path_of(action, name)}"
                 subject.report("parameter-type", "error", message, action=action, member=member)
-
-
-def path_of(action: Action, name: str) -> str:
-    """The path of a parameter by its flat name."""
-    for parameter in (*action.inputs, *action.outputs):
-        if flat_name(parameter.path) == name:
-            return parameter.path
-    return name

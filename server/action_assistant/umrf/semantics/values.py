@@ -1,6 +1,7 @@
 """Parameters at run time: who holds which value, and what reaches a child (SPEC 2.7)."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, Final
 
 import msgspec
@@ -112,15 +113,16 @@ def renamed(
     not be found any more.
     """
     if not remap:
-        return {name: name for name in inputs if name in outputs}
+        fewer, more = sorted((inputs, outputs), key=len)
+        return {name: name for name in fewer if name in more}
     own = sorted(outputs)
-    tree = _Tree(list(own))
+    names, shape = list(own), _shape(len(own))
     for rename in remap:
-        place = tree.find(rename.source)
+        place = shape.find(names, rename.source)
         if place is None:
             raise RemapUnknown(rename.source)
-        tree.names[place] = rename.target
-    places = {name: tree.find(name) for name in inputs}
+        names[place] = rename.target
+    places = {name: shape.find(names, name) for name in dict.fromkeys(names) if name in inputs}
     return {name: own[place] for name, place in places.items() if place is not None}
 
 
@@ -138,11 +140,10 @@ def plain(value: Json) -> Any:
 
 
 class _Tree:
-    """A red-black tree into which sorted names were inserted one by one, like `std::set`."""
+    """A red-black tree into which sorted names were inserted one by one, like `std::set`: its shape,
+    which depends on their number only."""
 
-    def __init__(self, names: list[str]) -> None:
-        self.names = names
-        count = len(names)
+    def __init__(self, count: int) -> None:
         self.left: list[int | None] = [None] * count
         self.right: list[int | None] = [None] * count
         self.parent: list[int | None] = [None] * count
@@ -151,15 +152,15 @@ class _Tree:
         for index in range(count):
             self._insert_greatest(index)
 
-    def find(self, name: str) -> int | None:
-        """The place of a name by the comparisons that the tree's order promises."""
+    def find(self, names: Sequence[str], name: str) -> int | None:
+        """The place of a name among `names` by the comparisons that the tree's order promises."""
         place, best = self.root, None
         while place is not None:
-            if self.names[place] < name:
+            if names[place] < name:
                 place = self.right[place]
             else:
                 best, place = place, self.left[place]
-        return best if best is not None and not name < self.names[best] else None
+        return best if best is not None and not name < names[best] else None
 
     def _insert_greatest(self, new: int) -> None:
         above = new - 1 if new else None
@@ -196,3 +197,8 @@ class _Tree:
             self.right[above] = up
         self.left[up] = top
         self.parent[top] = up
+
+
+@lru_cache(maxsize=64)
+def _shape(count: int) -> _Tree:
+    return _Tree(count)

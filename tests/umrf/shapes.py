@@ -1,0 +1,143 @@
+"""Graph files of shapes in which a careless algorithm takes the square of their size."""
+
+from collections.abc import Callable
+from typing import Any
+
+SAFE = ["on_error -> ignore"]
+TEXT = {"pvf_type": "string"}
+
+
+def _action(name: str, parents: list[Any], children: list[Any], **fields: Any) -> dict[str, Any]:
+    sides = {
+        "parents": [{"name": p, "conditions": SAFE} if isinstance(p, str) else p for p in parents],
+        "children": [{"name": c} if isinstance(c, str) else c for c in children],
+    }
+    return {"name": name, "type": "sync"} | sides | fields
+
+
+def _file(actions: list[dict[str, Any]], entry: list[str], exits: list[str]) -> dict[str, Any]:
+    ends = {"graph_entry": [{"name": e} for e in entry], "graph_exit": [{"name": e} for e in exits]}
+    return {"graph_name": "g", "actions": actions} | ends
+
+
+def _names(count: int) -> list[str]:
+    return [f"A{i}" for i in range(count)]
+
+
+def chain(count: int, **fields: Any) -> dict[str, Any]:
+    """One after the other."""
+    names = _names(count)
+    actions = [
+        _action(n, names[max(0, i - 1) : i], names[i + 1 : i + 2], **fields)
+        for i, n in enumerate(names)
+    ]
+    return _file(actions, names[:1], names[-1:])
+
+
+def spontaneous_chain(count: int) -> dict[str, Any]:
+    """All spontaneous, with a loop at the end."""
+    file = chain(count, type="spontaneous")
+    actions = file["actions"]
+    actions[-1]["children"] = [{"name": actions[-2]["name"]}]
+    actions[-2]["parents"].append({"name": actions[-1]["name"], "required": False})
+    return file
+
+
+def dead_chain(count: int) -> dict[str, Any]:
+    """A way back that is required, and all that waits behind it."""
+    file = chain(count)
+    actions = file["actions"]
+    actions[1]["parents"].append({"name": actions[2]["name"], "conditions": SAFE})
+    actions[2]["children"].append({"name": actions[1]["name"]})
+    return file
+
+
+def loop(count: int) -> dict[str, Any]:
+    """All in one circle, every way back required."""
+    names = _names(count)
+    actions = [_action(n, [names[i - 1]], [names[(i + 1) % count]]) for i, n in enumerate(names)]
+    return _file(actions, names[:1], names[-1:])
+
+
+def pairs(count: int) -> dict[str, Any]:
+    """A chain in which every two neighbours are a loop."""
+    names = _names(count)
+    back = [{"name": n, "required": False, "conditions": SAFE} for n in names]
+    actions = [
+        _action(n, [*names[max(0, i - 1) : i], *back[i + 1 : i + 2]],
+                [*names[i + 1 : i + 2], *names[max(0, i - 1) : i]])
+        for i, n in enumerate(names)
+    ]  # fmt: skip
+    return _file(actions, names[:1], names[-1:])
+
+
+def fan(count: int) -> dict[str, Any]:
+    """One that starts all, one that waits for all."""
+    names = _names(count)
+    middle = [_action(n, ["First"], ["Last"]) for n in names]
+    ends = [_action("First", [], names), _action("Last", names, [])]
+    return _file([*ends, *middle], ["First"], ["Last"])
+
+
+def all_ends(count: int) -> dict[str, Any]:
+    """Every action at entry and exit."""
+    names = _names(count)
+    return _file([_action(n, [], []) for n in names], names, names)
+
+
+def twins(count: int) -> dict[str, Any]:
+    """All called alike."""
+    return _file([_action("A", ["A"], ["A"]) for _ in range(count)], ["A"], ["A"])
+
+
+def ghosts(count: int) -> dict[str, Any]:
+    """Two actions and many that do not exist."""
+    names = _names(count)
+    return _file([_action("First", names, names), _action("Last", names, names)], names, names)
+
+
+def repeated(count: int) -> dict[str, Any]:
+    """One pair, many times; the exit too."""
+    actions = [_action("A", [], ["B"] * count), _action("B", ["A"] * count, [])]
+    return _file(actions, ["A"] * count, ["A"] * count)
+
+
+def parameters(count: int) -> dict[str, Any]:
+    """Many parameters that nobody provides, and many renamed ones."""
+    many = {name: TEXT for name in _names(count)}  # noqa: C420 - values are not shared in JSON
+    remap = [{"from": name, "to": f"B{name}"} for name in _names(count)]
+    lacking = {f"C{name}": TEXT for name in _names(count)}
+    actions = [
+        _action("A", [], [{"name": "B", "remap": remap}], output_parameters=many),
+        _action("B", ["A"], [], input_parameters=lacking),
+    ]
+    return _file(actions, ["A"], ["B"])
+
+
+def nested(count: int) -> dict[str, Any]:
+    """Groups of parameters as deep as it gets, side by side."""
+    group: dict[str, Any] = dict(TEXT)
+    for _ in range(55):
+        group = {"g": group}
+    many = {name: group for name in _names(count // 55 + 1)}  # noqa: C420
+    return _file([_action("A", [], [], input_parameters=many)], ["A"], ["A"])
+
+
+def joined(count: int) -> dict[str, Any]:
+    """Many parents with outputs and one child with inputs from none of them."""
+    side = max(2, int(count**0.5))
+    names = _names(side)
+    outputs = {f"o{i}": TEXT for i in range(side)}
+    inputs = {f"i{i}": TEXT for i in range(side)}
+    child = {"name": "Z", "remap": [{"from": "o0", "to": "zz"}]}
+    parents = [_action(n, [], [child], output_parameters=outputs) for n in names]
+    return _file([*parents, _action("Z", names, [], input_parameters=inputs)], names, ["Z"])
+
+
+SHAPES: dict[str, Callable[[int], dict[str, Any]]] = {
+    shape.__name__: shape
+    for shape in (
+        chain, spontaneous_chain, dead_chain, loop, pairs, fan, all_ends, twins, ghosts, repeated,
+        parameters, nested, joined,
+    )
+}  # fmt: skip
