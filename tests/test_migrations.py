@@ -18,8 +18,8 @@ from action_assistant.journal.migrate import (
     Branch,
     config_for,
     migrate,
-    sqlite_engine,
 )
+from action_assistant.journal.sqlite import sqlite_engine
 
 branches = pytest.mark.parametrize("branch", ["editor", "runner"])
 
@@ -123,4 +123,4 @@ def test_scripts_are_found_also_where_the_path_is_unusual(
 @branches
 def test_every_table_name_is_said_once(branch: Branch) -> None:
     metadata: MetaData = BRANCHES[branch]
-    assert {"event", "snapshot"} <= set(metadata.tables)
+    assert {"event", "head", "snapshot"} <= set(metadata.tables)

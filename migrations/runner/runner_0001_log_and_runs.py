@@ -22,9 +22,17 @@ def upgrade() -> None:
         sa.Column("at", sa.BigInteger, nullable=False),
         sa.Column("body", sa.LargeBinary, nullable=False),
         sa.Column("position", sa.BigInteger, nullable=False),
+        sa.Column("chain", sa.LargeBinary, nullable=False),
         sa.PrimaryKeyConstraint("stream", "seq", name="pk_event"),
     )
     op.create_index("ix_event_position", "event", ["position"], unique=True)
+    op.create_table(
+        "head",
+        sa.Column("stream", sa.Text, nullable=False),
+        sa.Column("seq", sa.BigInteger, nullable=False),
+        sa.Column("chain", sa.LargeBinary, nullable=False),
+        sa.PrimaryKeyConstraint("stream", name="pk_head"),
+    )
     op.create_table(
         "snapshot",
         sa.Column("stream", sa.Text, nullable=False),
@@ -76,5 +84,5 @@ def upgrade() -> None:
 
 def downgrade() -> None:
     """Go back to the one before."""
-    for table in ("robot", "run", "snapshot", "event"):
+    for table in ("robot", "run", "snapshot", "head", "event"):
         op.drop_table(table)

@@ -1,24 +1,45 @@
 """Journals to test: every kind that there is."""
 
-from collections.abc import AsyncIterator, Awaitable, Callable
+import itertools
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from action_assistant.journal.events import Fold, nothing
 from action_assistant.journal.journal import Journal
+from journal.servers import Server, binaries, server
 
 Open = Callable[..., Awaitable[Journal]]
+_NUMBERS = itertools.count()
 
 
-@pytest.fixture(params=["sqlite"])
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[Server]:
+    """A Postgres server that no test harms."""
+    if binaries() is None:
+        pytest.skip("Postgres is not installed (Debian: postgresql)")
+    with server() as one:
+        yield one
+
+
+@pytest.fixture(params=["sqlite", "postgres"])
 def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """A database of each kind, empty."""
     match request.param:
         case "sqlite":
             return f"sqlite:///{tmp_path / 'editor.db'}"
+        case "postgres":
+            return new_database(request.getfixturevalue("postgres"))
         case other:
             raise AssertionError(other)
+
+
+def new_database(server: Server) -> str:
+    """The URL of an empty database."""
+    name = f"test_{next(_NUMBERS)}"
+    server.sql(f"CREATE DATABASE {name}")
+    return server.url(name)
 
 
 @pytest.fixture

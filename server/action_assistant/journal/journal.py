@@ -2,69 +2,72 @@
 
 import asyncio
 import contextlib
-import fcntl
 import hashlib
-import os
-from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager
-from pathlib import Path
+from functools import partial
 from typing import Any, Final, TypeVar
 
-from sqlalchemy import Connection, Engine, QueuePool, Row, Select, create_engine, event
-from sqlalchemy.exc import DatabaseError
+from sqlalchemy import Connection, Row, Select, delete, func, insert, select
+from sqlalchemy.exc import DBAPIError
 
-from action_assistant.errors import CannotStart, Unavailable
+from action_assistant.errors import Unavailable
+from action_assistant.journal.chain import Damage, Head, Inspector
+from action_assistant.journal.database import Branch, Database, Session, database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold, Snapshot
-from action_assistant.journal.migrate import BRANCHES, Branch, file_of, migrate
-from action_assistant.journal.sqlite import Job, Pen, Writer
-from action_assistant.journal.tables import LOG
+from action_assistant.journal.follower import Follower
+from action_assistant.journal.migrate import BRANCHES
+from action_assistant.journal.tables import LOG, editor_event, editor_head, editor_snapshot
+from action_assistant.journal.writer import Job, Pen, Writer
 
 T = TypeVar("T")
 
-_READERS: Final = 3  # threads, each with a connection
-_HELD: Final = 1000  # events that wait for a follower in memory; after that it reads them
 _PAGE: Final = 500  # events that a follower reads at once
-_COLUMNS: Final = "stream, seq, kind, author, at, body, position"
+
+# The tables of the log are the same for both branches.
+_event, _head, _snapshot = editor_event.c, editor_head.c, editor_snapshot.c
+_EVENTS: Final = select(*(_event[name] for name in Event.__struct_fields__))
 
 
 class Journal:
     """The log of one process. The only writer of its database; readers never wait for it."""
 
-    def __init__(self, path: Path, branch: Branch, fold: Fold, lock: int) -> None:
+    def __init__(self, database: Database, session: Session, branch: Branch, fold: Fold) -> None:
         self._branch: Final = branch
-        self._lock = lock
         self._loop = asyncio.get_running_loop()
-        self._writer = Writer(path, fold)
-        self._readers = ThreadPoolExecutor(_READERS, thread_name_prefix=f"{branch} reader")
-        self._engine = _reading(path)
-        self._followers: set[_Follower] = set()
+        self._database = database
+        self._writer = Writer(database, session, fold)
+        self._followers: set[Follower] = set()
         self._closed = False
 
     @staticmethod
     def prepare(url: str, branch: Branch) -> None:
         """Raise CannotStart if `open` would: to be called before a server is begun."""
-        lock = _own(file_of(url))
+        database = database_of(url)
         try:
-            migrate(url, branch)
+            database.open(branch).close()
         finally:
-            _disown(lock)
+            database.disown()
 
     @classmethod
     async def open(cls, url: str, *, branch: Branch, fold: Fold) -> "Journal":
-        """Open, and bring the tables to this version. `url` is `sqlite:///PATH`.
+        """Open, and bring the tables to this version. `url`: sqlite:///PATH or postgresql://…
 
-        Raises CannotStart: newer or foreign database, folder that cannot be written, in use.
+        Raises CannotStart: newer or foreign database, not to be reached or written, in use, or not
+        set up to keep what it was told.
         """
-        path = file_of(url)
-        lock = _own(path)
+        return await cls.on(database_of(url), branch=branch, fold=fold)
+
+    @classmethod
+    async def on(cls, database: Database, *, branch: Branch, fold: Fold) -> "Journal":
+        """Open a journal in a database. Raises CannotStart."""
         try:
-            await asyncio.to_thread(migrate, url, branch)
-            return cls(path, branch, fold, lock)
+            session = await asyncio.to_thread(database.open, branch)
         except BaseException:
-            _disown(lock)
+            await database.close()
+            database.disown()
             raise
+        return cls(database, session, branch, fold)
 
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
@@ -81,24 +84,22 @@ class Journal:
         self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
     ) -> list[Event]:
         """The events of a stream with `after < seq <= upto`, in order."""
-        where = "stream = ? AND seq > ?" + ("" if upto is None else " AND seq <= ?")
-        values: list[object] = [stream, after, *([] if upto is None else [upto])]
-        sql = f"SELECT {_COLUMNS} FROM event WHERE {where} ORDER BY seq LIMIT ?"
-        return await self._events(sql, [*values, -1 if limit is None else limit])
+        chosen = _EVENTS.where(_event.stream == stream, _event.seq > after)
+        if upto is not None:
+            chosen = chosen.where(_event.seq <= upto)
+        return await self._events(chosen.order_by(_event.seq).limit(limit))
 
     async def read_all(self, *, after: int = 0, limit: int = _PAGE) -> list[Event]:
         """The events of all streams with `position > after`, in order."""
-        sql = f"SELECT {_COLUMNS} FROM event WHERE position > ? ORDER BY position LIMIT ?"
-        return await self._events(sql, [after, limit])
+        return await self._events(_after(after, limit))
 
     async def newest(self, stream: str) -> int:
         """The seq of a stream's last event; 0 when there is none."""
-        sql = "SELECT coalesce(max(seq), 0) FROM event WHERE stream = ?"
-        return await self._number(sql, (stream,))
+        return await self._number(select(_head.seq).where(_head.stream == stream))
 
     async def position(self) -> int:
         """The position of the last event of all."""
-        return await self._number("SELECT coalesce(max(position), 0) FROM event")
+        return await self._number(select(func.max(_event.position)))
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
         """Ask the tables."""
@@ -110,10 +111,12 @@ class Journal:
 
     async def snapshot(self, stream: str) -> Snapshot | None:
         """The cached sum of a stream; None when there is none, or when it does not fit the log."""
-        sql = "SELECT seq, proof, state FROM snapshot WHERE stream = ?"
+        chosen = select(_snapshot.seq, _snapshot.proof, _snapshot.state).where(
+            _snapshot.stream == stream
+        )
 
         def find(connection: Connection) -> Snapshot | None:
-            row = connection.exec_driver_sql(sql, (stream,)).first()
+            row = connection.execute(chosen).first()
             if row is None:
                 return None
             proof = _proof(_body(connection, stream, row.seq), row.state)
@@ -123,24 +126,24 @@ class Journal:
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
         """Cache what a stream adds up to at `seq`. Raises Unavailable."""
-        sql = "INSERT OR REPLACE INTO snapshot (stream, seq, proof, state) VALUES (?, ?, ?, ?)"
 
         def keep(pen: Pen) -> None:
             proof = _proof(_body(pen.connection, stream, seq), state)
-            pen.run(sql, (stream, seq, proof, state))
+            row = {"stream": stream, "seq": seq, "proof": proof, "state": state}
+            pen.connection.execute(delete(editor_snapshot).where(_snapshot.stream == stream))
+            pen.connection.execute(insert(editor_snapshot).values(row))
 
         await self._write(keep)
 
     async def rebuild(self) -> int:
         """Make all tables again from the events, in one transaction; the number of events."""
         folds = [t for t in BRANCHES[self._branch].sorted_tables if t.name not in LOG]
-        sql = f"SELECT {_COLUMNS} FROM event WHERE position > ? ORDER BY position LIMIT {_PAGE}"
 
         def again(pen: Pen) -> int:
             for table in reversed(folds):
                 pen.connection.execute(table.delete())
             done = position = 0
-            while rows := pen.connection.exec_driver_sql(sql, (position,)).all():
+            while rows := pen.connection.execute(_after(position, _PAGE)).all():
                 for row in rows:
                     for statement in pen.fold(Event(*row)):
                         pen.connection.execute(statement)
@@ -150,10 +153,31 @@ class Journal:
 
         return await self._write(again)
 
+    async def verify(self) -> list[Damage]:
+        """What is wrong with the log: the first damaged event of each stream, none when all is well.
+
+        Finds every change of a stored event and every one that is missing. Raises Unavailable.
+        """
+        inspector = Inspector()
+        after = 0
+        try:
+            while True:
+                rows, after = await self._ask(partial(self._database.scan, after=after))
+                for row in rows:
+                    inspector.see(row)
+                if not rows:
+                    break
+            ends = await self.query(select(_head.stream, _head.seq, _head.chain))
+            found = inspector.findings({row.stream: Head(row.seq, row.chain) for row in ends})
+            complaints = await self._ask(self._database.complaints)
+        except Unavailable as error:
+            return [*inspector.findings(None), Damage("", 0, error.detail)]
+        return [*found, *(Damage("", 0, text) for text in complaints)]
+
     async def health(self) -> str | None:
         """Why nothing can be stored at the moment; None when it can. Writes nothing."""
         try:
-            await self._write(lambda _: None)
+            await self._write(lambda pen: pen.connection)
         except Unavailable as error:
             return error.detail
         return None
@@ -167,9 +191,8 @@ class Journal:
         await asyncio.sleep(0)  # let the last outcomes arrive
         for follower in self._followers:
             follower.end()
-        await asyncio.to_thread(self._readers.shutdown)
-        self._engine.dispose()
-        _disown(self._lock)
+        await self._database.close()
+        self._database.disown()
 
     async def _write(self, work: Callable[[Pen], T]) -> T:
         if self._closed:
@@ -199,40 +222,31 @@ class Journal:
             follower.hear(events)
 
     async def _ask(self, question: Callable[[Connection], T]) -> T:
-        def asked() -> T:
-            try:
-                with self._engine.connect() as connection:
-                    return question(connection)
-            except DatabaseError as error:
-                raise Unavailable(f"The journal cannot be read: {error.orig}.") from error
-
         if self._closed:
             raise Unavailable("The journal is closed.")
-        return await self._loop.run_in_executor(self._readers, asked)
+        try:
+            return await self._database.ask(question)
+        except self._database.faults as error:
+            cause = error.orig if isinstance(error, DBAPIError) else error
+            raise Unavailable(f"The journal cannot be read: {cause}.") from error
 
-    async def _events(self, sql: str, values: Sequence[object]) -> list[Event]:
-        def find(connection: Connection) -> list[Event]:
-            return [Event(*row) for row in connection.exec_driver_sql(sql, tuple(values))]
+    async def _events(self, chosen: Select[Any]) -> list[Event]:
+        return await self._ask(lambda c: [Event(*row) for row in c.execute(chosen)])
 
-        return await self._ask(find)
-
-    async def _number(self, sql: str, values: Sequence[object] = ()) -> int:
-        def find(connection: Connection) -> int:
-            number: int = connection.exec_driver_sql(sql, tuple(values)).scalar_one()
-            return number
-
-        return await self._ask(find)
+    async def _number(self, chosen: Select[Any]) -> int:
+        found: int | None = await self._ask(lambda c: c.execute(chosen).scalar())
+        return found or 0
 
     @contextlib.asynccontextmanager
     async def _following(self) -> AsyncIterator[AsyncIterator[Event]]:
-        follower = _Follower()
+        follower = Follower()
         self._followers.add(follower)
         try:
             yield self._heard(follower, await self.position())
         finally:
             self._followers.discard(follower)
 
-    async def _heard(self, follower: "_Follower", last: int) -> AsyncIterator[Event]:
+    async def _heard(self, follower: Follower, last: int) -> AsyncIterator[Event]:
         """Events from memory, or from the file where memory was not enough."""
         while True:
             found = await follower.next()
@@ -248,89 +262,13 @@ class Journal:
                     yield each
 
 
-class _Follower:
-    """What waits for one follower."""
-
-    def __init__(self) -> None:
-        self._waiting: deque[Event] = deque()
-        self._missed = False
-        self._ended = False
-        self._news = asyncio.Event()
-
-    def hear(self, events: Sequence[Event]) -> None:
-        if not events or self._missed:
-            return
-        if len(self._waiting) + len(events) > _HELD:
-            self._waiting.clear()
-            self._missed = True
-        else:
-            self._waiting.extend(events)
-        self._news.set()
-
-    def wake(self) -> None:
-        """There is more to read."""
-        self._waiting.clear()
-        self._missed = True
-        self._news.set()
-
-    def end(self) -> None:
-        self._ended = True
-        self._news.set()
-
-    async def next(self) -> list[Event] | None:
-        """What came; empty when something was missed and has to be read; None at the end."""
-        await self._news.wait()
-        found = list(self._waiting)
-        if self._ended and not found and not self._missed:
-            return None
-        self._waiting.clear()
-        self._missed = False
-        if not self._ended:
-            self._news.clear()
-        return found
-
-
-def _own(path: Path) -> int:
-    """Lock the database for this process; two writers of one log would tear it."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = path.with_name(f"{path.name}.lock").open("ab")
-    except OSError as error:
-        raise CannotStart(f"Cannot write to the folder {path.parent}: {error.strerror}.") from error
-    with file:
-        descriptor = file.fileno()
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise CannotStart(f"The database {path} is in use by another process.") from error
-        return os.dup(descriptor)
-
-
-def _disown(lock: int) -> None:
-    os.close(lock)
-
-
-def _reading(path: Path) -> Engine:
-    engine = create_engine(
-        f"sqlite:///{path}",
-        poolclass=QueuePool,
-        pool_size=_READERS,
-        isolation_level="AUTOCOMMIT",
-        connect_args={"check_same_thread": False},
-    )
-
-    @event.listens_for(engine, "connect")
-    def _only_read(connection: Any, _: object) -> None:
-        connection.execute("PRAGMA query_only=ON")
-        connection.execute("PRAGMA wal_autocheckpoint=0")
-
-    return engine
+def _after(position: int, limit: int) -> Select[Any]:
+    return _EVENTS.where(_event.position > position).order_by(_event.position).limit(limit)
 
 
 def _body(connection: Connection, stream: str, seq: int) -> bytes:
-    sql = "SELECT body FROM event WHERE stream = ? AND seq = ?"
-    body = connection.exec_driver_sql(sql, (stream, seq)).scalar()
-    return bytes(body) if body is not None else b""
+    chosen = select(_event.body).where(_event.stream == stream, _event.seq == seq)
+    return connection.execute(chosen).scalar() or b""
 
 
 def _proof(body: bytes, state: bytes) -> bytes:

@@ -1,227 +1,249 @@
-"""The thread that writes a SQLite file: one connection, one transaction for all who wait."""
+"""A journal in one SQLite file: WAL, every commit on the disk before anyone hears of it."""
 
-import logging
-import queue
+import asyncio
+import fcntl
+import os
 import sqlite3
-import threading
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Final, Generic, TypeAlias, TypeVar
+from typing import Any, Final, TypeVar
 
-from sqlalchemy import Connection, Engine, StaticPool, create_engine
-from sqlalchemy.exc import DatabaseError, IntegrityError
+from sqlalchemy import Connection, Engine, NullPool, QueuePool, create_engine, event
+from sqlalchemy.exc import (
+    DatabaseError,
+    DataError,
+    IntegrityError,
+    InterfaceError,
+    ProgrammingError,
+)
 
-from action_assistant.errors import Conflict, Unavailable
-from action_assistant.journal.events import Addition, Event, Fold
-
-log: Final = logging.getLogger(__name__)
+from action_assistant.errors import CannotStart
+from action_assistant.journal.chain import Head
+from action_assistant.journal.database import Branch
+from action_assistant.journal.events import Event
+from action_assistant.journal.migrate import upgrade_to
 
 T = TypeVar("T")
-Clock: TypeAlias = Callable[[], int]
-#: What became of a job: its result, or why there is none; the events it wrote.
-Outcome: TypeAlias = tuple[Any, BaseException | None, list[Event]]
 
-_TOGETHER: Final = 1000  # jobs in one transaction
+_READERS: Final = 3  # threads, each with a connection
 _WAIT: Final = 5.0  # seconds for a lock that only a foreign process could hold
+_PRAGMAS: Final = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON")
+_PAGE: Final = 500
 _INSERT: Final = (
-    "INSERT INTO event (stream, seq, kind, author, at, body, position) VALUES (?, ?, ?, ?, ?, ?, ?)"
+    "INSERT INTO event (stream, seq, kind, author, at, body, position, chain)"
+    " VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
+)
+_END: Final = "INSERT OR REPLACE INTO head (stream, seq, chain) VALUES (?, ?, ?)"
+#: In the order of the rows themselves: an index may be what is damaged.
+_SCAN: Final = (
+    "SELECT stream, seq, kind, author, at, body, position, chain, rowid FROM event NOT INDEXED"
+    f" WHERE rowid > ? ORDER BY rowid LIMIT {_PAGE}"
 )
 
 
-def now() -> int:
-    """Microseconds since 1970."""
-    return time.time_ns() // 1000
+class SqliteSession:
+    """The connection that writes."""
 
+    def __init__(self, path: Path, driver: Any) -> None:
+        self._engine = create_engine(
+            f"sqlite:///{path}",
+            module=driver,
+            poolclass=NullPool,
+            isolation_level="AUTOCOMMIT",  # BEGIN and COMMIT are ours to say
+            connect_args={"timeout": _WAIT, "check_same_thread": False},
+        )
+        self.connection = self._engine.connect()
+        try:
+            raw: Any = self.connection.connection.dbapi_connection
+            self._raw: sqlite3.Connection = raw
+            for pragma in _PRAGMAS:
+                raw.execute(f"PRAGMA {pragma}")
+            # After a failed fsync the log file may hold what the disk does not: begin a new one.
+            if raw.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()[0]:
+                raise sqlite3.OperationalError("somebody reads the database without end")
+        except BaseException:
+            self.close()
+            raise
 
-class Job(Generic[T]):
-    """Work for the writer's thread. `done` is called on that thread, after the commit or failure."""
+    def run(self, work: Callable[[], T]) -> T:
+        """Do work that uses this session."""
+        return work()
 
-    def __init__(
-        self,
-        work: Callable[["Pen"], T],
-        done: Callable[[T | None, BaseException | None, Sequence[Event]], None],
-    ) -> None:
-        self.work = work
-        self.done = done
+    def alive(self) -> bool:
+        """Always: a file does not go away."""
+        return True
 
+    def begin(self) -> None:
+        """Open a transaction, locked from the start."""
+        self._raw.execute("BEGIN IMMEDIATE")
 
-class Pen:
-    """What a job writes with, inside a transaction that is already open."""
+    def say(self, command: str) -> None:
+        """A command without a result."""
+        self._raw.execute(command)
 
-    def __init__(self, connection: Connection, fold: Fold, clock: Clock) -> None:
-        self.connection = connection
-        self.fold = fold
-        self.written: list[Event] = []
-        self._clock = clock
-        self._heads: dict[str, int] = {}
-        (self._position,) = self._one("SELECT coalesce(max(position), 0) FROM event")
-
-    def add(self, addition: Addition) -> int:
-        """Append to one stream and fold; the newest seq. Raises Conflict."""
-        head = self._head(addition.stream)
-        if addition.expected is not None and addition.expected != head:
-            raise Conflict(
-                f"{addition.stream} has gone on to {head}; {addition.expected} was expected."
-            )
-        at = self._clock()
-        for draft in addition.drafts:
-            head += 1
-            self._position += 1
-            event = Event(
-                addition.stream, head, draft.kind, draft.author, at, draft.body, self._position
-            )
-            self._raw.execute(_INSERT, (event.stream, *_columns(event)))
-            for statement in self.fold(event):
-                self.connection.execute(statement)
-            self.written.append(event)
-        self._heads[addition.stream] = head
-        return head
-
-    def run(self, sql: str, values: Sequence[object] = ()) -> None:
-        """Driver SQL, for what SQLAlchemy would only slow down."""
-        self._raw.execute(sql, values)
-
-    def forget(self) -> None:
-        """What was written did not happen: read the newest places again."""
-        self._heads.clear()
-        self.written = []
-        (self._position,) = self._one("SELECT coalesce(max(position), 0) FROM event")
-
-    def _head(self, stream: str) -> int:
-        head = self._heads.get(stream)
-        if head is None:
-            sql = "SELECT coalesce(max(seq), 0) FROM event WHERE stream = ?"
-            (head,) = self._one(sql, (stream,))
-        return head
-
-    @property
-    def _raw(self) -> sqlite3.Connection:
-        raw: Any = self.connection.connection.dbapi_connection
-        connection: sqlite3.Connection = raw
-        return connection
-
-    def _one(self, sql: str, values: Sequence[object] = ()) -> tuple[int]:
-        row: tuple[int] = self._raw.execute(sql, values).fetchone()
-        return row
-
-
-class Writer:
-    """The only writer of a file. What waits while a commit is under way makes up the next one."""
-
-    def __init__(self, path: Path, fold: Fold, clock: Clock = now) -> None:
-        self._path = path
-        self._fold = fold
-        self._clock = clock
-        self._jobs: queue.SimpleQueue[Job[Any] | None] = queue.SimpleQueue()
-        self._engine: Engine | None = None
-        self._pen: Pen | None = None
-        self._thread = threading.Thread(target=self._run, name=f"journal {path.name}", daemon=True)
-        self._thread.start()
-
-    def submit(self, job: Job[Any]) -> None:
-        """Queue a job; returns at once."""
-        self._jobs.put(job)
+    def store(self, events: Sequence[tuple[Event, bytes]], heads: Mapping[str, Head]) -> None:
+        """Write events and ends of streams."""
+        alone = not self._raw.in_transaction
+        if alone:
+            self.begin()
+        self._raw.executemany(
+            _INSERT,
+            [
+                (e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position, chain)
+                for e, chain in events
+            ],
+        )
+        self._raw.executemany(_END, [(name, end.seq, end.chain) for name, end in heads.items()])
+        if alone:
+            self._raw.execute("COMMIT")
 
     def close(self) -> None:
-        """Finish what was submitted, then end the thread. Blocks."""
-        self._jobs.put(None)
-        self._thread.join()
-
-    def _run(self) -> None:
-        while True:
-            jobs, last = self._next()
-            if jobs:
-                self._commit(jobs)
-            if last:
-                self._disconnect()
-                return
-
-    def _next(self) -> tuple[list[Job[Any]], bool]:
-        """Everything that waits, at least one; whether to end after it."""
-        found: list[Job[Any]] = []
-        job = self._jobs.get()
-        while job is not None:
-            found.append(job)
-            if len(found) == _TOGETHER:
-                return found, False
-            try:
-                job = self._jobs.get_nowait()
-            except queue.Empty:
-                return found, False
-        return found, True
-
-    def _commit(self, jobs: list[Job[Any]]) -> None:
-        done: list[Outcome]
+        """Let go; what is not committed has not happened."""
         try:
-            pen = self._connected()
-            pen.run("BEGIN IMMEDIATE")
-            done = [_attempt(pen, job) for job in jobs]
-            pen.run("COMMIT")
-        except (sqlite3.Error, DatabaseError) as error:
-            # After a failed commit nobody knows what the disk holds: begin again from the file.
-            log.error("the journal %s cannot be written: %s", self._path, error)
-            self._disconnect()
-            refusal = Unavailable(f"Nothing can be stored at the moment: {_cause(error)}.")
-            done = [(None, refusal, [])] * len(jobs)
-        for job, (result, error_, events) in zip(jobs, done, strict=True):
-            job.done(result, error_, events)
-
-    def _connected(self) -> Pen:
-        if self._pen is None:
-            self._engine = create_engine(
-                f"sqlite:///{self._path}",
-                poolclass=StaticPool,
-                isolation_level="AUTOCOMMIT",  # BEGIN and COMMIT are ours to say
-                connect_args={"timeout": _WAIT, "check_same_thread": False},
-            )
-            connection = self._engine.connect()
-            for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
-                connection.exec_driver_sql(f"PRAGMA {pragma}")
-            self._pen = Pen(connection, self._fold, self._clock)
-        return self._pen
-
-    def _disconnect(self) -> None:
-        if self._pen is not None:
-            try:
-                self._pen.connection.close()
-            except (sqlite3.Error, DatabaseError) as error:
-                log.warning("closing %s: %s", self._path, error)
-        if self._engine is not None:
-            self._engine.dispose()
-        self._pen = self._engine = None
+            self.connection.close()
+        except (sqlite3.Error, DatabaseError):
+            self.connection.invalidate()  # a broken file may refuse even the roll-back
+        self._engine.dispose()
 
 
-def _attempt(pen: Pen, job: Job[Any]) -> Outcome:
-    """One job in a savepoint of its own, so that what it did wrong touches nobody else's work."""
-    pen.run("SAVEPOINT job")
+class Sqlite:
+    """A SQLite file that this process owns."""
+
+    patience: Final = 0.0
+    faults: Final[tuple[type[Exception], ...]] = (sqlite3.Error, DatabaseError)
+
+    def __init__(self, path: str | Path, *, driver: Any = sqlite3) -> None:
+        self._path: Final = Path(path)
+        self._driver = driver
+        self._lock: int | None = None
+        self._engine = _reading(self._path, driver)
+        self._threads = ThreadPoolExecutor(_READERS, thread_name_prefix=f"{self._path.name} reader")
+        self.name: Final = f"The database {path}"
+
+    def open(self, branch: Branch) -> SqliteSession:
+        """Lock the file for this process, since two writers of one log would tear it; migrate."""
+        self._lock = _own(self._path)
+        self.migrate(upgrade_to(branch))
+        try:
+            return self.connect()
+        except self.faults as error:
+            raise CannotStart(f"Cannot open {self._the}: {_cause(error)}.") from error
+
+    def migrate(self, upgrade: Callable[[Connection], T]) -> T:
+        """Run a change of the schema in one transaction. Raises CannotStart."""
+        engine = sqlite_engine(self._path, wait=2 * _WAIT, module=self._driver)
+        try:
+            with engine.begin() as connection:
+                return upgrade(connection)
+        except self.faults as error:
+            raise CannotStart(f"Cannot open {self._the}: {_cause(error)}.") from error
+        finally:
+            engine.dispose()
+
+    def connect(self) -> SqliteSession:
+        """Connect again; a session that was closed left nothing unfinished."""
+        return SqliteSession(self._path, self._driver)
+
+    def lost(self, error: Exception) -> bool:
+        """Whether the file is at fault."""
+        return not isinstance(error, IntegrityError | ProgrammingError | InterfaceError | DataError)
+
+    async def ask(self, question: Callable[[Connection], T]) -> T:
+        """Read, on a thread."""
+
+        def asked() -> T:
+            with self._engine.connect() as connection:
+                return question(connection)
+
+        return await asyncio.get_running_loop().run_in_executor(self._threads, asked)
+
+    def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
+        """Stored events as they stand, also where text has become unreadable."""
+        raw: Any = connection.connection.dbapi_connection
+        plain, raw.text_factory = raw.text_factory, _lenient
+        try:
+            rows = raw.execute(_SCAN, (after,)).fetchall()
+        finally:
+            raw.text_factory = plain
+        return [row[:8] for row in rows], rows[-1][8] if rows else after
+
+    def complaints(self, connection: Connection) -> list[str]:
+        """What SQLite finds wrong with the file."""
+        found = connection.exec_driver_sql("PRAGMA integrity_check").scalars().all()
+        return [text for text in found if text != "ok"]
+
+    async def close(self) -> None:
+        """Finish reading."""
+        await asyncio.to_thread(self._threads.shutdown)
+        self._engine.dispose()
+
+    def disown(self) -> None:
+        """Let others write."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    @property
+    def _the(self) -> str:
+        return self.name[0].lower() + self.name[1:]
+
+
+def sqlite_engine(path: Path, *, wait: float, **options: Any) -> Engine:
+    """An engine whose transactions are SQLite's own: also for schema changes, locked at BEGIN."""
+    engine = create_engine(
+        f"sqlite:///{path}", poolclass=NullPool, connect_args={"timeout": wait}, **options
+    )
+
+    @event.listens_for(engine, "connect")
+    def _plain(connection: Any, _: object) -> None:
+        connection.isolation_level = None  # the driver would commit before schema changes
+        for pragma in _PRAGMAS:
+            connection.execute(f"PRAGMA {pragma}")
+
+    @event.listens_for(engine, "begin")
+    def _begin(connection: Connection) -> None:
+        connection.exec_driver_sql("BEGIN IMMEDIATE")
+
+    return engine
+
+
+def _own(path: Path) -> int:
     try:
-        result = job.work(pen)
-    except sqlite3.Error:
-        raise  # the file, not the job
-    except DatabaseError as error:
-        if not isinstance(error, IntegrityError):
-            raise
-        outcome: Outcome = (None, _clash(error), [])
-    except Exception as error:  # noqa: BLE001 - the job's own; whoever waits for it gets it
-        outcome = (None, error, [])
-    else:
-        pen.run("RELEASE job")
-        events, pen.written = pen.written, []
-        return result, None, events
-    pen.run("ROLLBACK TO job")
-    pen.run("RELEASE job")
-    pen.forget()
-    return outcome
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = path.with_name(f"{path.name}.lock").open("ab")
+    except OSError as error:
+        raise CannotStart(f"Cannot write to the folder {path.parent}: {error.strerror}.") from error
+    with file:
+        descriptor = file.fileno()
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise CannotStart(f"The database {path} is in use by another process.") from error
+        return os.dup(descriptor)
 
 
-def _clash(error: IntegrityError) -> Conflict:
-    return Conflict(f"This is in the way of something that is already stored: {error.orig}.")
+def _reading(path: Path, driver: Any) -> Engine:
+    engine = create_engine(
+        f"sqlite:///{path}",
+        module=driver,
+        poolclass=QueuePool,
+        pool_size=_READERS,
+        isolation_level="AUTOCOMMIT",
+        connect_args={"check_same_thread": False},
+    )
+
+    @event.listens_for(engine, "connect")
+    def _only_read(connection: Any, _: object) -> None:
+        connection.execute("PRAGMA query_only=ON")
+        connection.execute("PRAGMA wal_autocheckpoint=0")
+
+    return engine
+
+
+def _lenient(text: bytes) -> str:
+    return text.decode("utf-8", "surrogateescape")
 
 
 def _cause(error: Exception) -> object:
     return error.orig if isinstance(error, DatabaseError) else error
-
-
-def _columns(event: Event) -> tuple[object, ...]:
-    return event.seq, event.kind, event.author, event.at, event.body, event.position

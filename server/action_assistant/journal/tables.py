@@ -1,7 +1,7 @@
 """Every table of both journals. The scripts in `migrations/` make the same ones, step by step.
 
-`event` and `snapshot` are in both files. Everything else is a fold of the events: it can be thrown
-away and made again. Times are microseconds since 1970, UTC.
+`event`, `head` (where each stream ends) and `snapshot` are in both files. Everything else is a fold of
+the events: it can be thrown away and made again. Times are microseconds since 1970, UTC.
 """
 
 from typing import Final
@@ -29,7 +29,7 @@ EDITOR: Final = MetaData(naming_convention=_NAMES)
 RUNNER: Final = MetaData(naming_convention=_NAMES)
 
 
-def _log(metadata: MetaData) -> tuple[Table, Table]:
+def _log(metadata: MetaData) -> tuple[Table, Table, Table]:
     event = Table(
         "event",
         metadata,
@@ -40,7 +40,15 @@ def _log(metadata: MetaData) -> tuple[Table, Table]:
         Column("at", BigInteger, nullable=False),
         Column("body", LargeBinary, nullable=False),
         Column("position", BigInteger, nullable=False),
+        Column("chain", LargeBinary, nullable=False),
         Index(None, "position", unique=True),
+    )
+    head = Table(
+        "head",
+        metadata,
+        Column("stream", Text, primary_key=True),
+        Column("seq", BigInteger, nullable=False),
+        Column("chain", LargeBinary, nullable=False),
     )
     snapshot = Table(
         "snapshot",
@@ -50,14 +58,14 @@ def _log(metadata: MetaData) -> tuple[Table, Table]:
         Column("proof", LargeBinary, nullable=False),
         Column("state", LargeBinary, nullable=False),
     )
-    return event, snapshot
+    return event, head, snapshot
 
 
-editor_event, editor_snapshot = _log(EDITOR)
-runner_event, runner_snapshot = _log(RUNNER)
+editor_event, editor_head, editor_snapshot = _log(EDITOR)
+runner_event, runner_head, runner_snapshot = _log(RUNNER)
 
 #: What is not a fold.
-LOG: Final = frozenset({"event", "snapshot"})
+LOG: Final = frozenset({"event", "head", "snapshot"})
 
 # --- editor -----------------------------------------------------------------------------------
 

@@ -1,0 +1,87 @@
+"""The chain through each stream, by which every change of a stored event shows."""
+
+from collections.abc import Mapping, Sequence
+from hashlib import blake2b
+from struct import pack
+from typing import Any, Final
+
+import msgspec
+
+from action_assistant.journal.events import Event
+
+START: Final = bytes(16)
+_TYPES: Final = (str, int, str, str, int, bytes, int, bytes)
+
+
+class Head(msgspec.Struct, frozen=True):
+    """The last event of a stream: its `seq`, and the chain up to it (16 bytes)."""
+
+    seq: int
+    chain: bytes
+
+
+NOTHING: Final = Head(0, START)
+
+
+class Damage(msgspec.Struct, frozen=True):
+    """A stream is sound before `seq` and not at it. Without a stream: the file itself is damaged."""
+
+    stream: str
+    seq: int
+    why: str
+
+
+def link(before: bytes, event: Event) -> bytes:
+    """The chain at an event: a digest of everything it holds and of the chain before it."""
+    digest = blake2b(before, digest_size=16)
+    for text in (event.stream, event.kind, event.author):
+        data = text.encode("utf-8", "surrogateescape")  # damaged text has to be told, not to fail
+        digest.update(pack(">I", len(data)))
+        digest.update(data)
+    digest.update(pack(">qqq", event.seq, event.at, event.position))
+    digest.update(event.body)
+    return digest.digest()
+
+
+class Inspector:
+    """Looks at all stored events in the order of their positions, and remembers what is wrong."""
+
+    def __init__(self) -> None:
+        self.seen = 0
+        self._heads: dict[str, Head] = {}
+        self._damages: dict[str, Damage] = {}
+        self._position = 0
+
+    def see(self, row: Sequence[Any]) -> None:
+        """The next event: its eight columns as they stand in the database."""
+        self.seen += 1
+        self._position += 1
+        stream = row[0] if isinstance(row[0], str) else repr(row[0])
+        before = self._heads.get(stream, NOTHING)
+        if tuple(map(type, row)) != _TYPES:
+            self._note(stream, before.seq + 1, "it holds values of the wrong kind")
+            self._heads[stream] = Head(before.seq + 1, START)
+            return
+        event, chain = Event(*row[:7]), row[7]
+        if event.seq != before.seq + 1:
+            self._note(stream, before.seq + 1, f"{event.seq} stands in its place")
+        elif chain != link(before.chain, event):
+            self._note(stream, event.seq, "it is not what was written")
+        elif event.position != self._position and not self._damages:
+            self._note(stream, event.seq, f"events before position {event.position} are missing")
+        self._position = event.position
+        self._heads[stream] = Head(event.seq, chain)
+
+    def findings(self, heads: Mapping[str, Head] | None) -> list[Damage]:
+        """The first damage of each stream. `heads`: what the database says their ends are."""
+        heads = self._heads if heads is None else heads
+        for stream in sorted(heads.keys() | self._heads.keys()):
+            end, found = heads.get(stream, NOTHING), self._heads.get(stream, NOTHING)
+            if end.seq > found.seq:
+                self._note(stream, found.seq + 1, f"the stream went on to {end.seq}")
+            elif end != found:
+                self._note(stream, found.seq, f"the stream's end is written down as {end.seq}")
+        return sorted(self._damages.values(), key=lambda each: (each.stream, each.seq))
+
+    def _note(self, stream: str, seq: int, why: str) -> None:
+        self._damages.setdefault(stream, Damage(stream, seq, why))

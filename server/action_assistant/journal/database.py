@@ -1,0 +1,99 @@
+"""What a journal needs of a database: the seam behind which SQLite and Postgres stand."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, Protocol, TypeAlias, TypeVar
+
+from sqlalchemy import Connection, make_url
+from sqlalchemy.exc import ArgumentError
+
+from action_assistant.errors import CannotStart
+from action_assistant.journal.chain import Head
+from action_assistant.journal.events import Event
+
+T = TypeVar("T")
+
+Branch: TypeAlias = Literal["editor", "runner"]
+
+
+class Session(Protocol):
+    """The connection that writes. Used by one thread at a time; everything only inside `run`."""
+
+    connection: Connection
+
+    def run(self, work: Callable[[], T]) -> T:
+        """Do work that uses this session."""
+
+    def alive(self) -> bool:
+        """Whether the connection was still there when last heard of."""
+
+    def begin(self) -> None:
+        """Open a transaction in which nobody else can write."""
+
+    def say(self, command: str) -> None:
+        """A command without a result: COMMIT, SAVEPOINT …"""
+
+    def store(self, events: Sequence[tuple[Event, bytes]], heads: Mapping[str, Head]) -> None:
+        """Write events with their chain, and the new ends of their streams: all or nothing."""
+
+    def close(self) -> None:
+        """Let go, whatever state the connection is in."""
+
+
+class Database(Protocol):
+    """One database, owned by this process for writing."""
+
+    @property
+    def name(self) -> str:
+        """What people may read: without a password."""
+
+    @property
+    def patience(self) -> float:
+        """Seconds to wait for the database before it is left open whether a commit has happened."""
+
+    @property
+    def faults(self) -> tuple[type[Exception], ...]:
+        """Everything that its driver raises."""
+
+    def open(self, branch: Branch) -> Session:
+        """Become the only writer, migrate, connect. Raises CannotStart."""
+
+    def migrate(self, upgrade: Callable[[Connection], T]) -> T:
+        """Run a change of the schema in one transaction. Raises CannotStart."""
+
+    def connect(self) -> Session:
+        """Connect again after a failure; whatever the last session left unfinished is over then."""
+
+    def lost(self, error: Exception) -> bool:
+        """Whether a fault is the database's, so that nothing can be written, or the statement's."""
+
+    async def ask(self, question: Callable[[Connection], T]) -> T:
+        """Read, without waiting for the writer."""
+
+    def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
+        """Some stored events with their chain as they stand, and from where to go on."""
+
+    def complaints(self, connection: Connection) -> list[str]:
+        """What the database itself finds wrong with its files."""
+
+    async def close(self) -> None:
+        """Finish reading."""
+
+    def disown(self) -> None:
+        """Let others write."""
+
+
+def database_of(url: str) -> Database:
+    """The database that a URL names. Raises CannotStart for what we cannot open."""
+    try:
+        parsed = make_url(url)
+    except ArgumentError as error:
+        raise CannotStart(f"{url!r} is not a database URL such as sqlite:///editor.db.") from error
+    if parsed.drivername in {"postgresql", "postgres"} and parsed.database:
+        from action_assistant.journal.postgres import Postgres
+
+        return Postgres(parsed)
+    if parsed.get_backend_name() == "sqlite" and parsed.database:
+        from action_assistant.journal.sqlite import Sqlite
+
+        return Sqlite(parsed.database)
+    raise CannotStart(f"Databases of the kind {parsed.drivername!r} are not supported.")

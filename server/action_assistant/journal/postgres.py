@@ -1,0 +1,267 @@
+"""A journal in a Postgres database: asyncpg writes, SQLAlchemy asks and makes the tables."""
+
+import asyncio
+import hashlib
+import os
+import secrets
+import time
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from typing import Any, Final, TypeVar
+
+import asyncpg  # type: ignore[import-untyped]
+from sqlalchemy import URL, Connection, NullPool, select
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
+from sqlalchemy.util import await_only
+
+from action_assistant.errors import CannotStart
+from action_assistant.journal.chain import Head
+from action_assistant.journal.database import Branch
+from action_assistant.journal.events import Event
+from action_assistant.journal.migrate import upgrade_to
+from action_assistant.journal.tables import editor_event
+
+T = TypeVar("T")
+
+_READERS: Final = 3  # connections
+_PAGE: Final = 500
+_CONNECT: Final = 5.0  # seconds for a connection to come up
+_ANSWER: Final = 30.0  # seconds for a statement; after that the connection counts as dead
+_HANDOVER: Final = 3.0  # seconds until a server has ended the connections of a process that died
+#: What must hold for an acknowledged commit to survive, and what to say where it does not.
+_SETTINGS: Final = {
+    "fsync": ({"on"}, "it does not write commits to the disk"),
+    "full_page_writes": ({"on"}, "a power cut would tear its pages"),
+    "synchronous_commit": (
+        {"on", "local", "remote_write", "remote_apply"},
+        "it confirms commits that it may lose",
+    ),
+    "server_encoding": ({"UTF8"}, "it cannot hold every text"),
+    "transaction_read_only": ({"off"}, "it is a read-only copy"),
+}
+#: One statement: the events, and with them the counter of each stream.
+_STORE: Final = """
+WITH ends AS (
+    INSERT INTO head (stream, seq, chain)
+    SELECT * FROM unnest($9::text[], $10::bigint[], $11::bytea[])
+    ON CONFLICT (stream) DO UPDATE SET seq = excluded.seq, chain = excluded.chain
+)
+INSERT INTO event (stream, seq, kind, author, at, body, position, chain)
+SELECT * FROM unnest($1::text[], $2::bigint[], $3::text[], $4::text[], $5::bigint[],
+                     $6::bytea[], $7::bigint[], $8::bytea[])
+"""
+_END_OLD: Final = """
+SELECT pg_terminate_backend(pid) FROM pg_stat_activity
+WHERE application_name = $1 AND pid <> pg_backend_pid()
+"""
+#: SQLSTATE classes that speak of the server: connection, resources, operator, system, internal.
+_SERVER: Final = ("08", "53", "57", "58", "XX", "25", "F0")
+
+
+class PostgresSession:
+    """The connection that writes, on an event loop of its own that only runs inside `run`."""
+
+    connection: Connection
+
+    def __init__(self, engine: AsyncEngine, begin: Callable[[Any], Awaitable[None]]) -> None:
+        self._engine = engine
+        self._loop = asyncio.new_event_loop()
+        self._open: AsyncConnection | None = None
+        try:
+            self._loop.run_until_complete(self._connect(begin))
+        except BaseException:
+            self.close()
+            raise
+
+    async def _connect(self, begin: Callable[[Any], Awaitable[None]]) -> None:
+        self._open = await self._engine.connect()
+        self._raw: Any = (await self._open.get_raw_connection()).driver_connection
+        await begin(self._raw)
+        sync = self._open.sync_connection
+        assert sync is not None
+        self.connection = sync
+
+    def run(self, work: Callable[[], T]) -> T:
+        """Do work that uses this session."""
+        assert self._open is not None
+        return self._loop.run_until_complete(self._open.run_sync(lambda _: work()))
+
+    def alive(self) -> bool:
+        """Whether the connection was still there when last heard of."""
+        self._loop.run_until_complete(_hear())
+        return not self._raw.is_closed()
+
+    def begin(self) -> None:
+        """Open a transaction."""
+        self.say("BEGIN")
+
+    def say(self, command: str) -> None:
+        """A command without a result."""
+        await_only(self._raw.execute(command))
+
+    def store(self, events: Sequence[tuple[Event, bytes]], heads: Mapping[str, Head]) -> None:
+        """Write events and ends of streams; a transaction of its own if none is open."""
+        columns = [(e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position) for e, _ in events]
+        values = [list(column) for column in zip(*columns, strict=True)]
+        ends = [list(heads), [end.seq for end in heads.values()], [e.chain for e in heads.values()]]
+        await_only(self._raw.execute(_STORE, *values, [chain for _, chain in events], *ends))
+
+    def close(self) -> None:
+        """Let go at once: what is not committed has not happened."""
+        self._loop.run_until_complete(self._end())
+        self._loop.close()
+
+    async def _end(self) -> None:
+        if self._open is not None:
+            raw: Any = (await self._open.get_raw_connection()).driver_connection
+            if raw.is_in_transaction():
+                raw.terminate()
+            else:
+                await _quietly(raw.close(timeout=1))
+            await self._open.invalidate()
+            await self._open.close()
+        await self._engine.dispose()
+        await _hear()
+
+
+class Postgres:
+    """A Postgres database in which this process is the only writer."""
+
+    patience: Final = 10.0
+    faults: Final[tuple[type[Exception], ...]] = (
+        asyncpg.PostgresError,
+        asyncpg.InterfaceError,
+        asyncpg.InternalClientError,
+        DBAPIError,
+        OSError,
+    )
+
+    def __init__(self, url: URL) -> None:
+        self._url: Final = url.set(drivername="postgresql+asyncpg")
+        self.name: Final = f"The database {url.set(username=None, password=None, query={})}"
+        self._me = f"action-assistant {os.getpid()} {secrets.token_hex(8)}"
+        self._key = 0
+        self._readers = self._engine(f"{self._me} reads", pool_size=_READERS, pool_pre_ping=True)
+
+    def open(self, branch: Branch) -> PostgresSession:
+        """Lock the database for this process, check that it keeps what it confirms, migrate."""
+        mark = hashlib.sha256(f"action-assistant journal {branch}".encode()).digest()
+        self._key = int.from_bytes(mark[:8], "big", signed=True)
+        try:
+            session = self.connect()
+        except self.faults as error:
+            raise CannotStart(f"Cannot use {self._the}: {_cause(error)}.") from error
+        try:
+            self.migrate(upgrade_to(branch))
+        except BaseException:
+            session.close()
+            raise
+        return session
+
+    def migrate(self, upgrade: Callable[[Connection], T]) -> T:
+        """Run a change of the schema in one transaction. Raises CannotStart."""
+
+        async def change() -> T:
+            engine = create_async_engine(self._url, poolclass=NullPool)
+            try:
+                async with engine.begin() as connection:
+                    await connection.exec_driver_sql("SELECT pg_advisory_xact_lock(7205759403)")
+                    return await connection.run_sync(upgrade)
+            finally:
+                await engine.dispose()
+
+        try:
+            return asyncio.run(change())
+        except self.faults as error:
+            raise CannotStart(f"Cannot use {self._the}: {_cause(error)}.") from error
+
+    def connect(self) -> PostgresSession:
+        """Connect, and become the only writer (again).
+
+        The lock belongs to a session: once it is ours, our last session has ended on the server,
+        and whatever it was committing has either happened or never will.
+        """
+        return PostgresSession(self._engine(self._me, poolclass=NullPool), self._take_over)
+
+    async def _take_over(self, raw: Any) -> None:
+        for name, (allowed, why) in _SETTINGS.items():
+            value = await raw.fetchval("SELECT current_setting($1)", name)
+            if value not in allowed:
+                raise Unfit(f"{why} ({name} is {value})")
+        await raw.execute(_END_OLD, self._me)
+        until = time.monotonic() + _HANDOVER
+        while not await raw.fetchval("SELECT pg_try_advisory_lock($1)", self._key):
+            if time.monotonic() > until:
+                raise Unfit("it is in use by another process")
+            await asyncio.sleep(0.05)
+
+    def lost(self, error: Exception) -> bool:
+        """Whether the server or the connection is at fault."""
+        cause: Any = error.orig if isinstance(error, DBAPIError) else error
+        if isinstance(error, DBAPIError) and error.connection_invalidated:
+            return True
+        state = getattr(cause, "sqlstate", None) or getattr(cause, "pgcode", None)
+        return state is None or str(state).startswith(_SERVER)
+
+    async def ask(self, question: Callable[[Connection], T]) -> T:
+        """Read, on a connection that is not the writer's."""
+        async with self._readers.connect() as connection:
+            return await connection.run_sync(question)
+
+    def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
+        """Stored events with their chain."""
+        columns = editor_event.c
+        chosen = select(*(columns[name] for name in (*Event.__struct_fields__, "chain")))
+        chosen = chosen.where(columns.position > after).order_by(columns.position).limit(_PAGE)
+        rows = [tuple(row) for row in connection.execute(chosen)]
+        return list(rows), rows[-1][6] if rows else after
+
+    def complaints(self, connection: Connection) -> list[str]:
+        """Nothing: the server looks after its own files."""
+        del connection
+        return []
+
+    async def close(self) -> None:
+        """Finish reading."""
+        await self._readers.dispose()
+
+    def disown(self) -> None:
+        """Nothing: the lock went with the session that wrote."""
+
+    def _engine(self, name: str, **options: Any) -> AsyncEngine:
+        return create_async_engine(
+            self._url,
+            isolation_level="AUTOCOMMIT",  # BEGIN and COMMIT are ours to say
+            connect_args={
+                "timeout": _CONNECT,
+                "command_timeout": _ANSWER,
+                "server_settings": {"application_name": name},
+            },
+            **options,
+        )
+
+    @property
+    def _the(self) -> str:
+        return self.name[0].lower() + self.name[1:]
+
+
+class Unfit(OSError):
+    """A database that answers, but must not be written to."""
+
+
+async def _hear() -> None:
+    """Let the loop notice what has come in, such as the end of a connection."""
+    for _ in range(3):
+        await asyncio.sleep(0)
+
+
+async def _quietly(closing: Awaitable[None]) -> None:
+    try:
+        await closing
+    except Postgres.faults:
+        return  # it is gone, which is what was wanted
+
+
+def _cause(error: Exception) -> str:
+    cause = error.orig if isinstance(error, DBAPIError) else error
+    return str(cause).strip().rstrip(".") or type(cause).__name__

@@ -1,0 +1,303 @@
+"""The thread that writes a journal: one connection, one transaction for all who wait."""
+
+import logging
+import queue
+import threading
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Final, Generic, TypeAlias, TypeVar
+
+from sqlalchemy import Connection, Select, func, select
+from sqlalchemy.exc import DBAPIError, IntegrityError
+
+from action_assistant.errors import BadInput, Conflict, Unavailable
+from action_assistant.journal import tables
+from action_assistant.journal.chain import NOTHING, Head, link
+from action_assistant.journal.database import Database, Session
+from action_assistant.journal.events import Addition, Event, Fold
+
+log: Final = logging.getLogger(__name__)
+
+T = TypeVar("T")
+Clock: TypeAlias = Callable[[], int]
+#: What became of a job: its result, or why there is none; the events it wrote.
+Outcome: TypeAlias = tuple[Any, BaseException | None, list[Event]]
+
+_TOGETHER: Final = 1000  # jobs in one transaction
+_HEAVY: Final = 16 << 20  # bytes in one statement, beyond which no other job joins
+_KNOWN: Final = 10_000  # streams whose ends are kept in memory
+_AGAIN: Final = 0.1  # seconds between attempts to find out about a commit
+_LAST: Final = select(func.coalesce(func.max(tables.editor_event.c.position), 0))
+
+
+def now() -> int:
+    """Microseconds since 1970."""
+    return time.time_ns() // 1000
+
+
+class Job(Generic[T]):
+    """Work for the writer's thread. `done` is called on that thread, after the commit or failure."""
+
+    def __init__(
+        self,
+        work: Callable[["Pen"], T],
+        done: Callable[[T | None, BaseException | None, Sequence[Event]], None],
+    ) -> None:
+        self.work = work
+        self.done = done
+
+
+class Pen:
+    """What jobs write with. Events are gathered, and stored together by one statement at the end.
+
+    A job that does nothing else costs no round trip of its own. Every other statement of a job is
+    inside a savepoint, so that what a job did wrong touches nobody else's work.
+    """
+
+    def __init__(self, session: Session, fold: Fold, clock: Clock) -> None:
+        self.fold: Final = fold
+        self._session = session
+        self._clock = clock
+        self._position: int = session.connection.execute(_LAST).scalar_one()
+        self._heads: dict[str, Head] = {}
+        self._before: dict[str, Head] = {}  # ends of streams before the job that is under way
+        self._gathered: list[tuple[Event, bytes]] = []  # by earlier jobs
+        self._own: list[tuple[Event, bytes]] = []  # by this job
+        self._begun = self._entered = self._storing = False
+        #: Whether the statement was sent after which everything is stored.
+        self.committing = False
+        #: The last event of this transaction, with its chain: where it is, all is.
+        self.last: tuple[Event, bytes] | None = None
+
+    def start(self) -> None:
+        """Begin with the next jobs."""
+        self.last = None
+        self.committing = False
+        if len(self._heads) > _KNOWN:
+            self._heads.clear()
+
+    @property
+    def connection(self) -> Connection:
+        """For statements: inside the transaction, and the savepoint of this job."""
+        if not self._entered:
+            self._flush()
+            self._session.say("SAVEPOINT job")
+            self._entered = True
+        return self._session.connection
+
+    def add(self, addition: Addition) -> int:
+        """Append to one stream and fold; the newest seq. Raises Conflict, BadInput."""
+        stream = addition.stream
+        head = self._head(stream)
+        if addition.expected is not None and addition.expected != head.seq:
+            raise Conflict(f"{stream} has gone on to {head.seq}; {addition.expected} was expected.")
+        at = self._clock()
+        for draft in addition.drafts:
+            if "\0" in stream + draft.kind + draft.author:
+                raise BadInput("A name cannot hold the character NUL.")
+            self._position += 1
+            event = Event(
+                stream, head.seq + 1, draft.kind, draft.author, at, draft.body, self._position
+            )
+            head = Head(event.seq, link(head.chain, event))
+            self._own.append((event, head.chain))
+            for statement in self.fold(event):
+                self.connection.execute(statement)
+        self._before.setdefault(stream, self._heads[stream])
+        self._heads[stream] = head
+        return head.seq
+
+    def attempt(self, job: Job[Any], database: Database) -> Outcome:
+        """One job. Raises what makes it impossible to store anything; all else is its outcome."""
+        position = self._position
+        self._before.clear()
+        try:
+            result = job.work(self)
+            if self._entered:
+                self._store(self._own)
+                self._session.say("RELEASE SAVEPOINT job")
+        except Exception as error:  # the job's own; whoever waits for it gets it
+            if isinstance(error, database.faults) and (self._storing or database.lost(error)):
+                raise
+            self._own.clear()
+            self._position = position
+            self._heads |= self._before
+            if self._entered:
+                self._session.say("ROLLBACK TO SAVEPOINT job")
+                self._session.say("RELEASE SAVEPOINT job")
+            self._entered = False
+            return None, _told(error), []
+        own, self._own = self._own, []
+        if not self._entered:
+            self._gathered += own
+        self._entered = False
+        if sum(len(event.body) for event, _ in self._gathered) > _HEAVY:
+            self._flush()
+        return result, None, [event for event, _ in own]
+
+    def finish(self) -> None:
+        """Commit. After `committing`, a failure leaves open whether it has happened."""
+        self.committing = True
+        if self._begun:
+            self.committing = False
+            self._store(self._gathered)
+            self.committing = True
+            self._session.say("COMMIT")
+        else:
+            self._store(self._gathered)
+        self._gathered = []
+        self._begun = False
+
+    def _flush(self) -> None:
+        """Store what earlier jobs gathered, in a transaction that stays open."""
+        if not self._begun:
+            self._session.begin()
+            self._begun = True
+        gathered, self._gathered = self._gathered, []
+        self._store(gathered)
+
+    def _store(self, events: list[tuple[Event, bytes]]) -> None:
+        if events:
+            self._storing = True
+            self.last = events[-1]
+            heads = {event.stream: Head(event.seq, chain) for event, chain in events}
+            self._session.store(events, heads)
+            self._storing = False
+
+    def _head(self, stream: str) -> Head:
+        head = self._heads.get(stream)
+        if head is None:
+            table = tables.editor_head
+            found = select(table.c.seq, table.c.chain).where(table.c.stream == stream)
+            row = self._session.connection.execute(found).first()
+            head = self._heads[stream] = Head(*row) if row is not None else NOTHING
+        return head
+
+
+class Writer:
+    """The only writer of a database. What waits while a commit is under way is the next one."""
+
+    def __init__(
+        self, database: Database, session: Session | None, fold: Fold, clock: Clock = now
+    ) -> None:
+        self._database = database
+        self._session = session
+        self._fold = fold
+        self._clock = clock
+        self._pen: Pen | None = None
+        self._jobs: queue.SimpleQueue[Job[Any] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name=f"{database.name} pen", daemon=True)
+        self._thread.start()
+
+    def submit(self, job: Job[Any]) -> None:
+        """Queue a job; returns at once."""
+        self._jobs.put(job)
+
+    def close(self) -> None:
+        """Finish what was submitted, then end the thread. Blocks."""
+        self._jobs.put(None)
+        self._thread.join()
+
+    def _run(self) -> None:
+        while True:
+            jobs, last = self._next()
+            if jobs:
+                self._commit(jobs)
+            if last:
+                self._disconnect()
+                return
+
+    def _next(self) -> tuple[list[Job[Any]], bool]:
+        """Everything that waits, at least one; whether to end after it."""
+        found: list[Job[Any]] = []
+        job = self._jobs.get()
+        while job is not None:
+            found.append(job)
+            if len(found) == _TOGETHER:
+                return found, False
+            try:
+                job = self._jobs.get_nowait()
+            except queue.Empty:
+                return found, False
+        return found, True
+
+    def _commit(self, jobs: list[Job[Any]]) -> None:
+        done: list[Outcome] = []
+        pen: Pen | None = None
+        try:
+            session, pen = self._connected()
+            session.run(lambda: self._together(pen, jobs, done))
+        except self._database.faults as error:
+            # After a failed commit nobody knows what the disk holds: begin again from there.
+            log.error("%s cannot be written: %s", self._database.name, _cause(error))
+            self._disconnect()
+            done = self._settled(pen, done, len(jobs), error)
+        for job, (result, error_, events) in zip(jobs, done, strict=True):
+            job.done(result, error_, events)
+
+    def _together(self, pen: Pen, jobs: list[Job[Any]], done: list[Outcome]) -> None:
+        pen.start()
+        done.extend(pen.attempt(job, self._database) for job in jobs)
+        pen.finish()
+
+    def _settled(
+        self, pen: Pen | None, done: list[Outcome], jobs: int, error: Exception
+    ) -> list[Outcome]:
+        """What became of jobs whose transaction failed: everything or nothing, or nobody knows."""
+        text = f"Nothing can be stored at the moment: {_cause(error)}."
+        if pen is not None and pen.committing and pen.last is not None:
+            match self._stored(*pen.last):
+                case True:
+                    return done
+                case None:
+                    text = f"It is not known whether this was stored: {_cause(error)}."
+        return [(None, Unavailable(text), [])] * jobs
+
+    def _stored(self, event: Event, chain: bytes) -> bool | None:
+        """Whether an event is in the log; None when the database cannot be asked for too long."""
+        table = tables.editor_event
+        found = select(table.c.chain).where(table.c.position == event.position)
+        until = time.monotonic() + self._database.patience
+        while True:
+            try:
+                session, _ = self._connected()
+                return session.run(partial(_scalar, session, found)) == chain
+            except self._database.faults as error:
+                log.warning("%s does not answer: %s", self._database.name, _cause(error))
+                self._disconnect()
+            if time.monotonic() > until:
+                return None
+            time.sleep(_AGAIN)
+
+    def _connected(self) -> tuple[Session, Pen]:
+        session = self._session
+        if session is None or not session.alive():
+            self._disconnect()
+            session = self._session = self._database.connect()
+        if self._pen is None:
+            self._pen = session.run(lambda: Pen(session, self._fold, self._clock))
+        return session, self._pen
+
+    def _disconnect(self) -> None:
+        session, self._session, self._pen = self._session, None, None
+        if session is not None:
+            session.close()
+
+
+def _scalar(session: Session, chosen: Select[Any]) -> object:
+    return session.connection.execute(chosen).scalar()
+
+
+def _told(error: Exception) -> Exception:
+    """What a job's own failure is to the one who asked for it."""
+    if isinstance(error, IntegrityError):
+        return Conflict(f"This is in the way of something that is already stored: {error.orig}.")
+    if isinstance(error, DBAPIError):
+        return BadInput(f"This cannot be stored: {error.orig}.")
+    return error
+
+
+def _cause(error: Exception) -> str:
+    cause = error.orig if isinstance(error, DBAPIError) else error
+    return str(cause).strip().rstrip(".") or type(cause).__name__

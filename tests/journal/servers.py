@@ -1,0 +1,104 @@
+"""A Postgres server for tests: its own cluster in a temporary folder, on loopback, never as root."""
+
+import contextlib
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+NOBODY: Final = 65534
+_SETTINGS: Final = {
+    "listen_addresses": "127.0.0.1",
+    "unix_socket_directories": "",
+    "max_connections": "30",
+    "shared_buffers": "8MB",
+    "fsync": "on",
+    "synchronous_commit": "on",
+}
+
+
+def binaries() -> Path | None:
+    """Where Postgres is installed; None when it is not."""
+    found = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"), key=_version)
+    if found:
+        return found[-1].parent
+    on_path = shutil.which("initdb")
+    return Path(on_path).resolve().parent if on_path else None
+
+
+def _version(initdb: Path) -> float:
+    return float(initdb.parent.parent.name)
+
+
+class Server:
+    """A cluster that can be started, stopped, and killed."""
+
+    def __init__(self, folder: Path, bin_: Path) -> None:
+        self._bin = bin_
+        self._home = folder
+        self._data = folder / "data"
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port: int = free.getsockname()[1]
+        self._run("initdb", "-D", str(self._data), "-U", "aa", "-A", "trust", "-E", "UTF8",
+                  "--locale=C", "--no-instructions", "--no-sync")  # fmt: skip
+        lines = "".join(f"{name} = '{value}'\n" for name, value in _SETTINGS.items())
+        with (self._data / "postgresql.conf").open("a") as file:
+            file.write(f"{lines}port = {self.port}\n")
+
+    def url(self, database: str, port: int | None = None) -> str:
+        """How a journal is told of a database here."""
+        return f"postgresql://aa@127.0.0.1:{port or self.port}/{database}"
+
+    def start(self) -> None:
+        """Start, and wait until it answers."""
+        self._ctl("start", "-l", str(self._home / "log"))
+
+    def stop(self, mode: str = "immediate") -> None:
+        """Stop; `immediate` is what a crash of the server is."""
+        self._ctl("stop", "-m", mode)
+
+    def sql(self, text: str, database: str = "postgres") -> None:
+        """Run SQL as the owner."""
+        self._run("psql", "-q", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(self.port),
+                  "-U", "aa", "-d", database, "-c", text)  # fmt: skip
+
+    def _ctl(self, command: str, *options: str) -> None:
+        self._run("pg_ctl", command, "-w", "-s", "-t", "60", "-D", str(self._data), *options)
+
+    def _run(self, program: str, *arguments: str) -> None:
+        user = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if os.geteuid() == 0 else {}
+        subprocess.run(
+            [str(self._bin / program), *arguments],
+            check=True,
+            cwd=self._home,
+            env={"PATH": os.environ["PATH"], "LC_ALL": "C", "HOME": str(self._home)},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            timeout=90,
+            **user,  # type: ignore[call-overload]
+        )
+
+
+@contextlib.contextmanager
+def server() -> Iterator[Server]:
+    """A server that runs, and is gone afterwards."""
+    bin_ = binaries()
+    assert bin_ is not None
+    folder = Path(tempfile.mkdtemp(prefix="aa-postgres-"))
+    try:
+        if os.geteuid() == 0:
+            os.chown(folder, NOBODY, NOBODY)
+        one = Server(folder, bin_)
+        one.start()
+        try:
+            yield one
+        finally:
+            with contextlib.suppress(subprocess.CalledProcessError):
+                one.stop()  # may be stopped already
+    finally:
+        shutil.rmtree(folder)
