@@ -121,7 +121,7 @@ def _editor(options: argparse.Namespace) -> int:
 
     _log()
     chosen = _editor_settings(options, settings.writable_folder(options.data.resolve()))
-    listen(create_app(chosen), host=chosen.host, port=chosen.port)
+    listen(lambda: create_app(chosen), host=chosen.host, port=chosen.port)
     return 0
 
 
@@ -140,7 +140,7 @@ def _runner(options: argparse.Namespace) -> int:
         hosts=hosts,
         limits=settings.limits(),
     )
-    listen(create_app(chosen), host=chosen.host, port=chosen.port)
+    listen(lambda: create_app(chosen), host=chosen.host, port=chosen.port)
     return 0
 
 

@@ -5,6 +5,7 @@ import errno
 import os
 import socket
 import threading
+from collections.abc import Callable
 from typing import Any, Final
 
 import uvicorn
@@ -18,10 +19,18 @@ GRACE: Final = 5  # seconds that open requests get when the process is told to e
 UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it was sent is gone
 
 
-def serve(app: ASGIApp, *, host: str, port: int) -> None:
-    """Serve until told to end. Raises CannotStart when the address is taken or unknown."""
+def serve(make: Callable[[], ASGIApp], *, host: str, port: int) -> None:
+    """Serve what `make` makes until told to end; nothing is touched before the address is ours.
+
+    Raises CannotStart when the address is taken or unknown.
+    """
     sockets = bound(host, port)
-    endings = Endings(app)
+    try:
+        endings = Endings(make())
+    except BaseException:
+        for listener in sockets:
+            listener.close()
+        raise
     config = uvicorn.Config(
         endings,
         lifespan="on",
