@@ -356,3 +356,18 @@ def test_any_json_is_read_or_refused(value: object) -> None:
 def test_json_text_is_spelled_back(text: str) -> None:
     value = {"k": [text]} if text.isprintable() else {"k": []}
     assert json.loads(dump(parse(json.dumps(value)))) == value
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ('{"a": "NaN",\n "b": NaN}', (2, 7)),
+        ('{"graph_name": "g", "x": -Infinity}', (1, 26)),
+        ('{"a":\n 1e999}', (2, 2)),
+        ('{"[[[": ' + "[" * 70, (1, 72)),
+    ],
+)
+def test_what_json_cannot_hold_is_refused_with_its_place(text: str, place: tuple[int, int]) -> None:
+    with pytest.raises(Unreadable) as refused:
+        read(text)
+    assert (refused.value.line, refused.value.column) == place

@@ -8,6 +8,7 @@ import json
 import math
 import re
 from collections.abc import Iterator
+from itertools import accumulate
 from json.encoder import encode_basestring as quote
 from typing import Any, Final, NoReturn, TypeAlias
 
@@ -71,14 +72,14 @@ def parse(text: str | bytes) -> Json:
     """The value of a JSON text. Raises `Unreadable`."""
     text = _decoded(text)
     _bound(text)
-    hooks = _Hooks()
+    hooks = _Hooks(text)
     try:
         value: Json = json.loads(
             text,
             object_pairs_hook=hooks.pairs,
             parse_int=hooks.number,
             parse_float=hooks.number,
-            parse_constant=_no_constant,
+            parse_constant=hooks.constant,
         )
     except json.JSONDecodeError as e:
         message = f"This is not JSON: {e.msg} at line {e.lineno}, column {e.colno}."
@@ -126,8 +127,9 @@ def number(value: float) -> Number:
 class _Hooks:
     """What the scanner calls for every object and number."""
 
-    def __init__(self) -> None:
+    def __init__(self, text: str) -> None:
         self.doubled = False
+        self._text = text
 
     def pairs(self, pairs: list[tuple[str, Json]]) -> dict[str, Json]:
         members = dict(pairs)
@@ -145,14 +147,31 @@ class _Hooks:
 
     def number(self, text: str) -> Number:
         if len(text) > MAX_NUMBER or math.isinf(float(text)):
-            raise Unreadable(
-                "number-too-big", f"The number {text[:30]}… is too big for the engine to read."
-            )
+            line, column = self._where(text)
+            message = f"The number {text[:30]}… at line {line}, column {column} is too big for the engine to read."
+            raise Unreadable("number-too-big", message, line=line, column=column)
         return Number(text)
 
+    def constant(self, name: str) -> NoReturn:
+        line, column = self._where(name)
+        message = (
+            f"This is not JSON: {name} at line {line}, column {column}; JSON knows no such number."
+        )
+        raise Unreadable("not-json", message, line=line, column=column)
 
-def _no_constant(name: str) -> NoReturn:
-    raise Unreadable("not-json", f"This is not JSON: it contains {name}, which JSON does not know.")
+    def _where(self, token: str) -> tuple[int, int]:
+        """Where a token stands first; the scanner does not say."""
+        return _place(self._text, _without_strings(self._text).find(token))
+
+
+def _without_strings(text: str) -> str:
+    """The text with blanks for its strings, so that offsets stay."""
+    return _STRING.sub(lambda found: " " * len(found[0]), text)
+
+
+def _place(text: str, offset: int) -> tuple[int, int]:
+    """Line and column, both from 1."""
+    return text.count("\n", 0, offset) + 1, offset - text.rfind("\n", 0, offset)
 
 
 def _decoded(text: str | bytes) -> str:
@@ -178,11 +197,19 @@ def _bound(text: str) -> None:
         if sign in "[{":
             depth += 1
             if depth > MAX_DEPTH:
-                raise Unreadable(
-                    "too-deep", f"The text is nested more than {MAX_DEPTH} levels deep."
-                )
+                raise _too_deep(text)
         else:
             depth -= 1
+
+
+def _too_deep(text: str) -> Unreadable:
+    signs = _without_strings(text)
+    depths = accumulate((sign in "[{") - (sign in "]}") for sign in signs)
+    line, column = _place(text, next(n for n, depth in enumerate(depths) if depth > MAX_DEPTH))
+    message = (
+        f"The text is nested more than {MAX_DEPTH} levels deep at line {line}, column {column}."
+    )
+    return Unreadable("too-deep", message, line=line, column=column)
 
 
 def _walk(value: Json, path: str = "") -> Iterator[tuple[str, Json]]:
