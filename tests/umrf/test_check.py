@@ -273,6 +273,12 @@ def test_facts_decide_which_hazards_there_are() -> None:
     assert check(graph, None, fixed) == []
 
 
+def test_of_equal_problems_the_first_thousand_are_told() -> None:
+    many = [{"name": f"Z{i}"} for i in range(5_000)]
+    graph = file(A | {"children": [{"name": "B"}, *many]}, B)
+    assert [p.code for p in problems(graph)] == ["ghost"] * 1_000
+
+
 def test_errors_come_first_and_every_path_leads_somewhere() -> None:
     found_ = problems(file(A, B, B, action("C"), exits=[]))
     severities = [problem.severity for problem in found_]

@@ -117,3 +117,19 @@ def test_what_was_translated_is_a_current_file() -> None:
     for verdict in verdicts():
         again = read(write(read((SHARED / verdict["file"]).read_bytes()).graph))
         assert (again.dialect, again.notes, again.problems) == ("D3", (), ()), verdict["file"]
+
+
+def test_what_was_written_from_an_old_file_is_not_old_even_if_a_field_could_not_be_translated() -> (
+    None
+):
+    parent = {"name": "A", "condition": ["what is this"]}
+    actions = [
+        {"name": "A", "type": "sync", "children": [{"name": "B"}]},
+        {"name": "B", "type": "sync", "parents": [parent]},
+    ]
+    ends = {"graph_entry": [{"name": "A"}], "graph_exit": [{"name": "B"}]}
+    first = read(json.dumps({"graph_name": "g", "actions": actions} | ends))
+    text = write(first.graph)
+    assert first.dialect == "D2"
+    assert "what is this" in text
+    assert read(text).dialect == "D3"

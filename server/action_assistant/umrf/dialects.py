@@ -46,7 +46,8 @@ def _action_dialect(file: dict[str, Json]) -> str | None:
 
 def _is_d2(action: dict[str, Json]) -> bool:
     return isinstance(action.get("state"), Number) or any(
-        "condition" in parent for parent in items_of(action, "parents")
+        "condition" in parent and "conditions" not in parent
+        for parent in items_of(action, "parents")
     )
 
 

@@ -81,7 +81,7 @@ def action_attributes(
     if isinstance(ours, dict):
         del rest["action_assistant"]
     if position is not None and isinstance(point, dict):
-        rest["position"] = {key: member for key, member in point.items() if key not in "xy"}
+        rest["position"] = {key: member for key, member in point.items() if key not in ("x", "y")}
         if not rest["position"]:
             del rest["position"]
     known = aid if isinstance(aid, str) and AID.fullmatch(aid) else None

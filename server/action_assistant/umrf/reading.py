@@ -34,6 +34,8 @@ from action_assistant.umrf.model import (
 )
 from action_assistant.umrf.relations import conditions_of, remap_of
 
+#: Problems of one code that are kept.
+MAX_EACH: Final = 1_000
 NODE_STATES: Final = {
     "UNINITIALIZED", "INITIALIZED", "RUNNING", "PAUSE_REQUESTED", "PAUSED", "STOPPING", "FINISHED",
     "BYPASSED", "ERROR",
@@ -91,6 +93,7 @@ class _Item(msgspec.Struct):
 class _Reader:
     def __init__(self) -> None:
         self.problems: list[Problem] = []
+        self.told: dict[str, int] = {}
         self.states: dict[Key, str] = {}
         self.actions: list[Action] = []
         self.by_name: dict[_Name, list[int]] = {}
@@ -98,8 +101,10 @@ class _Reader:
         self.listing: list[list[_Item]] = []
 
     def report(self, code: str, path: str, message: str) -> None:
-        where = Where(path=path)
-        self.problems.append(Problem(code=code, severity="error", where=where, message=message))
+        self.told[code] = self.told.get(code, 0) + 1
+        if self.told[code] <= MAX_EACH:
+            where = Where(path=path)
+            self.problems.append(Problem(code=code, severity="error", where=where, message=message))
 
     # The graph
 

@@ -1,6 +1,7 @@
 """Where things of a graph stand in its canonical file, and how problems name them."""
 
 from collections.abc import Iterator
+from typing import Final
 
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.jsontext import pointer
@@ -18,6 +19,9 @@ from action_assistant.umrf.model import (
 from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.writing import name_order
 
+#: Problems of one code and severity that are kept.
+MAX_EACH: Final = 1_000
+
 
 class Subject:
     """A graph under examination, indexed, with the problems found so far."""
@@ -26,6 +30,7 @@ class Subject:
         self.graph = graph
         self.facts = facts
         self.problems: list[Problem] = []
+        self._told: dict[str, int] = {}
         self.actions: dict[Key, Action] = {action.key: action for action in graph.actions}
         self.real = [action for action in graph.actions if not action.missing]
         self.paths: dict[Key, str] = {
@@ -100,7 +105,14 @@ class Subject:
         member: str = "",
         fix: str | None = None,
     ) -> None:
-        """Adds a problem of the graph, of an action or of a relation; `member` goes below it."""
+        """Adds a problem of the graph, of an action or of a relation; `member` goes below it.
+
+        Only the first `MAX_EACH` of one code and severity: more help nobody and fill the memory.
+        """
+        kind = f"{severity} {code}"
+        self._told[kind] = self._told.get(kind, 0) + 1
+        if self._told[kind] > MAX_EACH:
+            return
         where = Where(path=member)
         if action is not None:
             where = Where(path=self.paths.get(action.key, "") + member, aid=action.key)

@@ -1,0 +1,67 @@
+"""What must hold for any bytes that somebody calls a UMRF file."""
+
+import resource
+import time
+
+from action_assistant.umrf.check import blocking, check_reading, refused_by_parser
+from action_assistant.umrf.codec import Reading, Unreadable, read, stamp_of, write
+from action_assistant.umrf.codes import CODES
+from action_assistant.umrf.digest import digest
+from action_assistant.umrf.echo import echo
+from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.fixes import fix
+from action_assistant.umrf.jsontext import MAX_BYTES
+from action_assistant.umrf.semantics import simulate
+
+MEGABYTES = 1_500  # of the whole process: the interpreter, the fuzzer, ten times the text
+
+
+def examine(data: bytes) -> bool:
+    """Whether the bytes are a graph. Raises AssertionError, or whatever must not be raised."""
+    started = time.process_time()
+    try:
+        reading = read(data)
+    except Unreadable as error:
+        refusal = error
+    else:
+        return _examine_graph(data, reading, started)
+    assert refusal.code in CODES
+    assert refusal.message
+    return False
+
+
+def _examine_graph(data: bytes, reading: Reading, started: float) -> bool:
+    stamp_of(data)
+    problems = check_reading(reading)
+    for problem in problems:
+        assert problem.severity in CODES[problem.code].severities, problem
+        assert problem.message
+    assert set(refused_by_parser(reading)) <= set(problems)
+    assert set(blocking(problems)) <= set(problems)
+    _round_trip(data)
+    digest(echo(reading.graph, PINNED))
+    if len(data) < 50_000:
+        for problem in problems[:20]:
+            fix(reading.graph, problem)
+        for facts in (PINNED, None):
+            chosen = {} if facts is None else {"facts": facts}
+            trace = simulate(reading.graph, states=reading.states, max_events=300, **chosen)
+            assert sum(1 for _ in trace) <= 300
+    spent = time.process_time() - started
+    allowed = 2 + 20e-6 * len(data) + 200e-6 * data.count(b"{")
+    assert spent < allowed, f"{spent:.1f} s for {len(data)} bytes"
+    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    assert used < MEGABYTES, f"{used:.0f} MB"
+    return True
+
+
+def _round_trip(data: bytes) -> None:
+    """What is written is read as the same; writing that again changes nothing."""
+    graph = read(data).graph
+    text = write(graph)
+    if len(text) > MAX_BYTES:
+        return
+    again = read(text)
+    assert again.dialect == "D3", again.dialect
+    assert digest(again.graph) == digest(graph)
+    assert write(again.graph) == text
