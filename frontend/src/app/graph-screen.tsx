@@ -63,6 +63,7 @@ function Inside({ id }: { id: string }) {
       me={person.id}
       known={known}
       progress={progress}
+      run={live?.ended_at === null ? live.id : null}
       bar={(parts) => <TitledBar id={id} {...parts} />}
       list={(place) => <Sidebar current={id} onNew={create} onImport={choose} onPlace={place} />}
       status={(shown: Shown) => (
@@ -83,6 +84,8 @@ function Inside({ id }: { id: string }) {
           versionLabel={label}
           selected={shown.selected}
           onPick={shown.pick}
+          folded={shown.folded}
+          onFold={shown.fold}
         />
       )}
       corner={<LiveWord />}

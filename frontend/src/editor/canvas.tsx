@@ -30,13 +30,9 @@ interface Props {
   me: string;
   /** There is room for a map. */
   map: boolean;
+  /** The person has moved the view. */
+  onPanned: () => void;
 }
-
-/** The whole graph in view, clear of the tools below. */
-export const WHOLE = {
-  maxZoom: 1,
-  padding: { top: "28px", bottom: "72px", left: "28px", right: "28px" },
-} as const;
 
 function outcomeOf(handle: string | null | undefined): Precondition {
   return handle === "on_false" || handle === "on_error" || handle === "on_stopped"
@@ -57,7 +53,7 @@ function nodeAt([x, y]: Position): string | null {
   return hit?.dataset.id ?? null;
 }
 
-export function Canvas({ bench, canvas, me, map }: Props) {
+export function Canvas({ bench, canvas, me, map, onPanned }: Props) {
   const { doc, presence } = useRoom();
   const { flow } = canvas;
   const frame = useRef<HTMLDivElement>(null);
@@ -147,8 +143,10 @@ export function Canvas({ bench, canvas, me, map }: Props) {
         multiSelectionKeyCode={["Shift", "Meta", "Control"]}
         minZoom={0.08}
         maxZoom={2.2}
-        fitView
-        fitViewOptions={WHOLE}
+        onMoveStart={(event) => {
+          // A move without an event is the page's own.
+          if (event !== null) onPanned();
+        }}
         onlyRenderVisibleElements={canvas.nodes.length > 150}
         nodeDragThreshold={3}
         proOptions={{ hideAttribution: true }}

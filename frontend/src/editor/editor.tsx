@@ -1,6 +1,6 @@
 /** The editor of one graph: list, canvas, details and run strip, arranged for the screen at hand. */
 import { ActionIcon, SegmentedControl } from "@mantine/core";
-import { useMediaQuery } from "@mantine/hooks";
+import { useLocalStorage, useMediaQuery } from "@mantine/hooks";
 import { IconLayoutSidebar, IconLayoutSidebarRight } from "@tabler/icons-react";
 import { type ReactNode, useCallback, useMemo, useState, useSyncExternalStore } from "react";
 import { type Problems, useProblems } from "../api/graphs";
@@ -8,7 +8,7 @@ import type { Progress } from "../api/progress";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import { useLink } from "../room/use-room";
-import type { ProblemCount } from "../ui/canvas/elements";
+import { marksOf } from "../ui/canvas/marks";
 import { actionCarrier } from "../ui/carry";
 import type { Crumb } from "../ui/top-bar";
 import { type Bench, BenchContext, freePlace, type Panel, placeAction } from "./bench";
@@ -32,6 +32,9 @@ export interface Shown {
   selected: string | null;
   pick: (aid: string) => void;
   compact: boolean;
+  /** The strip shows its head only. Null where it has a place of its own. */
+  folded: boolean | null;
+  fold: (folded: boolean) => void;
 }
 
 export interface BarParts {
@@ -46,6 +49,8 @@ interface Props {
   me: string;
   known: readonly NewAction[];
   progress: ReadonlyMap<Key, Progress>;
+  /** The run that goes, if one does. */
+  run: string | null;
   bar: (parts: BarParts) => ReactNode;
   list: (place: (template: NewAction) => void) => ReactNode;
   strip: (shown: Shown) => ReactNode;
@@ -62,18 +67,6 @@ const PANES = [
   { value: "details", label: "Details" },
   { value: "run", label: "Run" },
 ];
-
-function countsOf(problems: Problems | undefined): Map<Key, ProblemCount> {
-  const counts = new Map<Key, { error: number; warning: number }>();
-  for (const { severity, where } of problems?.problems ?? []) {
-    const key = where.aid ?? where.relation?.split(">")[1]?.split(";")[0];
-    if (!key) continue;
-    const count = counts.get(key) ?? { error: 0, warning: 0 };
-    count[severity] += 1;
-    counts.set(key, count);
-  }
-  return counts;
-}
 
 function obstacleOf(
   bench: Bench,
@@ -97,6 +90,11 @@ export function Editor(props: Props) {
   const [left, setLeft] = useState(false);
   const [right, setRight] = useState(false);
   const [pane, setPane] = useState<Pane>("canvas");
+  const [folded, setFolded] = useLocalStorage({
+    key: "aa.strip-folded",
+    defaultValue: false,
+    getInitialValueInEffect: false,
+  });
   const carrying = useSyncExternalStore(actionCarrier.subscribe, actionCarrier.now) !== null;
   const onPanel = useCallback((_: Panel) => {
     setRight(true);
@@ -106,7 +104,7 @@ export function Editor(props: Props) {
   const { bench, panel, adding, sight, closeAdd } = useEditor(id, onPanel);
   const link = useLink();
   const problems = useProblems(id, link.seq).data;
-  const counts = useMemo(() => countsOf(problems), [problems]);
+  const marks = useMemo(() => marksOf(problems?.problems ?? []), [problems]);
   useShortcuts(bench);
 
   const place = (template: NewAction) => {
@@ -128,14 +126,18 @@ export function Editor(props: Props) {
       bench.view.show([aid]);
     },
     compact: !wide,
+    folded: phone ? null : folded,
+    fold: setFolded,
   };
   const stage = (
     <Stage
       me={props.me}
       sight={sight}
       progress={progress}
-      problems={counts}
+      marks={marks}
       compact={!wide}
+      phone={phone}
+      run={props.run}
       corner={phone ? null : props.corner}
     />
   );

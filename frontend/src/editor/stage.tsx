@@ -1,32 +1,35 @@
 /** The canvas with its tools, and what it says while it is empty. */
 import { Button, Skeleton } from "@mantine/core";
-import { IconRouteAltLeft } from "@tabler/icons-react";
+import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useRef } from "react";
 import type { Progress } from "../api/progress";
-import type { Key, Position } from "../graph/model";
+import type { Key } from "../graph/model";
 import { useLink } from "../room/use-room";
-import { CARD } from "../ui/canvas/arrange";
-import type { ProblemCount } from "../ui/canvas/elements";
+import type { Marks } from "../ui/canvas/marks";
 import { Empty } from "../ui/empty";
 import { useBench } from "./bench";
-import { Canvas, WHOLE } from "./canvas";
+import { Canvas } from "./canvas";
 import style from "./stage.module.css";
 import { Toolbar } from "./toolbar";
 import type { EditorState } from "./use-bench";
 import { useCanvas } from "./use-canvas";
+import { useView } from "./use-view";
 
 interface Props {
   me: string;
   sight: EditorState["sight"];
   progress: ReadonlyMap<Key, Progress>;
-  problems: ReadonlyMap<Key, ProblemCount>;
+  marks: Marks;
   compact: boolean;
+  phone: boolean;
+  /** The run that goes, if one does: the view follows it. */
+  run: string | null;
   /** In the lower right corner. */
   corner: ReactNode;
 }
 
-function Inside({ me, sight, progress, problems, compact, corner }: Props) {
+function Inside({ me, sight, progress, marks, compact, phone, run, corner }: Props) {
   const bench = useBench();
   const link = useLink();
   const canvas = useCanvas({
@@ -35,53 +38,25 @@ function Inside({ me, sight, progress, problems, compact, corner }: Props) {
     selection: bench.selection,
     select: bench.select,
     progress,
-    problems,
+    marks,
   });
   const { flow, places, sizes } = canvas;
   const frame = useRef<HTMLDivElement>(null);
-  useEffect(() => {
-    sight.current = {
-      places: () => places,
-      sizes: () => sizes,
-      view: {
-        fit: () => void flow.fitView({ ...WHOLE, duration: 200 }),
-        zoomIn: () => void flow.zoomIn({ duration: 120 }),
-        zoomOut: () => void flow.zoomOut({ duration: 120 }),
-        show: (keys) =>
-          void flow.fitView({ nodes: keys.map((id) => ({ id })), maxZoom: 1, duration: 250 }),
-        reveal: ([x, y]) => {
-          const box = frame.current?.getBoundingClientRect();
-          const a = flow.flowToScreenPosition({ x, y });
-          const b = flow.flowToScreenPosition({ x: x + CARD.width, y: y + CARD.height });
-          const inside =
-            box && a.x > box.left && b.x < box.right && a.y > box.top && b.y < box.bottom - 64;
-          if (inside) return;
-          const zoom = flow.getZoom();
-          void flow.setCenter(x + CARD.width / 2, y, { zoom, duration: 200 });
-        },
-        middle: (): Position => {
-          const box = frame.current?.getBoundingClientRect();
-          const [x, y] = box ? [box.left + box.width / 2, box.top + box.height / 3] : [0, 0];
-          const at = flow.screenToFlowPosition({ x, y });
-          return [Math.round(at.x), Math.round(at.y)];
-        },
-        screenOf: ([x, y]): Position => {
-          const at = flow.flowToScreenPosition({ x, y });
-          return [at.x, at.y];
-        },
-      },
-    };
-  }, [sight, flow, places, sizes]);
-
-  // The first view is of the whole graph, which arrives after the canvas.
   const arrived = link.seq > 0;
   const begun = arrived && bench.graph.actions.length > 0;
-  // biome-ignore lint/correctness/useExhaustiveDependencies: once, when the graph is there
+  const { view, lost, onPanned, onFollow } = useView({
+    flow,
+    frame,
+    places,
+    sizes,
+    phone,
+    begun,
+    progress,
+    run,
+  });
   useEffect(() => {
-    if (!begun) return;
-    const timer = setTimeout(() => void flow.fitView(WHOLE), 60);
-    return () => clearTimeout(timer);
-  }, [arrived]);
+    sight.current = { places: () => places, sizes: () => sizes, view };
+  }, [sight, view, places, sizes]);
 
   return (
     <div className={style.stage} ref={frame}>
@@ -90,6 +65,7 @@ function Inside({ me, sight, progress, problems, compact, corner }: Props) {
         canvas={canvas}
         me={me}
         map={!compact && bench.graph.actions.length > 3}
+        onPanned={onPanned}
       />
       {!arrived && (
         <div className={style.waiting} aria-busy="true">
@@ -116,7 +92,14 @@ function Inside({ me, sight, progress, problems, compact, corner }: Props) {
       <div className={style.tools}>
         <Toolbar compact={compact} />
       </div>
-      <div className={style.corner}>{corner}</div>
+      <div className={style.corner}>
+        {lost && (
+          <Button size="compact-sm" leftSection={<IconFocus2 size={15} />} onClick={onFollow}>
+            Follow the run
+          </Button>
+        )}
+        {corner}
+      </div>
     </div>
   );
 }

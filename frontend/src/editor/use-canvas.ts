@@ -12,14 +12,8 @@ import type { Graph, Key, Position } from "../graph/model";
 import type { Person } from "../room/presence";
 import { usePeople, useRoom } from "../room/use-room";
 import { type Places, placesOf, unplaced } from "../ui/canvas/arrange";
-import {
-  type Arrow,
-  type CanvasNode,
-  edgesOf,
-  keep,
-  nodesOf,
-  type ProblemCount,
-} from "../ui/canvas/elements";
+import { type Arrow, type CanvasNode, edgesOf, keep, nodesOf } from "../ui/canvas/elements";
+import type { Marks } from "../ui/canvas/marks";
 import { colorsOf } from "../ui/robot";
 
 export interface Size {
@@ -33,7 +27,7 @@ interface Given {
   selection: ReadonlySet<string>;
   select: (ids: Iterable<string>) => void;
   progress: ReadonlyMap<Key, Progress>;
-  problems: ReadonlyMap<Key, ProblemCount>;
+  marks: Marks;
 }
 
 /** Where everything stands while people drag it. */
@@ -71,7 +65,7 @@ export function selectionAfter(
   return same ? before : next;
 }
 
-export function useCanvas({ me, graph, selection, select, progress, problems }: Given) {
+export function useCanvas({ me, graph, selection, select, progress, marks }: Given) {
   const { doc, presence } = useRoom();
   const people = usePeople();
   const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
@@ -91,7 +85,7 @@ export function useCanvas({ me, graph, selection, select, progress, problems }: 
       ),
     );
   }, [me, people]);
-  const options = { others, places, selected: selection, progress, problems, measured: sizes };
+  const options = { others, places, selected: selection, progress, marks, measured: sizes };
   const nodes = keep(drawn.current.nodes, nodesOf(graph, options));
   const edges = keep(drawn.current.edges, edgesOf(graph, options));
   useEffect(() => {

@@ -1,6 +1,6 @@
 /** The strip under the canvas: the newest run of the graph as it goes. */
-import { Button, Text } from "@mantine/core";
-import { IconTimeline } from "@tabler/icons-react";
+import { ActionIcon, Button, Text } from "@mantine/core";
+import { IconChevronDown, IconChevronUp, IconTimeline } from "@tabler/icons-react";
 import { useMemo } from "react";
 import { Link } from "wouter";
 import { authorName } from "../api/graphs";
@@ -21,18 +21,35 @@ interface Props {
   versionLabel: string;
   selected: string | null;
   onPick: (aid: string) => void;
+  /** Only the head is shown; null: it cannot be folded. */
+  folded: boolean | null;
+  onFold: (folded: boolean) => void;
 }
 
-export function RunStrip({ run, graph, versionLabel, selected, onPick }: Props) {
+function FoldButton({ folded, onFold }: { folded: boolean; onFold: (folded: boolean) => void }) {
+  const Sign = folded ? IconChevronUp : IconChevronDown;
+  return (
+    <ActionIcon
+      size={24}
+      aria-label={folded ? "Show the lanes" : "Hide the lanes"}
+      aria-expanded={!folded}
+      onClick={() => onFold(!folded)}
+    >
+      <Sign size={16} aria-hidden />
+    </ActionIcon>
+  );
+}
+
+export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, onFold }: Props) {
   const { now } = useLive();
   const goes = run?.ended_at === null;
   const present = useNow(250, goes);
   const lanes = useMemo(() => (run ? lanesOf(run, graph) : []), [run, graph]);
   if (run === undefined)
-    return <section className={style.strip} aria-busy="true" aria-label="Run" />;
+    return <section className={style.strip} data-low aria-busy="true" aria-label="Run" />;
   if (run === null) {
     return (
-      <section className={style.strip} aria-label="Run">
+      <section className={style.strip} data-low aria-label="Run">
         <div className={style.none}>
           <IconTimeline size={18} aria-hidden />
           <span>
@@ -51,7 +68,12 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick }: Props) 
   const alarm = run.alarms.at(-1);
   const unsure = down && goes;
   return (
-    <section className={style.strip} aria-label="Run">
+    <section
+      className={style.strip}
+      data-low={folded === true || undefined}
+      data-alone={folded === null || undefined}
+      aria-label="Run"
+    >
       <header className={style.head}>
         <b>Run {run.number}</b>
         <span className={style.version}>{versionLabel}</span>
@@ -76,15 +98,18 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick }: Props) 
         <Button component={Link} to={`/runs/${run.id}`} size="compact-xs" variant="subtle">
           Open run
         </Button>
+        {folded !== null && <FoldButton folded={folded} onFold={onFold} />}
       </header>
-      <Timeline
-        run={run}
-        lanes={lanes}
-        until={until}
-        unsure={unsure}
-        selected={selected}
-        onPick={onPick}
-      />
+      {folded !== true && (
+        <Timeline
+          run={run}
+          lanes={lanes}
+          until={until}
+          unsure={unsure}
+          selected={selected}
+          onPick={onPick}
+        />
+      )}
     </section>
   );
 }

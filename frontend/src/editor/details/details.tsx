@@ -8,7 +8,7 @@ import { ActionForm } from "./action-form";
 import style from "./details.module.css";
 import { GraphForm } from "./graph-form";
 import { JsonView } from "./json-view";
-import { ProblemList } from "./problems";
+import { ProblemList, ProblemsHere } from "./problems";
 import { RelationForm } from "./relation-form";
 import { RunsWhen } from "./runs-when";
 
@@ -75,6 +75,7 @@ export function Details({ id, seq, panel, problems }: Props) {
         </Tabs.Tab>
       </Tabs.List>
       <Tabs.Panel value="details" className={style.panel ?? ""}>
+        <ProblemsHere problems={problems} />
         <Properties />
       </Tabs.Panel>
       <Tabs.Panel value="json" className={style.panel ?? ""} data-fill>

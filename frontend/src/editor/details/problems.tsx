@@ -1,37 +1,100 @@
-/** What is wrong with the graph, what it would do, and where. */
-import { IconCircleCheck } from "@tabler/icons-react";
+/** What is wrong with the graph, what it would do, where, and what mends it. */
+import { Button } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconCircleCheck, IconTool } from "@tabler/icons-react";
 import type { Problem, Problems } from "../../api/graphs";
-import { type Bench, useBench } from "../bench";
+import { ABOUT, applyFix, applySafe, fixOf, safeOnes } from "../../graph/fixes";
+import { relationId } from "../../graph/layout";
+import type { Graph } from "../../graph/model";
+import { bySeverity, placeOf } from "../../ui/canvas/marks";
+import { type Bench, endName, useBench } from "../bench";
 import style from "./problems.module.css";
 
-/** What on the canvas a problem is about: an action or a relation of the graph. */
-export function placeOf(_bench: Bench, problem: Problem): string | null {
-  return problem.where.relation ?? problem.where.aid ?? null;
+/** Where a problem is, as a person would say it; empty for the graph as a whole. */
+function placeWords(graph: Graph, place: string | null): string {
+  if (place === null) return "";
+  const relation = graph.relations.find((candidate) => relationId(candidate) === place);
+  if (relation) return `${endName(graph, relation.parent)} → ${endName(graph, relation.child)}`;
+  const action = graph.actions.find((candidate) => candidate.key === place);
+  return action ? endName(graph, action.key) : "";
 }
 
-function ProblemItem({ problem }: { problem: Problem }) {
+/** Shows the place of a problem on the canvas and selects it. */
+function jump(bench: Bench, place: string): void {
+  bench.select([place]);
+  bench.view.show(place.split(">").map((end) => end.split(";")[0] ?? end));
+}
+
+function tellNothing(): void {
+  notifications.show({ message: "There was nothing left to fix.", autoClose: 4_000 });
+}
+
+function ProblemItem({ problem, jumps }: { problem: Problem; jumps: boolean }) {
   const bench = useBench();
-  const place = placeOf(bench, problem);
-  const jump = () => {
-    if (place === null) return;
-    bench.select([place]);
-    bench.view.show(place.split(">").map((end) => end.split(";")[0] ?? end));
-  };
+  const place = placeOf(problem);
+  const words = placeWords(bench.graph, place);
+  const fix = fixOf(problem);
   const severity = problem.severity === "error" ? "Error" : "Warning";
   return (
-    <li className={style.problem} data-severity={problem.severity}>
+    <li className={style.problem} data-severity={problem.severity} data-code={problem.code}>
       <div className={style.head}>
         <b className={style.code}>{problem.code}</b>
         <span className={style.severity}>{severity}</span>
-        {place !== null && (
-          <button type="button" className={style.jump} onClick={jump}>
-            Show
+        {jumps && place !== null && words !== "" && (
+          <button
+            type="button"
+            className={style.jump}
+            onClick={() => jump(bench, place)}
+            aria-label={`Show ${words}`}
+          >
+            {words}
           </button>
         )}
       </div>
       <p>{problem.message}</p>
-      {problem.fix && <p className={style.fix}>{problem.fix}</p>}
+      {fix !== null && (
+        <Button
+          size="compact-sm"
+          mt={6}
+          leftSection={<IconTool size={14} aria-hidden />}
+          aria-label={`Fix ${problem.code}: ${ABOUT[fix].words}`}
+          onClick={() => {
+            if (!applyFix(bench.doc, problem)) tellNothing();
+          }}
+        >
+          {ABOUT[fix].words}
+        </Button>
+      )}
     </li>
+  );
+}
+
+function Items({ problems, jumps }: { problems: readonly Problem[]; jumps: boolean }) {
+  return (
+    <ul className={style.items}>
+      {problems.map((problem, i) => (
+        <ProblemItem
+          key={`${problem.code} ${problem.where.path ?? ""} ${placeOf(problem) ?? i}`}
+          problem={problem}
+          jumps={jumps}
+        />
+      ))}
+    </ul>
+  );
+}
+
+/** The problems of what is selected, with it. */
+export function ProblemsHere({ problems }: { problems: Problems | undefined }) {
+  const { selection } = useBench();
+  const here = bySeverity(problems?.problems ?? []).filter((problem) => {
+    const place = placeOf(problem);
+    return place !== null && selection.has(place);
+  });
+  if (here.length === 0 || selection.size > 1) return null;
+  return (
+    <section className={style.here} aria-label="Problems of what is selected">
+      <Items problems={here} jumps={false} />
+    </section>
   );
 }
 
@@ -41,8 +104,10 @@ interface Props {
 }
 
 export function ProblemList({ problems, seq }: Props) {
+  const bench = useBench();
   if (!problems) return <p className={style.checked}>Checking …</p>;
-  const order = [...problems.problems].sort((a, b) => a.severity.localeCompare(b.severity));
+  const order = bySeverity(problems.problems);
+  const safe = safeOnes(order).length;
   return (
     <div className={style.list}>
       {order.length === 0 && (
@@ -50,14 +115,20 @@ export function ProblemList({ problems, seq }: Props) {
           <IconCircleCheck size={18} aria-hidden /> No problem found.
         </p>
       )}
-      <ul>
-        {order.map((problem, i) => (
-          <ProblemItem
-            key={`${problem.code} ${problem.where.path ?? ""} ${problem.where.relation ?? i}`}
-            problem={problem}
-          />
-        ))}
-      </ul>
+      {safe > 1 && (
+        <Button
+          fullWidth
+          mb="sm"
+          leftSection={<IconTool size={15} aria-hidden />}
+          title="Everything that can be mended without losing what was drawn. One undo takes it back."
+          onClick={() => {
+            if (applySafe(bench.doc, order) === 0) tellNothing();
+          }}
+        >
+          Fix all {safe} safe ones
+        </Button>
+      )}
+      <Items problems={order} jumps />
       <p className={style.checked}>
         Checked at moment {problems.seq}
         {problems.seq < seq && `, now ${seq}: checking again …`}

@@ -1,5 +1,5 @@
 /** An action on the canvas: robot, name, state, two parameters; input above, four outcomes below. */
-import { IconAlertTriangleFilled, IconGhost2 } from "@tabler/icons-react";
+import { IconGhost2 } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo } from "react";
 import type { Progress } from "../../api/progress";
@@ -8,7 +8,8 @@ import { robotColor } from "../robot";
 import { StateWord } from "../state-word";
 import { duration, stopwatch, useNow } from "../when";
 import style from "./action-card.module.css";
-import type { CardNode, ProblemCount } from "./elements";
+import type { CardNode } from "./elements";
+import { ProblemBadge } from "./problem-badge";
 import { cardLines, lineText } from "./value-text";
 
 function ProgressLine({ progress }: { progress: Progress | null }) {
@@ -23,24 +24,12 @@ function ProgressLine({ progress }: { progress: Progress | null }) {
   return <StateWord tone={progress.tone} word={progress.word} {...(more === "" ? {} : { more })} />;
 }
 
-function ProblemBadge({ problems }: { problems: ProblemCount }) {
-  const worst = problems.error > 0 ? "error" : "warning";
-  const count = problems.error + problems.warning;
-  const words = `${count} ${count === 1 ? "problem" : "problems"}`;
-  return (
-    <span className={style.badge} data-worst={worst} title={words}>
-      <IconAlertTriangleFilled size={10} aria-hidden /> {count}
-      <span className="visually-hidden">{words}</span>
-    </span>
-  );
-}
-
 export const ActionCard = memo(function ActionCard({
   data,
   selected,
   isConnectable,
 }: NodeProps<CardNode>) {
-  const { action, progress, problems, other } = data;
+  const { action, progress, mark, other } = data;
   const lines = cardLines(action.inputs, 2);
   const color = robotColor(action.actor);
   return (
@@ -61,7 +50,7 @@ export const ActionCard = memo(function ActionCard({
         aria-label={`Input of ${action.name} ${action.instanceId}`}
       />
       {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
-      {problems && <ProblemBadge problems={problems} />}
+      {mark && <ProblemBadge mark={mark} on="card" />}
       <div className={style.head}>
         <b className={style.name} title={action.name}>
           {action.missing && <IconGhost2 size={13} aria-hidden />}

@@ -28,7 +28,7 @@ const options = (graph: Graph): NodeOptions => ({
   places: placesOf(graph),
   selected: new Set(),
   progress: new Map(),
-  problems: new Map(),
+  marks: new Map(),
   measured: new Map(),
 });
 

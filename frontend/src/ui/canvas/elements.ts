@@ -16,17 +16,13 @@ import {
 import { OUTCOMES, outcomeWord } from "../outcome";
 import { CARD, PILL, type Places } from "./arrange";
 import { type Box, laneBack, laneFor, MOST_CARDS } from "./lanes";
-
-export interface ProblemCount {
-  readonly error: number;
-  readonly warning: number;
-}
+import { type Mark, type Marks, markWords } from "./marks";
 
 export type CardNode = Node<
   {
     action: Action;
     progress: Progress | null;
-    problems: ProblemCount | null;
+    mark: Mark | null;
     /** The colour of somebody else who has it selected. */
     other: string | null;
   },
@@ -47,6 +43,8 @@ export type Arrow = Edge<
     response: Response;
     /** What the whole relation says; only the first arrow of a relation carries the label. */
     answers: readonly Answer[] | null;
+    /** What is wrong with the relation; on its first arrow. */
+    mark: Mark | null;
     optional: boolean;
     lead: boolean;
     /** The x of the lane on which it goes round cards; null: straight down. */
@@ -74,7 +72,7 @@ export interface NodeOptions {
   places: Places;
   selected: ReadonlySet<string>;
   progress: ReadonlyMap<Key, Progress>;
-  problems: ReadonlyMap<Key, ProblemCount>;
+  marks: Marks;
   others?: ReadonlyMap<Key, string>;
   measured: ReadonlyMap<Key, { width?: number; height?: number }>;
 }
@@ -104,11 +102,11 @@ export function nodesOf(graph: Graph, options: NodeOptions): CanvasNode[] {
     (action): CardNode => ({
       ...place(action.key, options),
       type: "action",
-      ariaLabel: cardWords(action, options.progress.get(action.key)),
+      ariaLabel: cardWords(action, options),
       data: {
         action,
         progress: options.progress.get(action.key) ?? null,
-        problems: options.problems.get(action.key) ?? null,
+        mark: options.marks.get(action.key) ?? null,
         other: options.others?.get(action.key) ?? null,
       },
     }),
@@ -156,9 +154,11 @@ function laneOf(relation: Relation, outcome: Precondition, boxes: Map<Key, Box>)
   return lane + Math.sign(lane - to.x) * LANE_WIDTH * at;
 }
 
-function cardWords(action: Action, progress: Progress | undefined): string {
+function cardWords(action: Action, { progress, marks }: NodeOptions): string {
   const robot = action.actor === "" ? "" : `, robot ${action.actor}`;
-  return `${action.name} ${action.instanceId}${robot}${progress ? `, ${progress.word}` : ""}`;
+  const state = progress.get(action.key)?.word;
+  const now = state === undefined ? "" : `, ${state}`;
+  return `${action.name} ${action.instanceId}${robot}${now}${markWords(marks.get(action.key))}`;
 }
 
 type Names = ReadonlyMap<Key, string>;
@@ -188,10 +188,11 @@ function arrowsOf(relation: Relation, options: NodeOptions, { boxes, names }: Ar
   const outcomes = spoken(relation.conditions);
   const shown: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
   const entry = relation.parent === ENTRY;
+  const mark = options.marks.get(id) ?? null;
   return shown.map((outcome, i) => ({
     id: `${id}|${outcome}`,
     type: "outcome",
-    ariaLabel: arrowWords(relation, outcome, names),
+    ariaLabel: arrowWords(relation, outcome, names) + markWords(i === 0 ? mark : null),
     source: relation.parent,
     target: relation.child,
     sourceHandle: entry ? "start" : outcome,
@@ -202,6 +203,7 @@ function arrowsOf(relation: Relation, options: NodeOptions, { boxes, names }: Ar
       outcome,
       response: relation.conditions[outcome],
       answers: i === 0 && !entry ? answersOf(relation) : null,
+      mark: i === 0 ? mark : null,
       optional: !relation.required,
       lead: i === 0,
       lane: laneOf(relation, outcome, boxes),

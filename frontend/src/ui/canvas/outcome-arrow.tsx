@@ -10,6 +10,7 @@ import { memo } from "react";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../outcome";
 import type { Answer, Arrow } from "./elements";
 import style from "./outcome-arrow.module.css";
+import { ProblemBadge } from "./problem-badge";
 
 interface Line {
   path: string;
@@ -119,7 +120,7 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
           ...(dash ? { strokeDasharray: dash } : {}),
         }}
       />
-      {data.answers && (
+      {(data.answers || data.mark) && (
         <EdgeLabelRenderer>
           <button
             type="button"
@@ -127,18 +128,23 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
             className={style.label}
             onClick={() => store.getState().addSelectedEdges([id])}
             data-selected={selected || undefined}
-            data-plain={isPlain(data.answers) || undefined}
+            data-plain={(data.answers && isPlain(data.answers)) || undefined}
             data-relation={data.relation}
             style={{ transform: `translate(${SHIFTS[anchor]}, -50%) translate(${x}px, ${y}px)` }}
           >
-            {data.answers.map((answer, i) => (
-              <AnswerLine
-                key={answer.response}
-                answer={answer}
-                optional={data.optional && i === (data.answers?.length ?? 0) - 1}
-              />
-            ))}
-            {data.answers.length === 0 && <span className={style.response}>ignores all</span>}
+            {data.mark && <ProblemBadge mark={data.mark} on="arrow" />}
+            {data.answers && (
+              <span className={style.answers}>
+                {data.answers.map((answer, i) => (
+                  <AnswerLine
+                    key={answer.response}
+                    answer={answer}
+                    optional={data.optional && i === (data.answers?.length ?? 0) - 1}
+                  />
+                ))}
+                {data.answers.length === 0 && <span className={style.response}>ignores all</span>}
+              </span>
+            )}
           </button>
         </EdgeLabelRenderer>
       )}

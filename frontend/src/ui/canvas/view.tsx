@@ -11,8 +11,9 @@ import type { Progress } from "../../api/progress";
 import type { Graph, Key } from "../../graph/model";
 import { ActionCard } from "./action-card";
 import { placesOf } from "./arrange";
-import { type CanvasNode, edgesOf, nodesOf, type ProblemCount } from "./elements";
+import { type CanvasNode, edgesOf, nodesOf } from "./elements";
 import { EndPill } from "./end-pill";
+import { NO_MARKS } from "./marks";
 import { ArrowTips, OutcomeArrow } from "./outcome-arrow";
 import "./canvas.css";
 
@@ -20,7 +21,6 @@ export const nodeTypes: NodeTypes = { action: ActionCard, end: EndPill };
 export const edgeTypes: EdgeTypes = { outcome: OutcomeArrow };
 
 const NONE: ReadonlySet<string> = new Set();
-const NO_PROBLEMS: ReadonlyMap<Key, ProblemCount> = new Map();
 
 interface Props {
   graph: Graph;
@@ -34,7 +34,7 @@ export function GraphView({ graph, progress, selected = NONE, label, onSelect }:
   const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
   const places = useMemo(() => placesOf(graph), [graph]);
   const options = useMemo(
-    () => ({ places, selected, progress, problems: NO_PROBLEMS, measured }),
+    () => ({ places, selected, progress, marks: NO_MARKS, measured }),
     [places, selected, progress, measured],
   );
   const nodes = useMemo(() => nodesOf(graph, options), [graph, options]);

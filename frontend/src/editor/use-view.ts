@@ -1,0 +1,140 @@
+/** The view of the canvas: what is seen at first, what Fit shows, and how it follows a run. */
+import type { ReactFlowInstance } from "@xyflow/react";
+import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
+import type { Progress } from "../api/progress";
+import { ENTRY, type Key, type Position } from "../graph/model";
+import { CARD, type Places, type Sizes } from "../ui/canvas/arrange";
+import type { Arrow, CanvasNode } from "../ui/canvas/elements";
+import type { View } from "./bench";
+import { alike, boundsOf, bring, fits, type Looking, READABLE, readable, whole } from "./sights";
+
+interface Given {
+  flow: ReactFlowInstance<CanvasNode, Arrow>;
+  frame: RefObject<HTMLDivElement | null>;
+  places: Places;
+  sizes: Sizes;
+  phone: boolean;
+  /** The graph has been heard of and has something to show. */
+  begun: boolean;
+  progress: ReadonlyMap<Key, Progress>;
+  /** The run that goes, if one does. */
+  run: string | null;
+}
+
+/** The actions that run, the latest first. */
+export function running(progress: ReadonlyMap<Key, Progress>): Key[] {
+  return [...progress]
+    .filter(([, { tone, since }]) => tone === "run" && since !== null)
+    .sort(([, a], [, b]) => (b.since ?? 0) - (a.since ?? 0))
+    .map(([key]) => key);
+}
+
+export function useView({ flow, frame, places, sizes, phone, begun, progress, run }: Given) {
+  const now = useRef({ places, sizes });
+  now.current = { places, sizes };
+  const least = phone ? READABLE.phone : READABLE.desktop;
+
+  const showAll = useCallback(
+    (duration: number) => {
+      const [box, room] = [boundsOf(now.current.places, now.current.sizes), frame.current];
+      if (box === null || room === null) return;
+      const size = { width: room.clientWidth, height: room.clientHeight };
+      const [x] = now.current.places.get(ENTRY) ?? [box.x + (box.width - CARD.width) / 2];
+      const first = readable(box, size, x + CARD.width / 2, least);
+      // Pressed once more, it shows the rest too.
+      const again = duration > 0 && alike(first, flow.getViewport());
+      void flow.setViewport(again ? whole(box, size) : first, { duration });
+    },
+    [flow, frame, least],
+  );
+
+  // The graph arrives after the canvas, and its sizes after that.
+  const opened = useRef(false);
+  useEffect(() => {
+    if (!begun || opened.current) return;
+    const timer = setTimeout(() => {
+      opened.current = true;
+      showAll(0);
+    }, 60);
+    return () => clearTimeout(timer);
+  }, [begun, showAll]);
+
+  const show = useCallback(
+    (keys: readonly Key[], goal: "near" | "middle") => {
+      const some: Places = new Map();
+      for (const key of keys) {
+        const at = now.current.places.get(key);
+        if (at) some.set(key, at);
+      }
+      const [box, room] = [boundsOf(some, now.current.sizes), frame.current];
+      if (box === null || room === null) return;
+      const size = { width: room.clientWidth, height: room.clientHeight };
+      const here: Looking = flow.getViewport();
+      const zoom = goal === "middle" ? Math.max(here.zoom, least) : here.zoom;
+      const next = fits(box, size, zoom)
+        ? (bring(box, size, { ...here, zoom }) ?? (zoom === here.zoom ? null : { ...here, zoom }))
+        : goal === "middle"
+          ? whole(box, size)
+          : null;
+      if (next !== null) void flow.setViewport(next, { duration: 250 });
+    },
+    [flow, frame, least],
+  );
+
+  const view = useMemo<View>(
+    () => ({
+      fit: () => showAll(200),
+      zoomIn: () => void flow.zoomIn({ duration: 120 }),
+      zoomOut: () => void flow.zoomOut({ duration: 120 }),
+      show: (keys) => show(keys, "middle"),
+      reveal: ([x, y]) => {
+        const room = frame.current;
+        if (room === null) return;
+        const size = { width: room.clientWidth, height: room.clientHeight };
+        const next = bring({ x, y, ...CARD }, size, flow.getViewport());
+        if (next !== null) void flow.setViewport(next, { duration: 200 });
+      },
+      middle: (): Position => {
+        const box = frame.current?.getBoundingClientRect();
+        const [x, y] = box ? [box.left + box.width / 2, box.top + box.height / 3] : [0, 0];
+        const at = flow.screenToFlowPosition({ x, y });
+        return [Math.round(at.x), Math.round(at.y)];
+      },
+      screenOf: ([x, y]): Position => {
+        const at = flow.flowToScreenPosition({ x, y });
+        return [at.x, at.y];
+      },
+    }),
+    [showAll, show, flow, frame],
+  );
+
+  const follow = useFollow({ run, progress, show });
+  return { view, ...follow };
+}
+
+interface Followed {
+  run: string | null;
+  progress: ReadonlyMap<Key, Progress>;
+  show: (keys: readonly Key[], goal: "near") => void;
+}
+
+/** Brings what runs into view until the person moves the view; each run begins anew. */
+function useFollow({ run, progress, show }: Followed) {
+  const [left, setLeft] = useState<string | null>(null);
+  const lost = run !== null && left === run;
+  const going = running(progress);
+  const key = going.join(" ");
+  // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
+  useEffect(() => {
+    if (run === null || lost || going.length === 0) return;
+    // All of them if they fit together at this zoom; else at least the one that began last.
+    show(going.slice(0, 1), "near");
+    show(going, "near");
+  }, [run, lost, key]);
+  return {
+    /** A run goes, and the view no longer follows it. */
+    lost,
+    onPanned: useCallback(() => setLeft(run), [run]),
+    onFollow: useCallback(() => setLeft(null), []),
+  };
+}

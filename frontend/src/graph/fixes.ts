@@ -1,0 +1,144 @@
+/**
+ * Fixes of problems as edits of the document: the twin of `umrf/fixes.py`.
+ *
+ * Each is one transaction of the person's own, does nothing where there is nothing to do, and says
+ * by its answer whether it did something.
+ */
+
+import type * as Y from "yjs";
+import { removeActions, setField } from "./edit-actions";
+import { mirrorRelation, removeRelation, setRequired } from "./edit-relations";
+import { endsOf } from "./layout";
+import type { Key } from "./model";
+import { graphOf, numbersOf, together } from "./pen";
+
+export const FIXES = [
+  "mirror-relation",
+  "not-required",
+  "remove-relation",
+  "renumber",
+  "type-sync",
+] as const;
+export type Fix = (typeof FIXES)[number];
+
+/** What of a problem a fix needs. */
+export interface Fixable {
+  readonly where: { readonly aid?: string; readonly relation?: string };
+  readonly fix?: string | null;
+}
+
+/** What a button says, and whether the fix may be done along with others, unread. */
+interface About {
+  readonly words: string;
+  /** It loses nothing that somebody has drawn or written. */
+  readonly safe: boolean;
+}
+
+export const ABOUT: Readonly<Record<Fix, About>> = {
+  "mirror-relation": { words: "List the arrow on both sides", safe: true },
+  "not-required": { words: "Do not wait for it", safe: true },
+  "remove-relation": { words: "Remove the arrow", safe: false },
+  renumber: { words: "Give it a free number", safe: true },
+  "type-sync": { words: "Make it “sync”", safe: true },
+};
+
+const known: ReadonlySet<unknown> = new Set(FIXES);
+
+/** The fix of a problem that this page knows how to do; null where there is none. */
+export function fixOf({ fix, where }: Fixable): Fix | null {
+  if (!known.has(fix)) return null;
+  const name = fix as Fix;
+  return placeOf(name, where) === undefined ? null : name;
+}
+
+function placeOf(fix: Fix, where: Fixable["where"]): string | undefined {
+  switch (fix) {
+    case "mirror-relation":
+    case "not-required":
+    case "remove-relation":
+      return where.relation;
+    case "renumber":
+    case "type-sync":
+      return where.aid;
+  }
+}
+
+/** Does the fix of one problem. False when there is none or nothing is left to do. */
+export function applyFix(doc: Y.Doc, problem: Fixable): boolean {
+  const fix = fixOf(problem);
+  const place = fix && placeOf(fix, problem.where);
+  if (!fix || !place) return false;
+  return together(doc, () => {
+    switch (fix) {
+      case "mirror-relation":
+        return mirrorRelation(doc, place);
+      case "not-required":
+        return setRequired(doc, place, false);
+      case "remove-relation":
+        return removeWithGhosts(doc, place);
+      case "renumber":
+        return renumber(doc, place);
+      case "type-sync":
+        return typeSync(doc, place);
+    }
+  });
+}
+
+/** Those that lose nothing, each by what it is about: two problems may have one fix. */
+export function safeOnes<P extends Fixable>(problems: readonly P[]): P[] {
+  const seen = new Set<string>();
+  return problems.filter((problem) => {
+    const fix = fixOf(problem);
+    if (fix === null || !ABOUT[fix].safe) return false;
+    const id = `${fix} ${placeOf(fix, problem.where)}`;
+    if (seen.has(id)) return false;
+    seen.add(id);
+    return true;
+  });
+}
+
+/** All that lose nothing, as one step of undo. Answers how many did something. */
+export function applySafe(doc: Y.Doc, problems: readonly Fixable[]): number {
+  return together(doc, () => safeOnes(problems).filter((one) => applyFix(doc, one)).length);
+}
+
+/** A ghost is there only because arrows name it: it goes with its last one. */
+function removeWithGhosts(doc: Y.Doc, id: string): boolean {
+  const ends = endsOf(id);
+  if (ends === null || !removeRelation(doc, id)) return false;
+  const { actions, relations } = graphOf(doc);
+  const named = new Set(relations.flatMap(({ parent, child }) => [parent, child]));
+  const lonely = actions.filter(
+    ({ key, missing }) => missing && !named.has(key) && (key === ends.parent || key === ends.child),
+  );
+  removeActions(
+    doc,
+    lonely.map(({ key }) => key),
+  );
+  return true;
+}
+
+/** The greatest number that an arrow can refer to: 16 bits in the engine. */
+const MOST = 65_535;
+const RESERVED: ReadonlySet<string> = new Set(["graph_entry", "graph_exit"]);
+
+function renumber(doc: Y.Doc, key: Key): boolean {
+  const actions = numbersOf(doc);
+  const action = actions.find((candidate) => candidate.key === key);
+  if (action === undefined) return false;
+  const taken = new Set(
+    actions
+      .filter((other) => other !== action && other.name === action.name)
+      .map((other) => other.instanceId),
+  );
+  if (RESERVED.has(action.name)) taken.add(0);
+  if (!taken.has(action.instanceId) && action.instanceId <= MOST) return false;
+  let free = 0;
+  while (taken.has(free)) free += 1;
+  return setField(doc, key, "instanceId", free);
+}
+
+function typeSync(doc: Y.Doc, key: Key): boolean {
+  const action = graphOf(doc).actions.find((candidate) => candidate.key === key);
+  return action?.type === "" && setField(doc, key, "type", "sync");
+}
