@@ -6,6 +6,7 @@ import style from "./saved-word.module.css";
 
 const whys: Record<Why, string> = {
   "session-ended": "Signed out",
+  "other-person": "Somebody else signed in here",
   forbidden: "View only",
   "no-such-graph": "This graph is gone",
   "other-epoch": "Reload needed: this graph was restored elsewhere",

@@ -6,7 +6,8 @@
  * has been sent. So the page can say "saved" and mean it, and can name the moment it shows.
  *
  * Works without React. Edits go into `doc` at any time, also before the first answer and while
- * offline; they are merged, and counted in `unsaved` until the server has stored them.
+ * offline; they are merged, and counted in `unsaved` until the server has stored them. With a
+ * device (see `keep`) they also survive the closing of the page.
  */
 
 import * as decoding from "lib0/decoding";
@@ -15,11 +16,15 @@ import * as awarenessProtocol from "y-protocols/awareness";
 import { Awareness, removeAwarenessStates } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
+import { type Device, deviceOf, freshId, type Kept, type Shelf, type Waiting } from "./device";
+import { type Stranded, strandedIn, wentBack } from "./history";
+import { Keeping } from "./keeping";
 import { Outbox } from "./outbox";
 
 /** Why a room does not let this page in, or let it go. */
 export type Why =
   | "session-ended"
+  | "other-person"
   | "forbidden"
   | "no-such-graph"
   | "other-epoch"
@@ -33,6 +38,8 @@ export interface Link {
   readonly why?: Why;
   /** Edits of this person that are not durable yet. */
   readonly unsaved: number;
+  /** Whether those edits survive closing this page. Absent for a room that keeps nothing. */
+  readonly kept?: boolean;
   /** The page shows the log up to this entry, plus what is `unsaved`. 0 before the first sync. */
   readonly seq: number;
 }
@@ -47,7 +54,11 @@ export interface Room {
   settled(signal?: AbortSignal): Promise<number>;
   /** Tries at once, also after a refusal (the person signed in again, say). */
   reconnect(): void;
-  /** Leaves the room. Edits that were not stored stay in `doc`. */
+  /** The edits that wait on another history of the graph; null unless `why` is `other-epoch`. */
+  stranded(): Stranded | null;
+  /** Forgets everything kept here of this history, edits that wait included. */
+  forget(): Promise<void>;
+  /** Leaves the room. Edits that were not stored stay in `doc`, and on the device if there is one. */
   close(): void;
 }
 
@@ -71,6 +82,23 @@ export interface ConnectOptions {
   readonly open?: (url: string) => Socket;
   /** 0 … 1, for the spread of reconnects. */
   readonly random?: () => number;
+  /** Keeps the graph and the edits that wait on this device, for this person only. */
+  readonly keep?: Keep;
+  /**
+   * Asked before each attempt: why not to come in, or null. A browser cannot tell a refused upgrade
+   * from a dead server, nor whose cookie an upgrade carries. `again` after an attempt that failed.
+   * Throwing means that nobody answers.
+   */
+  readonly admit?: Admit;
+}
+
+export type Admit = (again: boolean) => Promise<Why | null>;
+
+export interface Keep extends Shelf {
+  /** The browser's storage by default. */
+  readonly device?: Device;
+  /** Begins anew: what is kept of an older history stays where it is and is not shown. */
+  readonly anew?: boolean;
 }
 
 /** The address of a graph's room on the server that the page came from. */
@@ -90,7 +118,15 @@ const SILENCE_MS = 30_000;
 const OPENING_MS = 10_000;
 const FIRST_RETRY_MS = 300;
 const LAST_RETRY_MS = 10_000;
+/** Nobody looks at a hidden page; with nothing to save it may take its time. */
+const HIDDEN_RETRY_MS = 60_000;
+/** An answer to a question that any living server answers at once. */
+const PROBE_MS = 5_000;
+/** Above this, edits that wait travel one by one; a message may have 1 MiB. */
+const LARGE = 1 << 19;
+const NOTHING = new Uint8Array([0, 0]);
 const OPEN = 1;
+const OTHER_EPOCH = 4409;
 
 const REFUSED: ReadonlyMap<number, Why> = new Map([
   [1003, "not-accepted"],
@@ -100,12 +136,22 @@ const REFUSED: ReadonlyMap<number, Why> = new Map([
   [4401, "session-ended"],
   [4403, "forbidden"],
   [4404, "no-such-graph"],
-  [4409, "other-epoch"],
+  [OTHER_EPOCH, "other-epoch"],
 ]);
 const PASSING: ReadonlyMap<number, Why> = new Map([
   [1012, "restarting"],
   [1013, "too-slow"],
 ]);
+
+const madeNow = (update: Uint8Array): Waiting => ({ id: freshId(), update, at: Date.now() });
+
+let ofBrowser: Device | null = null;
+
+/** The storage of this browser, the same for all rooms. */
+export function browser(): Device {
+  ofBrowser ??= deviceOf();
+  return ofBrowser;
+}
 
 export function connect(options: ConnectOptions): Room {
   return new Connection(options);
@@ -119,9 +165,13 @@ class Connection implements Room {
   private readonly random: () => number;
   private readonly outbox = new Outbox();
   private readonly listeners = new Set<() => void>();
+  private readonly keeping: Keeping | null;
+  private readonly admit: Admit | null;
   private current: Link = { state: "connecting", unsaved: 0, seq: 0 };
   private socket: Socket | null = null;
   private heardAt = 0;
+  private probedAt: number | null = null;
+  private turn = 0;
   private attempts = 0;
   private retry: ReturnType<typeof setTimeout> | undefined;
   private readonly watch: ReturnType<typeof setInterval>;
@@ -137,9 +187,14 @@ class Connection implements Room {
     this.random = options.random ?? Math.random;
     this.doc.on("update", this.onUpdate);
     this.awareness.on("update", this.onAwareness);
-    globalThis.addEventListener?.("online", this.onOnline);
+    globalThis.addEventListener?.("online", this.onWake);
+    globalThis.addEventListener?.("offline", this.onWake);
+    globalThis.document?.addEventListener("visibilitychange", this.onVisibility);
     this.watch = setInterval(this.onWatch, 1_000);
-    this.dial();
+    this.admit = options.admit ?? null;
+    this.keeping = options.keep ? this.keepingOf(options.keep) : null;
+    if (this.keeping !== null && !options.keep?.anew) void this.recall(this.keeping);
+    else this.dial();
   }
 
   // Bound, so that they can be handed to `useSyncExternalStore`.
@@ -183,22 +238,38 @@ class Connection implements Room {
     this.closed = true;
     clearInterval(this.watch);
     clearTimeout(this.retry);
-    globalThis.removeEventListener?.("online", this.onOnline);
+    globalThis.removeEventListener?.("online", this.onWake);
+    globalThis.removeEventListener?.("offline", this.onWake);
+    globalThis.document?.removeEventListener("visibilitychange", this.onVisibility);
     this.doc.off("update", this.onUpdate);
     this.awareness.off("update", this.onAwareness);
     this.drop();
     this.awareness.destroy();
+    this.keeping?.close();
     this.say({ state: "offline" });
+  }
+
+  stranded(): Stranded | null {
+    if (this.current.why !== "other-epoch") return null;
+    return strandedIn(this.doc, this.outbox.edits);
+  }
+
+  async forget(): Promise<void> {
+    await this.keeping?.forget();
+    this.outbox.clear();
+    this.say({ unsaved: 0 });
   }
 
   private say(change: Partial<Omit<Link, "why">> & { why?: Why | undefined }): void {
     const { why, ...rest } = { ...this.current, ...change };
-    const next: Link = why === undefined ? rest : { ...rest, why };
+    const kept = this.keeping && { kept: this.keeping.kept };
+    const next: Link = { ...rest, ...kept, ...(why && { why }) };
     const old = this.current;
     if (
       old.state === next.state &&
       old.why === next.why &&
       old.unsaved === next.unsaved &&
+      old.kept === next.kept &&
       old.seq === next.seq &&
       !this.closed
     )
@@ -207,14 +278,65 @@ class Connection implements Room {
     for (const listener of [...this.listeners]) listener();
   }
 
+  // -- the device -----------------------------------------------------------------------------
+
+  private keepingOf({ device = browser(), graph, person, anew }: Keep): Keeping {
+    const keeping = new Keeping(device, { graph, person }, () => this.say({}));
+    if (anew) keeping.begin();
+    return keeping;
+  }
+
+  private async recall(keeping: Keeping): Promise<void> {
+    const kept = await keeping.load((late) => {
+      if (this.closed || late === null) return;
+      this.adopt(late);
+      if (late.waiting.length > 0) this.reconnectNow(); // so that they go the usual way
+    });
+    if (this.closed) return;
+    if (kept !== null) this.adopt(kept);
+    this.dial();
+  }
+
+  private adopt({ known, waiting, seq }: Kept): void {
+    this.doc.transact(() => {
+      for (const update of known) Y.applyUpdate(this.doc, update, this);
+      for (const { update } of waiting) Y.applyUpdate(this.doc, update, this);
+    }, this);
+    const recent = this.outbox.edits;
+    this.outbox.clear();
+    for (const edit of [...waiting, ...recent]) this.outbox.edited(edit);
+    this.say({ unsaved: this.outbox.unsaved, seq: Math.max(seq, this.current.seq) });
+  }
+
+  /** The whole document, when it holds nothing but what is durable. */
+  private readonly copy = (): Uint8Array | null =>
+    this.current.state === "live" && this.outbox.unsaved === 0
+      ? Y.encodeStateAsUpdate(this.doc)
+      : null;
+
   // -- the socket -----------------------------------------------------------------------------
 
   private dial(): void {
     clearTimeout(this.retry);
+    this.turn += 1;
+    if (this.admit === null) this.enter();
+    else void this.knock(this.admit, this.turn);
+  }
+
+  private async knock(admit: Admit, turn: number): Promise<void> {
+    const why = await admit(this.attempts > 0).catch(() => "nobody" as const);
+    if (turn !== this.turn || this.closed) return;
+    if (why === null) this.enter();
+    else if (why === "nobody") this.stayAway(undefined);
+    else this.say({ state: "refused", why });
+  }
+
+  private enter(): void {
     const socket = this.openSocket(this.url);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     this.heardAt = Date.now();
+    this.probedAt = null;
     socket.onopen = () => this.onOpen(socket);
     socket.onmessage = ({ data }) => this.onMessage(socket, data);
     socket.onclose = ({ code }) => this.onClose(socket, code);
@@ -242,12 +364,18 @@ class Connection implements Room {
       this.say({ state: "refused", why: refused });
       return;
     }
-    this.say({ state: "offline", why: PASSING.get(code) });
+    this.stayAway(PASSING.get(code));
+  }
+
+  private stayAway(why: Why | undefined): void {
+    this.say({ state: "offline", why });
     this.dialLater();
   }
 
   private dialLater(): void {
-    const longest = Math.min(LAST_RETRY_MS, FIRST_RETRY_MS * 2 ** this.attempts);
+    const idle = globalThis.document?.visibilityState === "hidden" && this.outbox.unsaved === 0;
+    const soon = Math.min(LAST_RETRY_MS, FIRST_RETRY_MS * 2 ** this.attempts);
+    const longest = idle ? HIDDEN_RETRY_MS : soon;
     this.attempts += 1;
     clearTimeout(this.retry);
     this.retry = setTimeout(() => this.dial(), longest * (0.5 + this.random() / 2));
@@ -256,6 +384,7 @@ class Connection implements Room {
   /** Forgets the socket; the others are out of sight until it is back. */
   private drop(): void {
     clearTimeout(this.retry);
+    this.turn += 1;
     const socket = this.socket;
     this.socket = null;
     if (socket !== null) {
@@ -268,9 +397,24 @@ class Connection implements Room {
     for (const id of others) this.awareness.meta.delete(id);
   }
 
-  private readonly onOnline = (): void => {
-    if (this.current.state === "offline" && !this.closed) this.reconnectNow();
+  /** The network or the page changed: try at once, or see whether the socket still lives. */
+  private readonly onWake = (): void => {
+    if (this.closed) return;
+    if (this.current.state === "offline") this.reconnectNow();
+    else if (this.current.state === "live") this.probe();
   };
+
+  private readonly onVisibility = (): void => {
+    if (globalThis.document.visibilityState === "visible") this.onWake();
+  };
+
+  private probe(): void {
+    this.probedAt = Date.now();
+    const encoder = encoding.createEncoder();
+    encoding.writeVarUint(encoder, SYNC);
+    sync.writeSyncStep1(encoder, this.doc);
+    this.send(encoder);
+  }
 
   private reconnectNow(): void {
     this.attempts = 0;
@@ -281,7 +425,9 @@ class Connection implements Room {
   private readonly onWatch = (): void => {
     if (this.socket === null) return;
     const limit = this.socket.readyState === OPEN ? SILENCE_MS : OPENING_MS;
-    if (Date.now() - this.heardAt > limit) this.onClose(this.socket, 1006);
+    const now = Date.now();
+    const mute = this.probedAt !== null && now - this.probedAt > PROBE_MS;
+    if (mute || now - this.heardAt > limit) this.onClose(this.socket, 1006);
   };
 
   private send(encoder: encoding.Encoder): void {
@@ -294,19 +440,20 @@ class Connection implements Room {
   private onMessage(socket: Socket, data: unknown): void {
     if (socket !== this.socket) return;
     this.heardAt = Date.now();
+    this.probedAt = null;
     if (!(data instanceof ArrayBuffer)) return;
     try {
-      this.take(decoding.createDecoder(new Uint8Array(data)));
+      this.take(socket, decoding.createDecoder(new Uint8Array(data)));
     } catch (error) {
       console.error("The room sent something that cannot be read", error);
       this.onClose(socket, 1006);
     }
   }
 
-  private take(decoder: decoding.Decoder): void {
+  private take(socket: Socket, decoder: decoding.Decoder): void {
     switch (decoding.readVarUint(decoder)) {
       case SYNC:
-        this.takeSync(decoder);
+        this.takeSync(socket, decoder);
         break;
       case AWARENESS: {
         const update = decoding.readVarUint8Array(decoder);
@@ -317,36 +464,66 @@ class Connection implements Room {
         this.sendAwareness();
         break;
       case ACK: {
-        this.outbox.durable(decoding.readVarUint(decoder));
+        const stored = this.outbox.durable(decoding.readVarUint(decoder));
         const seq = decoding.readVarUint(decoder);
+        if (stored.length > 0) this.keeping?.stored(stored);
+        this.keeping?.shows(seq, this.copy);
         this.say({ unsaved: this.outbox.unsaved, seq });
         break;
       }
     }
   }
 
-  private takeSync(decoder: decoding.Decoder): void {
-    switch (decoding.readVarUint(decoder)) {
-      case sync.messageYjsSyncStep1: {
-        const encoder = encoding.createEncoder();
-        encoding.writeVarUint(encoder, SYNC);
-        sync.writeSyncStep2(encoder, this.doc, decoding.readVarUint8Array(decoder));
-        this.outbox.sentAll();
-        this.send(encoder);
+  private takeSync(socket: Socket, decoder: decoding.Decoder): void {
+    const step = decoding.readVarUint(decoder);
+    const content = decoding.readVarUint8Array(decoder);
+    switch (step) {
+      case sync.messageYjsSyncStep1:
+        if (wentBack(this.doc, this.outbox.edits, content)) this.onClose(socket, OTHER_EPOCH);
+        else this.give(content);
         break;
-      }
       case sync.messageYjsSyncStep2:
-        Y.applyUpdate(this.doc, decoding.readVarUint8Array(decoder), this);
+        this.learn(content);
         this.attempts = 0;
         this.say({ state: "live", why: undefined });
         break;
       case sync.messageYjsUpdate:
-        Y.applyUpdate(this.doc, decoding.readVarUint8Array(decoder), this);
+        this.learn(content);
         break;
     }
   }
 
+  private learn(update: Uint8Array): void {
+    Y.applyUpdate(this.doc, update, this);
+    this.keeping?.learned(update);
+  }
+
   // -- what goes out --------------------------------------------------------------------------
+
+  /** The answer to a step 1: what the server lacks, in pieces when that is too much for one. */
+  private give(state: Uint8Array): void {
+    const whole = Y.encodeStateAsUpdate(this.doc, state);
+    const edits = this.outbox.edits;
+    if (whole.length <= LARGE || edits.length === 0) {
+      this.outbox.sentAll();
+      this.sendUpdate(sync.messageYjsSyncStep2, whole);
+      return;
+    }
+    this.outbox.sentSome(0);
+    this.sendUpdate(sync.messageYjsSyncStep2, NOTHING);
+    edits.forEach(({ update }, n) => {
+      this.outbox.sentSome(n + 1);
+      this.sendUpdate(sync.messageYjsUpdate, update);
+    });
+  }
+
+  private sendUpdate(step: number, update: Uint8Array): void {
+    const encoder = encoding.createEncoder();
+    encoding.writeVarUint(encoder, SYNC);
+    encoding.writeVarUint(encoder, step);
+    encoding.writeVarUint8Array(encoder, update);
+    this.send(encoder);
+  }
 
   private readonly onUpdate = (
     update: Uint8Array,
@@ -355,14 +532,11 @@ class Connection implements Room {
     transaction: Y.Transaction,
   ): void => {
     if (origin === this) return;
-    if (transaction.local) this.outbox.edited();
+    if (transaction.local) this.outbox.edited(this.keeping?.edited(update) ?? madeNow(update));
     // Until the room asked for what it lacks, everything travels with that answer, in order.
     if (this.outbox.answered && this.socket?.readyState === OPEN) {
-      const encoder = encoding.createEncoder();
-      encoding.writeVarUint(encoder, SYNC);
-      sync.writeUpdate(encoder, update);
       this.outbox.sentAll();
-      this.send(encoder);
+      this.sendUpdate(sync.messageYjsUpdate, update);
     }
     this.say({ unsaved: this.outbox.unsaved });
   };

@@ -6,17 +6,24 @@
  * was not acknowledged on the old one goes again, with the first step 2.
  */
 
+import type { Waiting } from "./device";
+
 const NOT_SENT = Number.POSITIVE_INFINITY;
 
 export class Outbox {
-  /** For each edit that waits: the number of the message that carried it. In order. */
-  private waiting: number[] = [];
+  /** In the order in which they were made. */
+  private waiting: { readonly edit: Waiting; message: number }[] = [];
   private sent = 0;
   private answeredSync = false;
 
-  /** Edits that are not durable. */
+  /** How many edits are not durable. */
   get unsaved(): number {
     return this.waiting.length;
+  }
+
+  /** The edits that are not durable. */
+  get edits(): readonly Waiting[] {
+    return this.waiting.map(({ edit }) => edit);
   }
 
   /** Whether the room has been given what it lacked, so that single updates may follow. */
@@ -28,23 +35,37 @@ export class Outbox {
   fresh(): void {
     this.sent = 0;
     this.answeredSync = false;
-    this.waiting = this.waiting.map(() => NOT_SENT);
+    for (const each of this.waiting) each.message = NOT_SENT;
   }
 
   /** The person changed something. */
-  edited(): void {
-    this.waiting.push(NOT_SENT);
+  edited(edit: Waiting): void {
+    this.waiting.push({ edit, message: NOT_SENT });
   }
 
-  /** A message went out that carries everything so far. */
+  /** A message went out that carries everything so far, or nothing. */
   sentAll(): void {
+    this.sentSome(this.waiting.length);
+  }
+
+  /** A message went out that carries the first `count` edits and what went before. */
+  sentSome(count: number): void {
     this.answeredSync = true;
     this.sent += 1;
-    this.waiting = this.waiting.map((message) => (message === NOT_SENT ? this.sent : message));
+    for (const each of this.waiting.slice(0, count)) {
+      if (each.message === NOT_SENT) each.message = this.sent;
+    }
   }
 
-  /** The first `count` messages of this socket are durable. */
-  durable(count: number): void {
-    this.waiting = this.waiting.filter((message) => message > count);
+  /** The first `count` messages of this socket are durable. Answers the edits that are so since. */
+  durable(count: number): Waiting[] {
+    const done = this.waiting.filter(({ message }) => message <= count);
+    if (done.length > 0) this.waiting = this.waiting.filter(({ message }) => message > count);
+    return done.map(({ edit }) => edit);
+  }
+
+  /** Lets go of what waits. */
+  clear(): void {
+    this.waiting = [];
   }
 }

@@ -17,8 +17,16 @@ export interface Presence {
   readonly selection: readonly Key[];
   /** The field being edited, as `<key>|<field>`. */
   readonly editing?: string;
+  /** What of the canvas this page shows: the place of its top left corner, and how large. */
+  readonly view?: View;
   /** What is being dragged, and how far it has come. */
   readonly drag?: { readonly ids: readonly Key[]; readonly dx: number; readonly dy: number };
+}
+
+export interface View {
+  readonly x: number;
+  readonly y: number;
+  readonly zoom: number;
 }
 
 /** One other page. A person with two windows is here twice, with the same `id`. */
@@ -111,6 +119,7 @@ function personOf(client: number, state: Readonly<Record<string, unknown>>): Per
   if (typeof id !== "string" || typeof name !== "string") return null;
   const cursor = pair(state.cursor);
   const drag = dragOf(state.drag);
+  const view = viewOf(state.view);
   return {
     client,
     id,
@@ -120,6 +129,7 @@ function personOf(client: number, state: Readonly<Record<string, unknown>>): Per
       selection: texts(state.selection),
       ...(cursor && { cursor }),
       ...(typeof state.editing === "string" && { editing: state.editing }),
+      ...(view && { view }),
       ...(drag && { drag }),
     },
   };
@@ -129,6 +139,13 @@ function dragOf(value: unknown): Presence["drag"] | null {
   const { ids, dx, dy } = record(value);
   const way = pair([dx, dy]);
   return way && { ids: texts(ids), dx: way[0], dy: way[1] };
+}
+
+function viewOf(value: unknown): View | null {
+  const { x, y, zoom } = record(value);
+  const place = pair([x, y]);
+  if (place === null || typeof zoom !== "number" || !(zoom > 0 && zoom < 1e3)) return null;
+  return { x: place[0], y: place[1], zoom };
 }
 
 const record = (value: unknown): Readonly<Record<string, unknown>> =>

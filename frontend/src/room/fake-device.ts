@@ -1,0 +1,79 @@
+/** A device in memory for tests, which can refuse, hang, and lose what was not written yet. */
+
+import type { Batch, Device, Kept, Shelf, Waiting } from "./device";
+
+interface Entry {
+  graph: string;
+  person: Shelf["person"];
+  epoch: string;
+  seq: number;
+  known: Uint8Array[];
+  waiting: Map<string, Waiting>;
+}
+
+export class FakeDevice implements Device {
+  readonly entries: Entry[] = [];
+  /** While set, every call fails. */
+  refuses = false;
+  writes = 0;
+  /** Resolves reads when it does; a hanging device otherwise. */
+  ready: Promise<void> = Promise.resolve();
+
+  async read({ graph, person }: Shelf): Promise<Kept | null> {
+    await this.ready;
+    this.check();
+    const mine = this.entries.filter((e) => e.graph === graph && e.person.id === person.id);
+    const found = mine.find(({ waiting }) => waiting.size > 0) ?? mine.at(-1);
+    if (found === undefined) return null;
+    const { epoch, seq, known, waiting } = found;
+    return { epoch, seq, known: [...known], waiting: [...waiting.values()] };
+  }
+
+  async write(shelf: Shelf, epoch: string, batch: Batch): Promise<void> {
+    this.check();
+    this.writes += 1;
+    const entry = this.entry(shelf, epoch);
+    if (batch.copy !== null) entry.known = [batch.copy];
+    entry.known.push(...batch.known);
+    for (const edit of batch.waits) entry.waiting.set(edit.id, edit);
+    for (const { id, update } of batch.durable) {
+      entry.waiting.delete(id);
+      if (batch.copy === null) entry.known.push(update);
+    }
+    entry.seq = batch.seq;
+  }
+
+  async forget({ graph, person }: Shelf, epoch: string): Promise<void> {
+    this.check();
+    const keep = this.entries.filter(
+      (e) => e.graph !== graph || e.person.id !== person.id || e.epoch !== epoch,
+    );
+    this.entries.splice(0, this.entries.length, ...keep);
+  }
+
+  async others({ graph, person }: Shelf) {
+    this.check();
+    return this.entries
+      .filter((e) => e.graph === graph && e.person.id !== person.id && e.waiting.size > 0)
+      .map((e) => ({ ...e.person, waiting: e.waiting.size }));
+  }
+
+  /** How many edits wait here. */
+  get waiting(): number {
+    return this.entries.reduce((sum, entry) => sum + entry.waiting.size, 0);
+  }
+
+  private entry({ graph, person }: Shelf, epoch: string): Entry {
+    const old = this.entries.find(
+      (e) => e.graph === graph && e.person.id === person.id && e.epoch === epoch,
+    );
+    if (old !== undefined) return old;
+    const fresh = { graph, person, epoch, seq: 0, known: [], waiting: new Map() };
+    this.entries.push(fresh);
+    return fresh;
+  }
+
+  private check(): void {
+    if (this.refuses) throw new DOMException("no room", "QuotaExceededError");
+  }
+}

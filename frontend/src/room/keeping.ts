@@ -1,0 +1,178 @@
+/**
+ * A room's dealings with the device: edits are stored as they are made and let go once durable.
+ *
+ * Writes are grouped: while one is under way, what comes next waits for the one after it. What
+ * others change is written with the next edit that may build on it, or a little later.
+ */
+
+import { type Batch, type Device, freshId, type Kept, type Shelf, type Waiting } from "./device";
+
+/** A device that has not answered by then is not waited for. */
+const PATIENCE_MS = 3_000;
+const KNOWN_LATER_MS = 2_000;
+const AGAIN_MS = 10_000;
+/** After so many updates the copy is written anew as a whole. */
+const TAIL = 200;
+
+/** Of graphs that were never taken back to an older state. */
+const FIRST_EPOCH = "0";
+
+export class Keeping {
+  private epoch = "";
+  private readonly device: Device;
+  private readonly shelf: Shelf;
+  private readonly onChange: () => void;
+  private waits: Waiting[] = [];
+  private known: Uint8Array[] = [];
+  private durable: Waiting[] = [];
+  private seq = 0;
+  private tail = 0;
+  private copy: (() => Uint8Array | null) | null = null;
+  private writing: Promise<void> | null = null;
+  private timer: ReturnType<typeof setTimeout> | undefined;
+  private opened = false;
+  private failed = false;
+  private closed = false;
+
+  constructor(device: Device, shelf: Shelf, onChange: () => void) {
+    this.device = device;
+    this.shelf = shelf;
+    this.onChange = onChange;
+  }
+
+  /** Whether all edits that wait are stored on this device. */
+  get kept(): boolean {
+    return this.opened && !this.failed && this.waits.length === 0;
+  }
+
+  /** Begins an epoch of its own without looking at what is kept. */
+  begin(): void {
+    this.epoch = freshId();
+    this.opened = true;
+  }
+
+  /** What is kept; `late` is called when the device answers only after we went on without it. */
+  async load(late: (kept: Kept | null) => void): Promise<Kept | null> {
+    let given = false;
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const reading = this.read();
+    const patience = new Promise<null>((resolve) => {
+      timer = setTimeout(() => {
+        given = true;
+        resolve(null);
+      }, PATIENCE_MS);
+    });
+    const kept = await Promise.race([reading, patience]);
+    clearTimeout(timer);
+    if (given) void reading.then(late);
+    return kept;
+  }
+
+  private async read(): Promise<Kept | null> {
+    try {
+      const kept = await this.device.read(this.shelf);
+      this.opened = true;
+      this.epoch = kept?.epoch ?? FIRST_EPOCH;
+      this.seq = Math.max(this.seq, kept?.seq ?? 0);
+      this.tail += kept?.known.length ?? 0;
+      if (this.waits.length > 0) this.flush();
+      return kept;
+    } catch (error) {
+      this.fail(error);
+      return null;
+    }
+  }
+
+  /** The person changed something. */
+  edited(update: Uint8Array): Waiting {
+    const edit = { id: freshId(), update, at: Date.now() };
+    this.waits.push(edit);
+    this.flush();
+    return edit;
+  }
+
+  /** Something durable came from the server. */
+  learned(update: Uint8Array): void {
+    this.known.push(update);
+    this.soon();
+  }
+
+  /** These edits are stored by the server. */
+  stored(edits: readonly Waiting[]): void {
+    this.durable.push(...edits);
+    this.flush();
+  }
+
+  /** Shows the log up to `seq`; `copy` gives the whole document while it holds nothing that waits. */
+  shows(seq: number, copy: () => Uint8Array | null): void {
+    if (seq === this.seq && this.copy !== null) return;
+    this.seq = seq;
+    this.copy = copy;
+    this.soon();
+  }
+
+  /** Forgets everything that is kept of this epoch. */
+  async forget(): Promise<void> {
+    clearTimeout(this.timer);
+    await this.writing;
+    this.waits = [];
+    this.known = [];
+    this.durable = [];
+    if (this.opened) await this.device.forget(this.shelf, this.epoch);
+    this.opened = false;
+  }
+
+  /** Writes what is left to write. */
+  close(): void {
+    this.closed = true;
+    clearTimeout(this.timer);
+    if (this.waits.length + this.known.length + this.durable.length > 0) this.flush();
+  }
+
+  private soon(wait = KNOWN_LATER_MS): void {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.flush(), wait);
+  }
+
+  private flush(): void {
+    if (!this.opened || this.writing !== null) return;
+    const batch = this.batch();
+    this.writing = this.device.write(this.shelf, this.epoch, batch).then(
+      () => this.wrote(batch),
+      (error: unknown) => this.lost(batch, error),
+    );
+  }
+
+  private batch(): Batch {
+    const { waits, known, durable, seq } = this;
+    this.tail += known.length + durable.length;
+    const copy = this.tail > TAIL ? (this.copy?.() ?? null) : null;
+    if (copy !== null) this.tail = 1;
+    this.known = [];
+    this.durable = [];
+    return { waits: [...waits], known: copy === null ? known : [], durable, copy, seq };
+  }
+
+  private wrote(batch: Batch): void {
+    const written = new Set(batch.waits);
+    this.writing = null;
+    this.failed = false;
+    this.waits = this.waits.filter((edit) => !written.has(edit));
+    if (this.waits.length > 0 || this.durable.length > 0) this.flush();
+    this.onChange();
+  }
+
+  private lost(batch: Batch, error: unknown): void {
+    this.writing = null;
+    this.known.unshift(...batch.known);
+    this.durable.unshift(...batch.durable);
+    if (!this.closed) this.soon(AGAIN_MS);
+    this.fail(error);
+  }
+
+  private fail(error: unknown): void {
+    if (!this.failed) console.warn("This device does not keep edits:", error);
+    this.failed = true;
+    this.onChange();
+  }
+}

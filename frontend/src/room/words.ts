@@ -1,0 +1,52 @@
+/** Why edits are not saved, in sentences for people. */
+
+import type { Link, Why } from "./connect";
+import type { OtherPerson } from "./device";
+
+/** What is with the edits that wait, or with the room; null when everything is saved. */
+export function whyNot(link: Link): string | null {
+  const edits = changes(link.unsaved);
+  const keeps = link.unsaved === 0 ? "" : ` ${where(link)}`;
+  switch (link.state) {
+    case "live":
+      return link.unsaved === 0 ? null : `${edits} on the way to the server.`;
+    case "refused":
+      return `${refusals[link.why ?? "not-accepted"]}${keeps}`;
+    case "connecting":
+    case "offline": {
+      const why = link.why === undefined ? "The server does not answer." : refusals[link.why];
+      if (link.unsaved === 0) return link.state === "connecting" ? null : why;
+      return `${why}${keeps} Sent when it is back.`;
+    }
+  }
+}
+
+/** Whose edits wait on this device until they sign in again; null when nobody's do. */
+export function othersWait(others: readonly OtherPerson[]): string | null {
+  if (others.length === 0) return null;
+  const parts = others.map(({ name, waiting }) => `${changes(waiting)} of ${name || "a guest"}`);
+  return `${parts.join(" and ")} wait on this device until they sign in again.`;
+}
+
+const refusals: Readonly<Record<Why, string>> = {
+  "session-ended": "You are signed out.",
+  "other-person": "Somebody else is signed in in this browser now.",
+  forbidden: "You may look at this graph, not change it.",
+  "no-such-graph": "This graph is gone.",
+  "other-epoch": "The server went back to an older state of this graph, from a backup perhaps.",
+  "not-accepted": "The server refused a change.",
+  restarting: "The server restarts.",
+  "too-slow": "The connection is too slow.",
+};
+
+function where(link: Link): string {
+  const edits = changes(link.unsaved);
+  const wait = link.unsaved === 1 ? "waits" : "wait";
+  return link.kept
+    ? `${edits} ${wait} on this device and survive closing the page.`
+    : `${edits} ${wait} in this page only: keep it open.`;
+}
+
+function changes(n: number): string {
+  return n === 1 ? "1 change" : `${n} changes`;
+}
