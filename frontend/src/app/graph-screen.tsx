@@ -122,9 +122,14 @@ function Gone() {
 }
 
 export function GraphScreen({ id }: { id: string }): ReactNode {
+  const { person } = usePerson();
   return (
     <Frame>
-      <RoomProvider url={roomUrl(id)} fallback={<Bar crumbs={[{ label: "Graphs", to: "/" }]} />}>
+      <RoomProvider
+        url={roomUrl(id)}
+        keep={{ graph: id, person }}
+        fallback={<Bar crumbs={[{ label: "Graphs", to: "/" }]} />}
+      >
         <Inside id={id} />
       </RoomProvider>
     </Frame>
