@@ -106,6 +106,20 @@ export function createGraph(name: string): Promise<GraphSummary> {
   return ask("/api/graphs", { method: "POST", body: { name } });
 }
 
+/** What importing a file would make: nothing is stored. */
+export interface Preview {
+  dialect: string;
+  /** What was translated, and what has no place. */
+  notes: string[];
+  problems: Problem[];
+  name: string;
+  actions: number;
+}
+
+export function previewGraph(text: string): Promise<Preview> {
+  return ask("/api/graphs?preview=true", { method: "POST", body: text });
+}
+
 /** Imports a file's text as it is. */
 export function importGraph(text: string): Promise<GraphSummary> {
   return ask("/api/graphs", { method: "POST", body: text });

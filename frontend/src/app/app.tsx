@@ -16,6 +16,7 @@ import { theme, variables } from "../ui/theme";
 import { DropFiles } from "./drop-files";
 import { GraphScreen } from "./graph-screen";
 import { Lost } from "./lost";
+import { ReviewDialog } from "./review-dialog";
 import { HomeScreen, RunScreen, RunsScreen } from "./screens";
 
 const client = new QueryClient({
@@ -49,6 +50,7 @@ export function App() {
                 <Route component={Lost} />
               </Switch>
               <AskName />
+              <ReviewDialog />
               <StopNotice />
               <CarriedGhost carrier={actionCarrier} />
             </DropFiles>

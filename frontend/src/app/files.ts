@@ -3,8 +3,15 @@ import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
 import { useCallback } from "react";
 import { useLocation } from "wouter";
-import { createGraph, type GraphSummary, importGraph, refreshGraphs } from "../api/graphs";
+import {
+  createGraph,
+  type GraphSummary,
+  importGraph,
+  previewGraph,
+  refreshGraphs,
+} from "../api/graphs";
 import { place, sentence } from "../api/http";
+import { isPlain, reviews } from "./review";
 
 const MOST_BYTES = 10 * 1024 * 1024;
 
@@ -55,7 +62,10 @@ export function useNewGraphs(): NewGraphs {
       for (const file of files) {
         try {
           if (file.size > MOST_BYTES) throw new Error("The file is larger than 10 MB.");
-          last = await importGraph(await file.text());
+          const text = await file.text();
+          const preview = await previewGraph(text);
+          if (!isPlain(preview) && !(await reviews.ask(file.name, preview))) continue;
+          last = await importGraph(text);
         } catch (error) {
           complain(`${file.name} was not imported`, error);
         }
