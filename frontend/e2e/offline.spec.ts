@@ -1,0 +1,130 @@
+/** Work without a server: edits wait on the device, for one person, and are merged on return. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { add, card, saved } from "./bench";
+import { Product } from "./product";
+
+const product = new Product();
+
+test.beforeEach(() => product.start());
+test.afterEach(() => product.kill());
+test.afterAll(() => product.dispose());
+
+interface Graph {
+  id: string;
+}
+
+async function newGraph(name: string): Promise<string> {
+  const body = JSON.stringify({ name });
+  const headers = { "content-type": "application/json" };
+  return (await product.ask<Graph>("/api/graphs", { method: "POST", body, headers })).id;
+}
+
+/** The names of the actions as the log has them. */
+async function stored(graph: string): Promise<string[]> {
+  const file = await product.ask<{ actions: { name: string }[] }>(`/api/graphs/${graph}/umrf`);
+  return file.actions.map(({ name }) => name).sort();
+}
+
+async function enter(page: Page, graph: string): Promise<void> {
+  await page.goto(`${product.url}/graphs/${graph}`);
+  await saved(page);
+}
+
+async function offline(page: Page, changes: number): Promise<void> {
+  const words = changes === 1 ? "1 change" : `${changes} changes`;
+  await expect(page.getByText(new RegExp(`offline.*\\b${words}`, "i")).first()).toBeVisible();
+}
+
+/** The edits that wait on this device, by person, as the browser stores them. */
+function waiting(page: Page): Promise<Record<string, number>> {
+  return page.evaluate(async () => {
+    const open = indexedDB.open("action-assistant");
+    await new Promise((done, fail) => {
+      open.onsuccess = done;
+      open.onerror = fail;
+    });
+    const keys = open.result.transaction("waiting").objectStore("waiting").getAllKeys();
+    await new Promise((done) => {
+      keys.onsuccess = done;
+    });
+    open.result.close();
+    const counts: Record<string, number> = {};
+    for (const key of keys.result as unknown as [string, string][]) {
+      counts[key[1]] = (counts[key[1]] ?? 0) + 1;
+    }
+    return counts;
+  });
+}
+
+test("edits made while the server is gone survive closing the tab and are merged on return", async ({
+  browser,
+}) => {
+  const ada = await product.person(browser, "Ada");
+  const mari = await product.person(browser, "Mari");
+  const graph = await newGraph("survives");
+  await enter(ada.page, graph);
+  await add(ada.page, "Before");
+  await saved(ada.page);
+  await product.kill();
+  await add(ada.page, "While");
+  await offline(ada.page, 1);
+  await expect.poll(() => waiting(ada.page).then(Object.values)).toEqual([1]);
+  await ada.page.close();
+  await product.start();
+  await enter(mari.page, graph);
+  await add(mari.page, "Meanwhile");
+  await saved(mari.page);
+  expect(await stored(graph)).toEqual(["Before", "Meanwhile"]);
+
+  const again = await ada.context.newPage();
+  await enter(again, graph);
+  expect(await stored(graph)).toEqual(["Before", "Meanwhile", "While"]);
+  for (const page of [again, mari.page]) {
+    for (const name of ["Before", "Meanwhile", "While"]) {
+      await expect(card(page, name)).toBeVisible();
+    }
+  }
+  expect(await waiting(again)).toEqual({});
+  await ada.context.close();
+  await mari.context.close();
+});
+
+test("on a shared tablet nobody's edits are sent under another name", async ({ browser }) => {
+  const ada = await product.person(browser, "Ada");
+  const mari = await product.person(browser, "Mari");
+  const graph = await newGraph("shared");
+  await enter(ada.page, graph);
+  await add(ada.page, "First");
+  await saved(ada.page);
+  const cookies = await ada.context.cookies();
+  await product.kill();
+  await add(ada.page, "OfAda");
+  await offline(ada.page, 1);
+  await expect.poll(() => waiting(ada.page).then(Object.values)).toEqual([1]);
+
+  // Mari signs in with the same browser; the tab in which Ada worked is still open.
+  await ada.context.clearCookies();
+  await ada.context.addCookies(await mari.context.cookies());
+  await product.start();
+  await expect(ada.page.getByText(/somebody else signed in/i).first()).toBeVisible();
+  const other = await ada.context.newPage();
+  await enter(other, graph);
+  await add(other, "OfMari");
+  await saved(other);
+  await expect(card(other, "OfAda")).toHaveCount(0);
+  expect(await stored(graph)).toEqual(["First", "OfMari"]);
+  expect(Object.values(await waiting(other))).toEqual([1]);
+  await other.close();
+  await ada.page.close();
+
+  await ada.context.clearCookies();
+  await ada.context.addCookies(cookies);
+  const again = await ada.context.newPage();
+  await enter(again, graph);
+  expect(await stored(graph)).toEqual(["First", "OfAda", "OfMari"]);
+  const done = await product.ask<{ author: { name: string } }[]>(`/api/graphs/${graph}/history`);
+  expect(done[0]?.author.name).toBe("Ada");
+  await ada.context.close();
+  await mari.context.close();
+});
