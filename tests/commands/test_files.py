@@ -193,6 +193,44 @@ def test_simulate_tells_a_person_what_the_engine_would_do_wrong(tmp_path: Path) 
     assert "hazard H2: The child in “A_0 => B_0” does not list it" in answer.stdout
 
 
+def test_the_file_of_an_action_is_checked_as_such(tmp_path: Path) -> None:
+    path = written(tmp_path, {"name": "Go", "type": "sync", "input_parameters": {"x": 5}})
+    answer = run("check", "--json", path)
+    assert answer.returncode == 1
+    (verdict,) = json.loads(answer.stdout)
+    assert verdict["dialect"] == "D3-action"
+    (problem,) = verdict["problems"]
+    assert (problem["code"], problem["where"]["path"]) == (
+        "parameter-illegal",
+        "/input_parameters/x",
+    )
+
+
+def test_check_knows_the_actions_and_sub_graphs_of_folders(tmp_path: Path) -> None:
+    file = written(tmp_path, TWO)
+    known = tmp_path / "known"
+    known.mkdir()
+    needs = {"speed": {"pvf_type": "number"}}
+    (known / "a.umrf.json").write_text(
+        json.dumps({"name": "A", "type": "sync", "input_parameters": needs})
+    )
+    (known / "b.graph.json").write_text(
+        json.dumps({"graph_name": "B", "actions": [{"name": "C", "type": "sync"}],
+                    "graph_entry": [{"name": "C"}], "graph_exit": []})
+    )  # fmt: skip
+    (known / "broken.umrf.json").write_text("{")
+
+    def codes(*options: str) -> set[str]:
+        answer = run("check", "--json", file, *options)
+        return {p["code"] for p in json.loads(answer.stdout)[0]["problems"]} - {"H3"}
+
+    assert codes() == set()
+    assert codes("--actions", str(known)) == {"signature", "unknown-action"}
+    assert codes("--graphs", str(known)) == {"H8"}
+    assert codes("--graphs", str(known), "--actions", str(known)) == {"signature", "H8"}
+    assert "left out" in run("check", file, "--actions", str(known)).stderr
+
+
 def test_a_script_that_makes_no_sense_is_wrong_use(tmp_path: Path) -> None:
     script = tmp_path / "script.json"
     script.write_text('{"behaviours": {"A": [{"after_s": "soon"}]}}')

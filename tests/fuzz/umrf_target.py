@@ -3,8 +3,16 @@
 import resource
 import time
 
-from action_assistant.umrf.check import blocking, check_reading, refused_by_parser
-from action_assistant.umrf.codec import Reading, Unreadable, read, stamp_of, write
+from action_assistant.umrf.check import blocking, check_action, check_reading, refused_by_parser
+from action_assistant.umrf.codec import (
+    Reading,
+    Unreadable,
+    read,
+    read_action,
+    stamp_of,
+    write,
+    write_action,
+)
 from action_assistant.umrf.codes import CODES
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.echo import echo
@@ -12,12 +20,14 @@ from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.fixes import fix
 from action_assistant.umrf.jsontext import MAX_BYTES
 from action_assistant.umrf.semantics import simulate
+from action_assistant.umrf.signatures import signature_of
 
 MEGABYTES = 1_500  # of the whole process: the interpreter, the fuzzer, ten times the text
 
 
 def examine(data: bytes) -> bool:
     """Whether the bytes are a graph. Raises AssertionError, or whatever must not be raised."""
+    examine_action(data)
     started = time.process_time()
     try:
         reading = read(data)
@@ -28,6 +38,23 @@ def examine(data: bytes) -> bool:
     assert refusal.code in CODES
     assert refusal.message
     return False
+
+
+def examine_action(data: bytes) -> bool:
+    """Whether the bytes are the file of an action; raises like `examine`."""
+    try:
+        reading = read_action(data)
+    except Unreadable:
+        return False
+    for problem in check_action(reading):
+        assert problem.severity in CODES[problem.code].severities, problem
+    signature_of(reading.action)
+    text = write_action(reading.action)
+    if len(text) <= MAX_BYTES:
+        again = read_action(text)
+        assert again.dialect == "D3-action", again.dialect
+        assert write_action(again.action) == text
+    return True
 
 
 def _examine_graph(data: bytes, reading: Reading, started: float) -> bool:
@@ -43,6 +70,8 @@ def _examine_graph(data: bytes, reading: Reading, started: float) -> bool:
     if len(data) < 50_000:
         for problem in problems[:20]:
             fix(reading.graph, problem)
+        inner = {action.name: reading.graph for action in reading.graph.actions[:2]}
+        check_reading(reading, {}, PINNED, inner)
         for facts in (PINNED, None):
             chosen = {} if facts is None else {"facts": facts}
             trace = simulate(reading.graph, states=reading.states, max_events=300, **chosen)

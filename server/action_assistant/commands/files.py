@@ -12,8 +12,10 @@ import msgspec
 from action_assistant.errors import CannotStart
 from action_assistant.umrf import check as checks
 from action_assistant.umrf import codec, semantics
+from action_assistant.umrf.action_files import ACTION_DIALECTS
 from action_assistant.umrf.facts import PINNED, SIMULATED, EngineFacts, facts_for
-from action_assistant.umrf.model import Graph, Problem, Where
+from action_assistant.umrf.model import Graph, Problem, Signature, Where
+from action_assistant.umrf.signatures import signature_of
 
 _DAY: Final = 24 * 3600.0  # seconds
 _EVENTS: Final = 100_000
@@ -38,6 +40,10 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     check.add_argument("files", type=Path, nargs="+", metavar="FILE")
     check.add_argument("--json", action="store_true", help="as JSON, for programs")
     check.add_argument("--facts", metavar="COMMIT", help="of the engine the graph is meant for")
+    check.add_argument(
+        "--actions", type=Path, metavar="DIR", help="of action packages: their *umrf.json"
+    )
+    check.add_argument("--graphs", type=Path, metavar="DIR", help="of sub-graphs: *graph.json")
     check.set_defaults(deed=_check)
 
     convert = commands.add_parser(
@@ -99,7 +105,9 @@ def _refusal(path: Path, error: codec.Unreadable) -> str:
 
 def _check(options: argparse.Namespace) -> int:
     facts = facts_for(options.facts) if options.facts else PINNED
-    verdicts = [_verdict(path, facts) for path in options.files]
+    actions = _actions(options.actions) if options.actions else None
+    graphs = _library(options.graphs) if options.graphs else None
+    verdicts = [_verdict(path, facts, actions, graphs) for path in options.files]
     if options.json:
         sys.stdout.buffer.write(msgspec.json.format(msgspec.json.encode(verdicts)) + b"\n")
     else:
@@ -109,15 +117,24 @@ def _check(options: argparse.Namespace) -> int:
     return 1 if bad else 0
 
 
-def _verdict(path: Path, facts: EngineFacts) -> Verdict:
+def _verdict(
+    path: Path,
+    facts: EngineFacts,
+    actions: Mapping[str, Signature] | None,
+    graphs: Mapping[str, Graph] | None,
+) -> Verdict:
+    text = _text(path)
     try:
-        reading = codec.read(_text(path))
+        reading = codec.read(text)
+        if reading.dialect in ACTION_DIALECTS:
+            action = codec.read_action(text)
+            return Verdict(str(path), action.dialect, tuple(checks.check_action(action)))
     except codec.Unreadable as error:
         problem = Problem(
             code=error.code, severity="error", where=Where(path=error.path), message=error.message
         )
         return Verdict(str(path), None, (problem,))
-    found = checks.check_reading(reading, None, facts)
+    found = checks.check_reading(reading, actions, facts, graphs)
     return Verdict(str(path), reading.dialect, tuple(dict.fromkeys(found)))
 
 
@@ -208,6 +225,19 @@ def _library(folder: Path | None) -> Mapping[str, Graph]:
             print(f"left out {path}: {refusals[0].message}", file=sys.stderr)
             continue
         found.setdefault(reading.graph.name, reading.graph)
+    return found
+
+
+def _actions(folder: Path) -> Mapping[str, Signature]:
+    """What the actions of a folder take and give, by name; the engine indexes `*umrf.json`."""
+    found: dict[str, Signature] = {}
+    for path in sorted(folder.rglob("*umrf.json")):
+        try:
+            reading = codec.read_action(_text(path))
+        except codec.Unreadable as error:
+            print(f"left out {_refusal(path, error)}", file=sys.stderr)
+            continue
+        found.setdefault(reading.action.name, signature_of(reading.action))
     return found
 
 

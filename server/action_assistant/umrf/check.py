@@ -2,37 +2,68 @@
 
 from collections.abc import Collection, Mapping
 
+from action_assistant.umrf.action_files import at_top
 from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.scenarios import check_scenarios
 from action_assistant.umrf.checks.structure import check_structure
-from action_assistant.umrf.checks.values import check_values
-from action_assistant.umrf.codec import Reading
+from action_assistant.umrf.checks.subgraphs import check_subgraphs
+from action_assistant.umrf.checks.values import check_static, check_values
+from action_assistant.umrf.codec import ActionReading, Reading
 from action_assistant.umrf.codes import REFUSED, STRUCTURAL
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem, Signature
 
-__all__ = ["REFUSED", "STRUCTURAL", "blocking", "check", "check_reading", "refused_by_parser"]
+__all__ = [
+    "REFUSED",
+    "STRUCTURAL",
+    "blocking",
+    "check",
+    "check_action",
+    "check_reading",
+    "refused_by_parser",
+]
 
 
 def check(
-    graph: Graph, library: Mapping[str, Signature] | None = None, facts: EngineFacts = PINNED
+    graph: Graph,
+    library: Mapping[str, Signature] | None = None,
+    facts: EngineFacts = PINNED,
+    graphs: Mapping[str, Graph] | None = None,
 ) -> list[Problem]:
-    """Every problem of a graph, errors first. Never raises."""
+    """Every problem of a graph, errors first. Never raises.
+
+    `library`: the actions that the engine has, by name; `graphs`: the graphs that it has indexed and
+    so can run as sub-graphs. What is None is not known, and nothing is said of it.
+    """
     subject = Subject(graph, facts)
     check_structure(subject)
     check_flow(subject)
-    check_values(subject, library)
+    check_values(subject, library, graphs or {})
+    check_subgraphs(subject, graphs or {}, library or {})
     _check_actors(subject)
     check_scenarios(subject)
     return sorted(subject.problems, key=lambda problem: problem.severity)
 
 
 def check_reading(
-    reading: Reading, library: Mapping[str, Signature] | None = None, facts: EngineFacts = PINNED
+    reading: Reading,
+    library: Mapping[str, Signature] | None = None,
+    facts: EngineFacts = PINNED,
+    graphs: Mapping[str, Graph] | None = None,
 ) -> list[Problem]:
     """Every problem of a file as it stands: of its text, and of the graph in it."""
-    problems = [*reading.problems, *check(reading.graph, library, facts)]
+    problems = [*reading.problems, *check(reading.graph, library, facts, graphs)]
+    return sorted(problems, key=lambda problem: problem.severity)
+
+
+def check_action(reading: ActionReading) -> list[Problem]:
+    """Every problem of the file of one action, with places in that file, errors first."""
+    graph = Graph(name=reading.action.name or "action", actions=(reading.action,))
+    subject = Subject(graph, PINNED)
+    check_structure(subject)
+    check_static(subject)
+    problems = [*reading.problems, *at_top(iter(subject.problems))]
     return sorted(problems, key=lambda problem: problem.severity)
 
 

@@ -2,13 +2,17 @@
 
 import msgspec
 
+from action_assistant.umrf.action_files import ActionReading, read_action, write_action
 from action_assistant.umrf.dialects import dialect_of, translated
 from action_assistant.umrf.jsontext import Unreadable, parse, pointer
 from action_assistant.umrf.model import Graph, Key, Problem, Where
 from action_assistant.umrf.reading import Tree, read_tree
 from action_assistant.umrf.writing import Stamp, write
 
-__all__ = ["Reading", "Stamp", "Unreadable", "read", "stamp_of", "write"]
+__all__ = [
+    "ActionReading", "Reading", "Stamp", "Unreadable", "read", "read_action", "stamp_of", "write",
+    "write_action",
+]  # fmt: skip
 
 
 class Reading(msgspec.Struct, frozen=True):

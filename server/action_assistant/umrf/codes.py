@@ -119,6 +119,14 @@ CODES: Final[dict[str, Code]] = {
         "hazard", _WARNING, "the graph can be FINISHED while actions still run",
         "the engine ignores every stop of the graph",
     ),
+    "subgraph": Code(
+        "hazard", _ERROR, "a sub-graph that has an error itself",
+        "what its error says; a crash takes all graphs with it",
+    ),
+    "recursion": Code(
+        "hazard", _ERROR, "a sub-graph that contains itself, or the graph that it is in",
+        "the engine cannot resolve the graph",
+    ),
     "actors": Code(
         "hazard", _ERROR, "several actors, and an engine that cannot synchronise",
         "the engine refuses to start the graph",

@@ -1,7 +1,9 @@
-"""What an action file says about its action, for libraries."""
+"""What action files and graphs say about their parameters, for libraries (SPEC 2.1)."""
 
-from action_assistant.umrf.jsontext import parse_small
-from action_assistant.umrf.model import Action, Parameter, Signature
+import msgspec
+
+from action_assistant.umrf.jsontext import Json, dump, parse_small
+from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Parameter, Signature
 from action_assistant.umrf.parameters import flat_name
 
 
@@ -10,6 +12,47 @@ def signature_of(action: Action) -> Signature:
     inputs, optional = _types(action.inputs)
     outputs, _ = _types(action.outputs)
     return Signature(inputs=inputs, outputs=outputs, optional=optional)
+
+
+def signature_of_graph(graph: Graph) -> Signature:
+    """The signature of a graph as a sub-graph: the inputs of its entry actions that have no value,
+    and the outputs of the last exit action that has any."""
+    by_key = {action.key: action for action in graph.actions if not action.missing}
+    inputs: dict[str, str] = {}
+    optional: frozenset[str] = frozenset()
+    outputs: dict[str, str] = {}
+    for relation in sorted(graph.relations, key=lambda r: r.child_order):
+        if relation.parent == ENTRY and (entry := by_key.get(relation.child)):
+            open_ = tuple(p for p in entry.inputs if not _has_value(parse_small(p.text)))
+            types, free = _types(open_)
+            inputs |= types
+            optional |= free
+        if relation.child == EXIT and (end := by_key.get(relation.parent)):
+            outputs = _types(end.outputs)[0] or outputs
+    return Signature(inputs=inputs, outputs=outputs, optional=optional)
+
+
+def with_inputs(graph: Graph) -> Graph:
+    """The graph as if its parent had given its entry actions what they lack."""
+    entries = {relation.child for relation in graph.relations if relation.parent == ENTRY}
+    actions = tuple(
+        msgspec.structs.replace(action, inputs=tuple(map(_not_required, action.inputs)))
+        if action.key in entries
+        else action
+        for action in graph.actions
+    )
+    return msgspec.structs.replace(graph, actions=actions)
+
+
+def _has_value(leaf: Json) -> bool:
+    return isinstance(leaf, dict) and "pvf_value" in leaf
+
+
+def _not_required(parameter: Parameter) -> Parameter:
+    leaf = parse_small(parameter.text)
+    if not isinstance(leaf, dict) or "pvf_type" not in leaf or "pvf_value" in leaf:
+        return parameter
+    return Parameter(parameter.path, dump({**leaf, "pvf_required": False}))
 
 
 def _types(parameters: tuple[Parameter, ...]) -> tuple[dict[str, str], frozenset[str]]:

@@ -5,7 +5,15 @@ from typing import Final
 
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.model import PRECONDITIONS, Action
-from action_assistant.umrf.semantics import Behaviour, Hazard, NotReady, Script, simulate
+from action_assistant.umrf.semantics import (
+    Behaviour,
+    GraphState,
+    Hazard,
+    NotReady,
+    Script,
+    Trace,
+    simulate,
+)
 
 #: Actions and relations that all trials together may have, so that checking stays quick.
 BUDGET: Final = 2_000
@@ -31,19 +39,32 @@ def check_scenarios(subject: Subject) -> None:
         subject.report("H8", "warning", message, action=waiting)
 
 
-def _trials(subject: Subject) -> Iterator[tuple[Action | None, str]]:
+def _trials(subject: Subject, every: bool = False) -> Iterator[tuple[Action | None, str]]:
+    """Which action ends how; `every`: also where all children ignore it."""
     yield None, ""
     for action in subject.real:
         outgoing = subject.outgoing.get(action.key, [])
         answers = {o: [r.conditions.answer(o) for r in outgoing] for o in PRECONDITIONS}
         for outcome in ("on_false", "on_error"):
-            asked = any(answer != "ignore" for answer in answers[outcome])
+            asked = every or any(answer != "ignore" for answer in answers[outcome])
             if asked and answers[outcome] != answers["on_true"]:
                 yield action, outcome
 
 
-def _stuck(subject: Subject, action: Action | None, outcome: str) -> str | None:
-    """What the graph waits for in the end, or None if it does not."""
+def halted(subject: Subject) -> str | None:
+    """In which case a graph ends HALTED, in words; None if no trial does."""
+    size = max(len(subject.real), len(subject.relations))
+    for trial, (action, outcome) in enumerate(_trials(subject, every=True)):
+        if trial * size >= BUDGET:
+            break
+        for trace in _tried(subject, action, outcome):
+            if isinstance(trace, GraphState) and trace.state == "HALTED":
+                return f"if {action.full_name} ends with {outcome}" if action else "in any case"
+    return None
+
+
+def _tried(subject: Subject, action: Action | None, outcome: str) -> Iterator[Trace]:
+    """The trace of a trial: the first run of one action ends otherwise."""
     behaviours: dict[str, tuple[Behaviour, ...]] = {
         other.full_name: (Behaviour(after_s=1 + place / 1000),)
         for place, other in enumerate(subject.real)
@@ -52,10 +73,14 @@ def _stuck(subject: Subject, action: Action | None, outcome: str) -> str | None:
         usual = behaviours[action.full_name][0]
         other_end = Behaviour(after_s=usual.after_s, result=outcome)
         behaviours[action.full_name] = (other_end, usual)
-    waits: dict[str, str] = {}
     events = 20 * len(subject.real) + 100
-    traces = simulate(subject.graph, script=Script(behaviours), max_events=events)
-    for trace in traces:
+    return simulate(subject.graph, script=Script(behaviours), max_events=events)
+
+
+def _stuck(subject: Subject, action: Action | None, outcome: str) -> str | None:
+    """What the graph waits for in the end, or None if it does not."""
+    waits: dict[str, str] = {}
+    for trace in _tried(subject, action, outcome):
         match trace:
             case NotReady(node=node, why=why):
                 waits[node] = why

@@ -1,14 +1,18 @@
 """Parameters: who provides them, what renamings break, what a library says (SPEC 2.7, H2, H7, H8)."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 
 from action_assistant.umrf.checks.places import Subject, joined
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Key, Relation, Severity, Signature
 from action_assistant.umrf.semantics.values import RemapUnknown, Slot, renamed, slots_of
 
 
-def check_values(subject: Subject, library: Mapping[str, Signature] | None) -> None:
-    """Reports all of it."""
+def check_values(
+    subject: Subject,
+    library: Mapping[str, Signature] | None,
+    graphs: Container[str] = frozenset(),
+) -> None:
+    """Reports all of it. `graphs`: names of sub-graphs, which no library needs to know."""
     inputs = {action.key: slots_of(action.inputs) for action in subject.real}
     outputs = {action.key: slots_of(action.outputs) for action in subject.real}
     for relation in subject.sound:
@@ -17,7 +21,7 @@ def check_values(subject: Subject, library: Mapping[str, Signature] | None) -> N
         _check_inputs(subject, action, inputs, outputs, library)
         _check_static(subject, action, inputs[action.key])
         if library is not None:
-            _check_signature(subject, action, library, inputs[action.key], outputs[action.key])
+            _check_known(subject, action, library, inputs[action.key], outputs[action.key], graphs)
 
 
 _Slots = dict[str, Slot]
@@ -126,6 +130,12 @@ def _given_kinds(
     return kinds
 
 
+def check_static(subject: Subject) -> None:
+    """Values that are none of the allowed ones."""
+    for action in subject.real:
+        _check_static(subject, action, slots_of(action.inputs))
+
+
 def _check_static(subject: Subject, action: Action, inputs: _Slots) -> None:
     for name, slot in inputs.items():
         if slot.has_value() and slot.allowed and slot.value not in slot.allowed:
@@ -136,18 +146,26 @@ def _check_static(subject: Subject, action: Action, inputs: _Slots) -> None:
             subject.report("parameter-allowed", "warning", message, action=action, member=member)
 
 
-def _check_signature(
+def _check_known(
     subject: Subject,
     action: Action,
     library: Mapping[str, Signature],
     inputs: _Slots,
     outputs: _Slots,
+    graphs: Container[str],
 ) -> None:
     known = library.get(action.name)
-    if known is None:
+    if known is not None:
+        check_signature(subject, action, known, inputs, outputs)
+    elif action.name not in graphs:
         message = f"No library knows the action “{action.name}”; the engine refuses the graph unless it does."
         subject.report("unknown-action", "warning", message, action=action, member="/name")
-        return
+
+
+def check_signature(
+    subject: Subject, action: Action, known: Signature, inputs: _Slots, outputs: _Slots
+) -> None:
+    """Whether an action has exactly the parameters of what it is resolved to."""
     for side, ours, theirs in (("input", inputs, known.inputs), ("output", outputs, known.outputs)):
         surplus, lacking = set(ours) - set(theirs), set(theirs) - set(ours)
         if surplus or lacking:

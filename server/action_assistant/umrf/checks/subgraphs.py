@@ -1,0 +1,88 @@
+"""Actions that are graphs themselves: what the graph inside does to the one around it (SPEC 2.6)."""
+
+from collections.abc import Container, Mapping
+
+from action_assistant.umrf.checks.flow import check_flow
+from action_assistant.umrf.checks.places import Subject
+from action_assistant.umrf.checks.scenarios import halted
+from action_assistant.umrf.checks.structure import check_structure
+from action_assistant.umrf.checks.values import check_signature, check_values
+from action_assistant.umrf.model import EXIT, PRECONDITIONS, Action, Graph, Problem, Severity
+from action_assistant.umrf.semantics.values import slots_of
+from action_assistant.umrf.signatures import signature_of_graph, with_inputs
+
+
+def check_subgraphs(
+    subject: Subject, graphs: Mapping[str, Graph], known: Container[str] = frozenset()
+) -> None:
+    """Reports all of it. `known`: names of actions, which come before graphs of the same name."""
+    inner: dict[str, list[tuple[str, Severity, str]]] = {}
+    for action in subject.real:
+        graph = graphs.get(action.name)
+        if graph is None or action.name in known:
+            continue
+        if _contains(graph, {subject.graph.name, graph.name}, graphs, known):
+            message = (
+                f"The sub-graph “{graph.name}” contains itself or the graph that it is in; the "
+                "engine cannot resolve the graph."
+            )
+            subject.report("recursion", "error", message, action=action, member="/name")
+            continue
+        own = slots_of(action.inputs), slots_of(action.outputs)
+        check_signature(subject, action, signature_of_graph(graph), *own)
+        if action.name not in inner:
+            inner[action.name] = list(_problems_of(subject, graph))
+        for code, severity, message in inner[action.name]:
+            subject.report(code, severity, message, action=action, member="/name")
+        _check_pauses(subject, action)
+
+
+def _contains(
+    graph: Graph, above: set[str], graphs: Mapping[str, Graph], known: Container[str]
+) -> bool:
+    """Whether one of the graphs in which it is comes again inside."""
+    seen: set[str] = set()
+    stack = [graph]
+    while stack:
+        for action in stack.pop().actions:
+            if action.name in known or action.name not in graphs:
+                continue
+            if action.name in above:
+                return True
+            if action.name not in seen:
+                seen.add(action.name)
+                stack.append(graphs[action.name])
+    return False
+
+
+def _problems_of(subject: Subject, graph: Graph) -> list[tuple[str, Severity, str]]:
+    """Code, severity and message of what a sub-graph does wrong."""
+    inside = Subject(with_inputs(graph), subject.facts)
+    check_structure(inside)
+    check_flow(inside)
+    check_values(inside, None)
+    errors: list[Problem] = [p for p in inside.problems if p.severity == "error"]
+    if errors:
+        message = (
+            f"The sub-graph “{graph.name}” has an error ({errors[0].code}): {errors[0].message}"
+        )
+        return [("subgraph", "error", message)]
+    when = halted(inside)
+    if when is None:
+        return []
+    certain = not inside.incoming.get(EXIT)
+    message = (
+        f"The sub-graph “{graph.name}” ends HALTED {when}, which nobody is told: this action then "
+        "stays RUNNING for ever, and the graph with it."
+    )
+    return [("H8", "error" if certain else "warning", message)]
+
+
+def _check_pauses(subject: Subject, action: Action) -> None:
+    for relation in subject.incoming.get(action.key, []):
+        if "pause" in {relation.conditions.answer(outcome) for outcome in PRECONDITIONS}:
+            message = (
+                f"{action.full_name} is a sub-graph: a pause of it never completes, and the engine "
+                "obeys nothing any more."
+            )
+            subject.report("H5", "warning", message, relation=relation, member="/conditions")

@@ -1,0 +1,113 @@
+"""Graphs inside graphs, as `check` sees them."""
+
+import json
+import os
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from action_assistant.umrf.check import blocking, check, check_reading
+from action_assistant.umrf.codec import read
+from action_assistant.umrf.model import Graph, Signature
+
+ROOT = Path(__file__).parents[2]
+SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf" / "traces"
+SAFE = ["on_error -> ignore"]
+RUN = ["on_error -> run"]
+TEXT = {"pvf_type": "string"}
+
+
+def graph(name: str, *actions: dict[str, Any], exits: bool = True, **fields: Any) -> Graph:
+    """A chain of these actions."""
+    file: dict[str, Any] = {"graph_name": name, "actions": list(actions)} | fields
+    for first, second in pairwise(actions):
+        first["children"] = [{"name": second["name"]}]
+        second.setdefault("parents", [{"name": first["name"], "conditions": SAFE}])
+    file["graph_entry"] = [{"name": actions[0]["name"]}]
+    file["graph_exit"] = [{"name": actions[-1]["name"], "conditions": RUN}] if exits else []
+    return read(json.dumps(file)).graph
+
+
+def action(name: str, **fields: Any) -> dict[str, Any]:
+    return {"name": name, "type": "sync"} | fields
+
+
+def found(outer: Graph, *inner: Graph, library: Any = None) -> dict[str, str]:
+    graphs = {each.name: each for each in inner}
+    return {p.code: p.severity for p in check(outer, library, graphs=graphs)}
+
+
+def test_a_sound_sub_graph_is_no_problem() -> None:
+    assert found(graph("outer", action("Inner"), action("B")), graph("Inner", action("A"))) == {}
+
+
+def test_a_sub_graph_that_never_finishes_keeps_its_parent_running_for_ever() -> None:
+    inner = graph("Inner", action("A"), exits=False)
+    (problem,) = check(graph("outer", action("Inner")), graphs={"Inner": inner})
+    assert (problem.code, problem.severity) == ("H8", "error")
+    assert problem.where.path == "/actions/0/name"
+    assert "HALTED in any case" in problem.message
+
+
+def test_a_sub_graph_that_may_be_halted_is_a_warning_that_says_when() -> None:
+    inner = graph("Inner", action("A"), action("B"))
+    outer = graph("outer", action("Inner"))
+    assert found(outer, inner) == {"H8": "warning"}
+    (problem,) = check(outer, graphs={"Inner": inner})
+    assert "ends HALTED if A_0 ends with on_error" in problem.message
+
+
+def test_an_error_in_a_sub_graph_is_an_error_of_the_graph_around_it() -> None:
+    inner = graph("Inner", action("A", children=[]), action("B", parents=[]))
+    assert found(graph("outer", action("Inner")), inner) == {"subgraph": "error"}
+
+
+def test_a_sub_graph_gets_its_inputs_from_outside() -> None:
+    inner = graph("Inner", action("A", input_parameters={"text": TEXT}))
+    given = {"input_parameters": {"text": TEXT | {"pvf_value": "x"}}}
+    assert found(graph("outer", action("Inner", **given)), inner) == {}
+    assert found(graph("outer", action("Inner")), inner) == {"signature": "error"}
+
+
+def test_graphs_that_contain_each_other_are_found() -> None:
+    first, second = graph("First", action("Second")), graph("Second", action("First"))
+    assert found(first, first, second) == {"recursion": "error"}
+    assert found(graph("outer", action("First")), first, second) == {"recursion": "error"}
+
+
+def test_an_action_comes_before_a_graph_of_its_name_and_a_graph_before_the_unknown() -> None:
+    inner = graph("Inner", action("A"), exits=False)
+    outer = graph("outer", action("Inner"))
+    assert found(outer, inner, library={"Inner": Signature()}) == {}
+    assert found(outer, library={}) == {"unknown-action": "warning"}
+    assert "unknown-action" not in found(outer, inner, library={})
+
+
+def test_pausing_a_sub_graph_is_told() -> None:
+    pausing = [{"name": "A", "conditions": ["on_true -> pause", "on_false -> run", *SAFE]}]
+    outer = graph("outer", action("A"), action("Inner", parents=pausing))
+    messages = [p.message for p in check(outer, graphs={"Inner": graph("Inner", action("B"))})]
+    assert any("Inner_0 is a sub-graph: a pause of it never completes" in m for m in messages)
+
+
+RECORDED = {
+    path.name.removesuffix(".graph.json"): path for path in sorted(SHARED.glob("sub_*.graph.json"))
+}
+
+
+@pytest.mark.skipif(not RECORDED, reason=f"there are no recordings in {SHARED}")
+def test_of_the_recorded_sub_graphs_the_one_that_halted_is_found() -> None:
+    library = {
+        inner.name: inner
+        for path in (SHARED / "subgraphs").glob("*.json")
+        for inner in [read(path.read_bytes()).graph]
+    }
+    halting = {}
+    for name, path in RECORDED.items():
+        problems = check_reading(read(path.read_bytes()), None, graphs=library)
+        halting[name] = [p for p in problems if "ends HALTED" in p.message]
+        if name != "sub_halt":
+            assert blocking(problems) == [], name
+    assert halting["sub_halt"]
