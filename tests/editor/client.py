@@ -21,6 +21,7 @@ class Client:
         self.member: Member | None = None
         self.room: Room | None = None
         self.seq = 0
+        self.read_only = ""
         self.durable = 0
         self.sent = 0
         self.others: dict[int, bytes] = {}
@@ -78,6 +79,9 @@ class Client:
             reader = wire.Reader(frame[1:])
             self.durable, self.seq = reader.number(), reader.number()
             assert self.durable <= self.sent
+            return
+        if frame[0] == wire.READ_ONLY:
+            self.read_only = wire.Reader(frame[1:]).text().decode()
             return
         match wire.parse(frame):
             case wire.Question(state):

@@ -155,7 +155,7 @@ async def test_bytes_are_stored_as_they_came_and_only_if_they_bring_something(
     async with rooms.enter(STREAM) as room:
         assert await room.submit(one, "ada") == 1
         assert await room.submit(one, "bob") == 1
-        assert await room.submit(two, "bob") == 2
+        assert await room.submit(two, "ada") == 2
         assert await room.submit(wire.NOTHING_NEW, "bob") == 2
     assert await bodies(journal) == [one, two]
 

@@ -126,7 +126,7 @@ async def agree_on_log(journal: Journal, rooms: Rooms, stream: str) -> None:
     replica = await room.quiet() if room is not None else None
     plain = Replica()
     for event in await journal.read(stream):
-        brought = plain.take(event.body)
+        brought = plain.take(event.body, event.author)
         assert (brought, event.kind) in {(Brought.NEWS, UPDATED), (Brought.WAITS, DEFERRED)}
     loaded = await load(journal, stream)
     for other in (loaded.replica, replica):

@@ -24,7 +24,11 @@ DESCRIPTION_LIMIT: Final = 10_000
 
 
 class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A graph as lists and pages show it. `seq` counts the changes of its document."""
+    """A graph as lists and pages show it. `seq` counts the changes of its document.
+
+    `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
+    change it.
+    """
 
     id: str
     name: str
@@ -35,6 +39,7 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     actions: int | None = None
     problems: Counts | None = None
     deleted_at: datetime | None = None
+    damaged: int | None = None
 
 
 class Reading(msgspec.Struct, frozen=True):
@@ -177,6 +182,7 @@ class Catalogue:
             actions=summary.actions,
             problems=summary.problems,
             deleted_at=None if row.deleted_at is None else h.when(row.deleted_at),
+            damaged=summary.damaged,
         )
 
 

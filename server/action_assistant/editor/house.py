@@ -1,6 +1,7 @@
 """What one editor process is made of."""
 
 from action_assistant.editor.catalogue import Catalogue
+from action_assistant.editor.crowd import Crowd
 from action_assistant.editor.history import History
 from action_assistant.editor.library import Library
 from action_assistant.editor.people import People
@@ -19,6 +20,7 @@ class House:
         self.journal = journal
         self.people = people
         self.rooms = Rooms(journal)
+        self.crowd = Crowd(limits=settings.limits)
         self.sights = Sights(journal, self.rooms)
         self.catalogue = Catalogue(journal, self.rooms, self.sights)
         self.versions = Versions(journal, self.sights)

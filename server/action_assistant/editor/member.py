@@ -21,7 +21,7 @@ class Member:
     def __init__(self, person: Person, *, edits: bool = True, acks: bool = False) -> None:
         self.person: Final = person
         self.seat: Final = Seat(person)
-        self.edits: Final = edits
+        self.edits = edits
         self.acks: Final = acks
         self.synced = False  # has been sent the document
         self.refused = False  # nothing more is taken from it
@@ -52,6 +52,11 @@ class Member:
         """Send the document, however large: it was asked for."""
         self._frames.append(frame)
         self._news.set()
+
+    def post_read_only(self, why: str) -> None:
+        """Say that nobody may change the document, to those who know our own messages."""
+        if self.acks:
+            self.post(wire.read_only(why))
 
     def post_presence(self, entries: Iterable[Entry]) -> None:
         """Tell who is where; only the last word of each client waits."""

@@ -93,6 +93,11 @@ class Attendance:
         # The same clock, so that the client's next word, should it come back, is newer.
         return [Entry(client, last.clock if clock is None else clock, _GONE)]
 
+    def holder(self, client: int) -> str | None:
+        """The person whose socket speaks for a client."""
+        seat = self._seats.get(client)
+        return None if seat is None else seat.person.id
+
     def everyone(self) -> tuple[Entry, ...]:
         """Who is there now."""
         return tuple(self._entries.values())

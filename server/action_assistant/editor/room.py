@@ -16,9 +16,18 @@ from action_assistant.editor import wire
 from action_assistant.editor.happenings import DEFERRED, UPDATED
 from action_assistant.editor.member import Member
 from action_assistant.editor.presence import Attendance
-from action_assistant.editor.replica import Brought, Loaded, Panicked, Replica, load
+from action_assistant.editor.replica import (
+    Brought,
+    Foreign,
+    Kept,
+    Loaded,
+    Panicked,
+    Replica,
+    TooMuchWaits,
+    load,
+)
 from action_assistant.editor.wire import Entry, Malformed
-from action_assistant.errors import BadInput, Refused, Unavailable
+from action_assistant.errors import BadInput, Conflict, Refused, TooLarge, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 
@@ -73,6 +82,7 @@ class Room:
         self._journal = journal
         self._replica = loaded.replica
         self._kept = loaded.kept
+        self.damaged: Final = loaded.damaged
         self._gone = gone
         self._waiting: list[Item] = []
         self._in_hand: list[Item] = []
@@ -87,6 +97,9 @@ class Room:
     def join(self, member: Member) -> None:
         """Let a socket in: it is asked what it has, and told who is there."""
         self.members.add(member)
+        if self.damaged is not None:
+            member.edits = False
+            member.post_read_only(self._why_not())
         if member.edits:
             # Not from a batch that is being committed: an older state only asks for more.
             member.post(wire.question(self._replica.doc.get_state()))
@@ -126,6 +139,8 @@ class Room:
 
         Raises BadInput, Unavailable. Returns after the commit, also when nothing changed.
         """
+        if self.damaged is not None:
+            raise Conflict(self._why_not())
         if self._ended:
             raise Unavailable(_CLOSING)
         done: asyncio.Future[int] = asyncio.get_running_loop().create_future()
@@ -165,6 +180,12 @@ class Room:
         await self._quiet.wait()
         self._task.cancel()
         await asyncio.wait([self._task])
+
+    def _why_not(self) -> str:
+        damaged = self.damaged
+        if damaged is None:
+            return ""
+        return f"This graph can only be read: change {damaged.seq} of its history is damaged."
 
     def _enter(self, item: Item) -> None:
         if self._ended:
@@ -226,6 +247,13 @@ class Room:
             except Malformed as error:
                 _refuse(item, wire.MALFORMED, BadInput(f"The update cannot be read: {error}."))
                 continue
+            except Foreign as error:
+                log.warning("%s: %s forged an edit: %s", self.stream, item.author, error)
+                _refuse(item, wire.FORBIDDEN, BadInput("The update speaks for somebody else."))
+                continue
+            except TooMuchWaits:
+                _refuse(item, wire.TOO_BIG, TooLarge("Too much waits for what never came."))
+                continue
             except Panicked:
                 log.warning("%s: refused an update that makes the library panic", self.stream)
                 _refuse(item, wire.MALFORMED, BadInput("The update cannot be read."))
@@ -254,7 +282,7 @@ class Room:
                 _refuse(offer, wire.FORBIDDEN, BadInput("Not allowed."))
                 return None
             return Brought.NOTHING
-        return self._replica.take(offer.update)
+        return self._replica.take(offer.update, offer.author, self.attendance.holder)
 
     # --- telling --------------------------------------------------------------------------------
 
@@ -304,9 +332,9 @@ class Room:
 
     async def _keep_snapshot(self) -> None:
         """Cache the document. Not while something waits: no state that it gives out has that."""
-        if self._kept == self.seq or self._replica.waiting:
+        if self._kept == self.seq or self._replica.waiting or self.damaged is not None:
             return
-        seq, state = self.seq, self._replica.doc.get_update()
+        seq, state = self.seq, Kept.of(self._replica)
         try:
             await self._journal.keep_snapshot(self.stream, seq, state)
         except Refused as error:

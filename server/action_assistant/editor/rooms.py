@@ -8,7 +8,6 @@ from typing import Final
 from action_assistant.editor import wire
 from action_assistant.editor.replica import load
 from action_assistant.editor.room import Room
-from action_assistant.editor.wire import Malformed
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 
@@ -94,9 +93,6 @@ class Rooms:
     async def _load(self, stream: str) -> Room:
         try:
             loaded = await load(self._journal, stream)
-        except Malformed as error:
-            raise Unavailable(f"The stored history cannot be read: {error}.") from error
-        else:
             room = self._rooms[stream] = Room(stream, self._journal, loaded, self._forget)
             return room
         finally:

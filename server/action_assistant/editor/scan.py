@@ -5,14 +5,17 @@ several updates that wait for an earlier one. So nothing reaches it that was not
 Yjs update format, version 1.
 """
 
-from typing import Final
+from typing import Final, TypeAlias
 
 import msgspec
 
+from action_assistant.editor.nesting import Placed
 from action_assistant.editor.wire import Malformed, Reader
 
 MOST_STRUCTS: Final = 200_000
 MOST_CLIENTS: Final = 20_000
+MOST_CLIENT: Final = 2**53 - 1  # beyond that a page cannot read the number, and fails
+MOST_CLOCK: Final = 2**31 - 1
 DEEPEST: Final = 64  # of arrays and objects in one value
 
 _GC, _DELETED, _JSON, _BINARY, _STRING, _EMBED, _FORMAT, _TYPE, _ANY, _DOC, _SKIP = range(11)
@@ -22,10 +25,11 @@ _NAMED_TYPES: Final = frozenset({3, 5})
 
 class Outline(msgspec.Struct, frozen=True):
     """What an update brings, `(client, from clock, to clock)`, and what must be there before it:
-    of each client so many clocks."""
+    of each client so many clocks. `placed`: what need not lie in a root."""
 
     brings: tuple[tuple[int, int, int], ...]
     needs: dict[int, int]
+    placed: tuple[Placed, ...] = ()
 
     def ready(self, known: dict[int, int]) -> bool:
         """Whether everything that it builds on is known, or comes with it."""
@@ -45,12 +49,17 @@ def outline(update: bytes) -> Outline:
     reader = Reader(update)
     brings: list[tuple[int, int, int]] = []
     needs: dict[int, int] = {}
+    placed: list[Placed] = []
+    seen: set[int] = set()
     clients = reader.number()
     if clients > MOST_CLIENTS or clients * 3 > reader.left:
         raise Malformed("too many clients")
     structs = 0
     for _ in range(clients):
-        count, client, clock = reader.number(), reader.number(), reader.number()
+        count, client, clock = reader.number(), _client(reader), reader.number()
+        if client in seen:
+            raise Malformed("a client comes twice")
+        seen.add(client)
         structs += count
         if structs > MOST_STRUCTS or count > reader.left:
             raise Malformed("too many structs")
@@ -60,50 +69,73 @@ def outline(update: bytes) -> Outline:
             if info & 31 == _SKIP:
                 clock += reader.number()
                 continue
-            clock += _struct(reader, info, needs)
+            length, reference = _struct(reader, info, needs)
+            clock += length
+            if reference is not None:
+                placed.append(Placed((client, start, clock), *reference))
             if brings and brings[-1][0] == client and brings[-1][2] == start:
                 brings[-1] = (client, brings[-1][1], clock)
             else:
                 brings.append((client, start, clock))
+        if clock > MOST_CLOCK:
+            raise Malformed("a clock that no client reaches")
     _deletions(reader, needs)
     if reader.left:
         raise Malformed("something follows the update")
-    return Outline(tuple(brings), needs)
+    return Outline(tuple(brings), needs, tuple(placed))
+
+
+def _client(reader: Reader) -> int:
+    client = reader.number()
+    if client > MOST_CLIENT:
+        raise Malformed("a client that cannot be")
+    return client
 
 
 def _deletions(reader: Reader, needs: dict[int, int]) -> None:
     for _ in range(reader.number()):
-        client = reader.number()
+        client = _client(reader)
         for _ in range(reader.number()):
             end = reader.number() + reader.number()
+            if end > MOST_CLOCK:
+                raise Malformed("a clock that no client reaches")
             needs[client] = max(end, needs.get(client, 0))
 
 
-def _struct(reader: Reader, info: int, needs: dict[int, int]) -> int:
+#: A struct that tells where this one lies, and whether inside it.
+_Reference: TypeAlias = tuple[int, int, bool]
+
+
+def _struct(reader: Reader, info: int, needs: dict[int, int]) -> tuple[int, _Reference | None]:
     """One struct; how many clocks it takes."""
     kind = info & 31
     if kind == _GC:
-        return _length(reader)
+        return _length(reader), None
+    reference: _Reference | None = None
     if info & 0x80:
-        _need(reader, needs)
+        reference = *_need(reader, needs), False
     if info & 0x40:
-        _need(reader, needs)
+        right = *_need(reader, needs), False
+        reference = reference or right
     if not info & 0xC0:
         parent = reader.number()
         if parent == 1:
             reader.text()
         elif parent == 0:
-            _need(reader, needs)
+            reference = *_need(reader, needs), True
         else:
             raise Malformed("a struct without a parent")
         if info & 0x20:
             reader.text()
-    return _content(reader, kind)
+    return _content(reader, kind), reference
 
 
-def _need(reader: Reader, needs: dict[int, int]) -> None:
-    client, clock = reader.number(), reader.number()
+def _need(reader: Reader, needs: dict[int, int]) -> tuple[int, int]:
+    client, clock = _client(reader), reader.number()
+    if clock > MOST_CLOCK:
+        raise Malformed("a clock that no client reaches")
     needs[client] = max(clock + 1, needs.get(client, 0))
+    return client, clock
 
 
 def _content(reader: Reader, kind: int) -> int:

@@ -10,7 +10,6 @@ from action_assistant.editor.document import Maps
 from action_assistant.editor.happenings import graph_stream
 from action_assistant.editor.replica import load
 from action_assistant.editor.rooms import Rooms
-from action_assistant.editor.wire import Malformed
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf.check import check
@@ -38,13 +37,14 @@ class Counts(msgspec.Struct, frozen=True):
 
 
 class Summary(msgspec.Struct, frozen=True):
-    """What a list shows of a graph."""
+    """What a list shows of a graph. `damaged`: the first change that cannot be read."""
 
     seq: int
     name: str
     description: str
     actions: int
     problems: Counts
+    damaged: int | None = None
 
 
 class Sights:
@@ -58,10 +58,14 @@ class Sights:
         self._summaries = _Recent[str, Summary](_COUNTED)
 
     async def now(self, graph: str) -> Moment:
-        """The graph as it is. Raises Unavailable, NotFound."""
+        """The graph as it is; of one whose history is damaged, what can be read of it.
+
+        Raises Unavailable, NotFound.
+        """
         room = self._rooms.open_room(graph_stream(graph))
         if room is None:
-            return await self.at(graph, await self._newest(graph))
+            newest = await self._newest(graph)
+            return self._moments.get((graph, newest)) or await self._loaded(graph, newest)
         found = await room.look(
             lambda replica, seq: (
                 self._moments.get((graph, seq)) or _moment(seq, document.maps_of(replica.doc))
@@ -72,7 +76,7 @@ class Sights:
     async def at(self, graph: str, seq: int) -> Moment:
         """The graph after its change `seq`. Raises NotFound, Conflict, Unavailable."""
         known = self._moments.get((graph, seq))
-        if known is not None:
+        if known is not None and known.seq == seq:
             return known
         room = self._rooms.open_room(graph_stream(graph))
         if room is not None and room.seq == seq:
@@ -85,15 +89,22 @@ class Sights:
                 f"This graph has the changes 1 to {newest}; there is no {seq}.",
                 where={"path": "/seq"},
             )
-        try:
-            loaded = await load(self._journal, graph_stream(graph), upto=seq)
-        except Malformed as error:
-            raise Unavailable(f"The stored history cannot be read: {error}.") from error
+        found = await self._loaded(graph, seq)
+        if found.seq < seq:
+            raise Unavailable(
+                f"Change {found.seq + 1} of this graph's history is damaged; those before it can "
+                "be read."
+            )
+        return found
+
+    async def _loaded(self, graph: str, seq: int) -> Moment:
+        """The graph after its change `seq`, or after the last one before it that can be read."""
+        loaded = await load(self._journal, graph_stream(graph), upto=seq)
         try:
             maps = document.maps_of(loaded.replica.doc)
         finally:
             loaded.replica.close()
-        return self._moments.put((graph, seq), _moment(seq, maps))
+        return self._moments.put((graph, seq), _moment(loaded.seq, maps))
 
     async def moment(self, graph: str, seq: int | None) -> Moment:
         """The graph at `seq`, or as it is."""
@@ -122,6 +133,7 @@ class Sights:
                 moment.graph.description,
                 sum(not action.missing for action in moment.graph.actions),
                 Counts(errors, len(problems) - errors),
+                moment.seq + 1 if moment.seq < newest else None,
             ),
         )
 

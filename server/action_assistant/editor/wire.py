@@ -9,6 +9,7 @@ SYNC: Final = 0
 AWARENESS: Final = 1
 QUERY_AWARENESS: Final = 3
 ACKS: Final = 100
+READ_ONLY: Final = 102
 STEP_1: Final = 0
 STEP_2: Final = 1
 UPDATE: Final = 2
@@ -196,6 +197,11 @@ def presence(entries: Iterable[Entry]) -> bytes:
 def acks(messages: int, seq: int) -> bytes:
     """The first `messages` edits of this socket are durable; it was sent the log up to `seq`."""
     return bytes((ACKS,)) + number(messages) + number(seq)
+
+
+def read_only(why: str) -> bytes:
+    """Nobody may change this document; a sentence says why."""
+    return bytes((READ_ONLY,)) + text(why.encode())
 
 
 #: Says nothing; sent so that a client which drops silent sockets does not.

@@ -13,7 +13,7 @@ from action_assistant.editor import wire
 from action_assistant.editor.house import Door
 from action_assistant.editor.member import Member
 from action_assistant.editor.room import Room
-from action_assistant.errors import Refused
+from action_assistant.errors import Refused, TooMany
 from action_assistant.web.access import person_of
 from action_assistant.web.problems import PROBLEM_JSON, problem_of
 
@@ -31,12 +31,14 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
     @websocket("/api/graphs/{graph_id:str}/room")
     async def room(socket: Socket, graph_id: str) -> None:
         house, person = door.house, person_of(socket)
+        address = socket.client.host if socket.client is not None else ""
         try:
-            await house.catalogue.require(graph_id)
-            await house.people.seen(person)
-            async with house.rooms.enter(h.graph_stream(graph_id)) as found:
-                await socket.accept()
-                await _converse(socket, found, Member(person, acks=_wants_acks(socket)))
+            with house.crowd.admitted(person.id, address):
+                await house.catalogue.require(graph_id)
+                await house.people.seen(person)
+                async with house.rooms.enter(h.graph_stream(graph_id)) as found:
+                    await socket.accept()
+                    await _converse(socket, found, Member(person, acks=_wants_acks(socket)))
         except Refused as refused:
             await _refuse(socket, refused)
 
@@ -106,6 +108,8 @@ async def _refuse(socket: Socket, refused: Refused) -> None:
         (b"content-type", PROBLEM_JSON.encode()),
         (b"content-length", str(len(body)).encode()),
     ]
+    if isinstance(refused, TooMany):
+        fields.append((b"retry-after", b"5"))
     start: Any = {
         "type": "websocket.http.response.start",
         "status": refused.status,
