@@ -86,7 +86,7 @@ export interface ConnectOptions {
   readonly keep?: Keep;
   /**
    * Asked before each attempt: why not to come in, or null. A browser cannot tell a refused upgrade
-   * from a dead server, nor whose cookie an upgrade carries. `again` after an attempt that failed.
+   * from a dead server, nor whose cookie an upgrade carries. `again` after an attempt or a connection broke off.
    * Throwing means that nobody answers.
    */
   readonly admit?: Admit;

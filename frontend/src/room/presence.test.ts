@@ -111,3 +111,23 @@ test("a field is taken back with undefined, and saying the same again is not sen
   vi.advanceTimersByTime(100);
   expect(sent).toBe(0);
 });
+
+test("where another page looks is known, and nonsense is not followed", () => {
+  const page = other({ ...ada, view: { x: 10, y: -20, zoom: 0.5 } });
+  expect(presence.people()[0]?.presence.view).toEqual({ x: 10, y: -20, zoom: 0.5 });
+  for (const view of [{ x: 1, y: 2 }, { x: 1, y: 2, zoom: 0 }, { x: "1", y: 2, zoom: 1 }, null]) {
+    show(page, { ...ada, view });
+    expect(presence.people()[0]?.presence.view).toBeUndefined();
+  }
+});
+
+test.each(["Ülle Õunapuu", "名前 さん", "اسم", "🤖🏳️‍🌈", "ключ"])(
+  "the name %s arrives as it is",
+  (name) => {
+    other({ user: { id: "1", name, color: "" }, editing: `k|${name}`, selection: [name] });
+    expect(presence.people()[0]).toMatchObject({
+      name,
+      presence: { editing: `k|${name}`, selection: [name] },
+    });
+  },
+);

@@ -3,16 +3,23 @@ import { act, StrictMode } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { addAction, rename } from "../graph/edit";
+import type { Keep } from "./connect";
+import { FakeDevice } from "./fake-device";
 import { FakeServer } from "./fake-server";
 import {
+  type Choice,
   type OpenRoom,
   RoomProvider,
+  useChoice,
+  useEditors,
   useGraph,
   useGraphPart,
   useLink,
+  useOthersWaiting,
   usePeople,
   useRoom,
   useUndo,
+  useViewOf,
 } from "./use-room";
 
 let server: FakeServer;
@@ -103,4 +110,86 @@ test("leaving and changing the graph close the room that was open", () => {
   expect(second.url).toContain("other");
   act(() => root.render(null));
   expect(second.readyState).toBe(3);
+});
+
+let choice: Choice | null;
+
+function Together() {
+  open = useRoom();
+  choice = useChoice();
+  const { state, unsaved } = useLink();
+  const names = useGraph().actions.map((action) => action.name);
+  const editors = useEditors("k|name").map((person) => person.name);
+  const waiting = useOthersWaiting().map(({ name, waiting }) => `${name}:${waiting}`);
+  const view = useViewOf(5);
+  const parts = [state, unsaved, ...names, ...editors, ...waiting, view ? `at ${view.x}` : ""];
+  return <p>{parts.join(" ").trim()}</p>;
+}
+
+const flush = () => act(() => new Promise((done) => setTimeout(done, 5)));
+
+async function showKept(keep: Keep) {
+  vi.stubGlobal("fetch", async () => Response.json({ person: keep.person }));
+  act(() =>
+    root.render(
+      <StrictMode>
+        <RoomProvider url="ws://host/room" keep={{ ...keep }}>
+          <Together />
+        </RoomProvider>
+      </StrictMode>,
+    ),
+  );
+  await flush();
+}
+
+const leave = async () => {
+  act(() => root.render(null));
+  await flush();
+};
+
+const ADA = { id: "a", name: "Ada" };
+const MARI = { id: "m", name: "Mari" };
+
+test("a page knows who edits a field, where somebody looks, and whose edits wait here", async () => {
+  const device = new FakeDevice();
+  await showKept({ graph: "g", person: MARI, device });
+  act(() => void addAction(open.doc, { name: "Scan" }));
+  await leave();
+  await showKept({ graph: "g", person: ADA, device });
+  act(() => void server.accept());
+  const view = { x: 7, y: 8, zoom: 1 };
+  act(() => server.presence(5, 1, { user: MARI, editing: "k|name", view }));
+  await flush();
+  expect(text()).toBe("live 0 Mari Mari:1 at 7");
+});
+
+test("edits on a history that the server left are made again there, or dropped, as the person says", async () => {
+  for (const decision of ["apply", "drop"] as const) {
+    const device = new FakeDevice();
+    server = new FakeServer();
+    await showKept({ graph: "g", person: ADA, device });
+    act(() => void server.accept());
+    act(() => void addAction(open.doc, { name: "Lost" }));
+    act(() => server.last.end(1006));
+    act(() => void addAction(open.doc, { name: "Mine" }));
+    await leave();
+    server = new FakeServer();
+    await showKept({ graph: "g", person: ADA, device });
+    act(() => void server.accept());
+    expect(text()).toBe("refused 1 Lost Mine");
+    expect(choice?.stranded.edits).toBe(1);
+
+    let deciding: Promise<unknown> | undefined;
+    act(() => {
+      deciding = choice?.[decision]();
+    });
+    await flush();
+    act(() => void server.accept());
+    await act(async () => void (await deciding));
+    await flush();
+    expect(choice).toBeNull();
+    expect(text()).toBe(decision === "apply" ? "live 0 Mine" : "live 0");
+    expect(device.waiting).toBe(0);
+    await leave();
+  }
 });

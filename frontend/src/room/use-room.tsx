@@ -125,17 +125,22 @@ export function RoomProvider({
     async (difference: Stranded["difference"] | null) => {
       const old = now.current;
       if (old === null) return 0;
-      if (difference === null) await old.room.forget();
-      const fresh = enter(difference !== null);
-      let changed = 0;
-      if (difference !== null) {
-        await fresh.room.settled(untilRefused(fresh.room));
-        changed = applyDifference(fresh.doc, difference);
-        await fresh.room.settled(untilRefused(fresh.room));
+      if (difference === null) {
         await old.room.forget();
+        old.leave();
+        enter(false);
+        return 0;
       }
-      old.leave();
-      return changed;
+      const { room, doc } = enter(true);
+      try {
+        await room.settled(untilRefused(room));
+        const changed = applyDifference(doc, difference);
+        await room.settled(untilRefused(room));
+        await old.room.forget();
+        return changed;
+      } finally {
+        old.leave();
+      }
     },
     [enter],
   );

@@ -41,9 +41,9 @@ const refusals: Readonly<Record<Why, string>> = {
 
 function where(link: Link): string {
   const edits = changes(link.unsaved);
-  const wait = link.unsaved === 1 ? "waits" : "wait";
+  const [wait, survive] = link.unsaved === 1 ? ["waits", "survives"] : ["wait", "survive"];
   return link.kept
-    ? `${edits} ${wait} on this device and survive closing the page.`
+    ? `${edits} ${wait} on this device and ${survive} closing the page.`
     : `${edits} ${wait} in this page only: keep it open.`;
 }
 
