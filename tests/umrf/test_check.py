@@ -316,9 +316,9 @@ def test_ten_thousand_actions_are_checked_in_seconds() -> None:
         for i, name in enumerate(names)
     ]
     graph = read(json.dumps(file(*actions, entry=names[:1], exits=names[-1:]))).graph
-    started = time.perf_counter()
+    started = time.process_time()
     assert check(graph) == []
-    assert time.perf_counter() - started < 5
+    assert time.process_time() - started < 5
 
 
 # The engine's own verdicts
