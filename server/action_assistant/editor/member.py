@@ -3,6 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import Iterable
+from enum import Enum
 from typing import Final
 
 from action_assistant.editor import wire
@@ -13,6 +14,15 @@ from action_assistant.web.keys import Person
 WAITING_FRAMES: Final = 256
 WAITING_BYTES: Final = 1 << 20
 _UNHANDLED_EDITS: Final = 256  # that a socket may have sent ahead of the room
+
+
+class _Answer(Enum):
+    """Where the document is that the socket asked for."""
+
+    NONE = "nowhere"
+    WANTED = "still to be made"
+    WAITS = "waits to be taken"
+    LEFT = "is being sent"
 
 
 class Member:
@@ -29,6 +39,7 @@ class Member:
         self._heard = 0  # edits that the socket brought
         self._frames: deque[bytes] = deque()
         self._bytes = 0
+        self._answer = _Answer.NONE
         self._entries: dict[int, Entry] = {}
         self._ack: bytes | None = None
         self._news = asyncio.Event()
@@ -48,8 +59,19 @@ class Member:
         self._bytes += len(frame)
         self._news.set()
 
+    def asks(self) -> bool:
+        """The socket wants the document; False when it is still on its way for an earlier wish.
+
+        What changes meanwhile is sent behind it, so that a second one would tell nothing new.
+        """
+        if self._answer is not _Answer.NONE:
+            return False
+        self._answer = _Answer.WANTED
+        return True
+
     def post_answer(self, frame: bytes) -> None:
         """Send the document, however large: it was asked for."""
+        self._answer = _Answer.WAITS
         self._frames.append(frame)
         self._news.set()
 
@@ -72,12 +94,16 @@ class Member:
 
     async def take(self) -> list[bytes]:
         """What is to be sent next, in order; waits until there is something."""
+        if self._answer is _Answer.LEFT:  # whoever takes again has sent what was taken before
+            self._answer = _Answer.NONE
         await self._news.wait()
         self._news.clear()
         self._taken_at = self._loop.time()
         frames = list(self._frames)
         self._frames.clear()
         self._bytes = 0
+        if self._answer is _Answer.WAITS:
+            self._answer = _Answer.LEFT
         if self._entries:
             frames.append(wire.presence(self._entries.values()))
             self._entries = {}

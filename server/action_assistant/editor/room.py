@@ -120,7 +120,8 @@ class Room:
                     return
                 self._enter(Offer(update, member.person.id, member))
             case wire.Question(state):
-                self._enter(Ask(member, state))
+                if member.asks():
+                    self._enter(Ask(member, state))
             case wire.Presence(entries):
                 self._tell_presence(self.attendance.hear(member.seat, entries), member)
             case wire.WhoIsThere():
