@@ -1,6 +1,7 @@
 """Different clients in one room of the real server: the page, a stock y-websocket, pycrdt's own."""
 
 import os
+import shutil
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -169,5 +170,34 @@ def test_edits_made_while_the_server_was_gone_are_saved_when_it_is_back(
         with product.editor() as client:
             file = client.get(f"/api/graphs/{graph_id}/umrf").json()
         assert sorted(action["name"] for action in file["actions"]) == ["Before", "While"]
+    finally:
+        product.end()
+
+
+def test_a_page_never_brings_back_what_a_restored_backup_lacks(page: Page, tmp_path: Path) -> None:
+    product = Product(tmp_path / "data")
+    product.start()
+    try:
+        with product.editor() as client:
+            graph_id = client.post("/api/graphs", json={"name": "g"}).json()["id"]
+        join(page, product, graph_id, "page")
+        page("act", name="page", edit=["addAction", {"name": "Before"}])
+        until(lambda: page("look", name="page")["link"]["unsaved"], 0)
+        product.kill()
+        shutil.copytree(product.data, tmp_path / "backup")
+        product.start()
+        until(lambda: page("look", name="page")["link"]["state"], "live", seconds=30)
+        page("act", name="page", edit=["addAction", {"name": "LostWithTheDisk"}])
+        until(lambda: page("look", name="page")["link"]["unsaved"], 0)
+        product.kill()
+        page("act", name="page", edit=["addAction", {"name": "Waits"}])
+        shutil.rmtree(product.data)
+        shutil.copytree(tmp_path / "backup", product.data)
+        product.start()
+        until(lambda: page("look", name="page")["link"].get("why"), "other-epoch", seconds=30)
+        assert page("look", name="page")["link"]["unsaved"] == 1
+        with product.editor() as client:
+            file = client.get(f"/api/graphs/{graph_id}/umrf").json()
+        assert [action["name"] for action in file["actions"]] == ["Before"]
     finally:
         product.end()
