@@ -1,17 +1,30 @@
 /** Lets the page in only with a session, and knows whose it is. */
-import { type ReactNode, useCallback, useEffect, useMemo, useState } from "react";
+import { useQueryClient } from "@tanstack/react-query";
+import {
+  type ReactNode,
+  useCallback,
+  useEffect,
+  useMemo,
+  useState,
+  useSyncExternalStore,
+} from "react";
+import { sessionEnd } from "../api/ended";
 import { Refusal, sentence } from "../api/http";
 import { currentPerson, openSession, type Person, rename, takeToken } from "../api/session";
 import { PersonContext } from "./person";
 import { SignIn } from "./sign-in";
+import { SignInBar } from "./sign-in-bar";
 
-type Gate = { at: "knocking" } | { at: "outside"; why: string } | { at: "inside"; person: Person };
+type Gate =
+  | { at: "knocking" }
+  | { at: "outside"; why: string }
+  | { at: "inside"; person: Person; visit: number };
 
 async function knock(): Promise<Gate> {
   const token = takeToken();
   try {
     const person = token === null ? await currentPerson() : await openSession(token);
-    return { at: "inside", person };
+    return { at: "inside", person, visit: 0 };
   } catch (error) {
     const refused = error instanceof Refusal && error.details.status === 401;
     if (refused && token === null) return { at: "outside", why: "" };
@@ -22,13 +35,27 @@ async function knock(): Promise<Gate> {
   }
 }
 
+const visitOf = (gate: Gate): number => (gate.at === "inside" ? gate.visit : 0);
+
+/** Whoever is inside stays the same object while they are the same: nothing below begins anew. */
+function inside(gate: Gate, person: Person): Gate & { at: "inside" } {
+  const known = gate.at === "inside" ? gate.person : null;
+  const same = known?.id === person.id && known.name === person.name;
+  return { at: "inside", person: same ? known : person, visit: visitOf(gate) + 1 };
+}
+
+/** A link that does not open the door puts nobody out who is inside already. */
+const stay = (gate: Gate, next: Gate): Gate => (gate.at === "inside" ? gate : next);
+
 export function Gate({ children }: { children: ReactNode }) {
   const [gate, setGate] = useState<Gate>({ at: "knocking" });
   useEffect(() => {
     let gone = false;
     const enter = () =>
       void knock().then((next) => {
-        if (!gone) setGate(next);
+        if (gone) return;
+        if (next.at === "inside") sessionEnd.clear();
+        setGate((now) => (next.at === "inside" ? inside(now, next.person) : stay(now, next)));
       });
     // A fresh link pasted into the same tab changes only the fragment.
     const onHash = () => {
@@ -43,18 +70,42 @@ export function Gate({ children }: { children: ReactNode }) {
   }, []);
   const takeName = useCallback(async (name: string) => {
     const person = await rename(name);
-    setGate({ at: "inside", person: { ...person, name } });
+    setGate((now) => ({ ...inside(now, { ...person, name }), visit: visitOf(now) }));
   }, []);
-  const person = gate.at === "inside" ? gate.person : null;
-  const hold = useMemo(() => person && { person, rename: takeName }, [person, takeName]);
+  const client = useQueryClient();
+  const letIn = useCallback(
+    (person: Person) => {
+      sessionEnd.clear();
+      setGate((now) => inside(now, person));
+      void client.invalidateQueries();
+    },
+    [client],
+  );
+  const ended = useSyncExternalStore(sessionEnd.subscribe, sessionEnd.now);
+  useEffect(() => {
+    if (gate.at !== "inside") return;
+    // Another tab of this browser may sign in or out at any time.
+    const look = () => void currentPerson().then(ended ? letIn : () => {}, () => {});
+    const timer = setInterval(look, ended ? 3_000 : 30_000);
+    window.addEventListener("focus", look);
+    return () => {
+      clearInterval(timer);
+      window.removeEventListener("focus", look);
+    };
+  }, [gate.at, ended, letIn]);
+  const hold = useMemo(
+    () =>
+      gate.at === "inside" ? { person: gate.person, visit: gate.visit, rename: takeName } : null,
+    [gate, takeName],
+  );
   if (gate.at === "knocking") return <div aria-busy="true" />;
   if (hold === null) {
-    return (
-      <SignIn
-        why={gate.at === "outside" ? gate.why : ""}
-        onOpen={(who) => setGate({ at: "inside", person: who })}
-      />
-    );
+    return <SignIn why={gate.at === "outside" ? gate.why : ""} onOpen={letIn} />;
   }
-  return <PersonContext value={hold}>{children}</PersonContext>;
+  return (
+    <PersonContext value={hold}>
+      {children}
+      {ended && <SignInBar onOpen={letIn} />}
+    </PersonContext>
+  );
 }

@@ -4,6 +4,8 @@ import type { Person } from "../api/session";
 
 export interface PersonHold {
   person: Person;
+  /** How often somebody has signed in since the page was opened: sockets begin anew with each. */
+  visit: number;
   rename: (name: string) => Promise<void>;
 }
 

@@ -1,5 +1,7 @@
 /** Requests to editor and runner, and how they refuse. */
 
+import { sessionEnd } from "./ended";
+
 /** RFC 9457 as both processes answer it. */
 export interface ProblemDetails {
   type: string;
@@ -66,7 +68,9 @@ async function send(url: string, ask: Ask): Promise<Response> {
     init.body = typeof ask.body === "string" ? ask.body : JSON.stringify(ask.body);
   }
   try {
-    return await fetch(url, init);
+    const response = await fetch(url, init);
+    if (response.status === 401) sessionEnd.notice();
+    return response;
   } catch (error) {
     if (ask.signal?.aborted) throw error;
     throw new Unreachable(url.startsWith("/") ? "The editor" : "The runner");

@@ -30,8 +30,8 @@ const client = new QueryClient({
 
 /** The runner hears of a new name by a new socket. */
 function Live({ children }: { children: ReactNode }) {
-  const { person } = usePerson();
-  return <LiveProvider who={`${person.id} ${person.name}`}>{children}</LiveProvider>;
+  const { person, visit } = usePerson();
+  return <LiveProvider who={`${visit} ${person.id} ${person.name}`}>{children}</LiveProvider>;
 }
 
 export function App() {

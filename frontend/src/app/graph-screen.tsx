@@ -42,7 +42,7 @@ function useRunHere(id: string): RunHere {
 }
 
 function Inside({ id }: { id: string }) {
-  const { person } = usePerson();
+  const { person, visit } = usePerson();
   const { create, choose } = useNewGraphs();
   const { actions } = useKnownActions();
   const known = useMemo(() => actions.map((action) => action.template), [actions]);
@@ -50,12 +50,13 @@ function Inside({ id }: { id: string }) {
   const progress = useMemo(() => progressByAid(live, unsure), [live, unsure]);
   const link = useLink();
   const { room } = useRoom();
-  const entered = useRef(person.name);
+  const who = `${visit} ${person.name}`;
+  const entered = useRef(who);
   useEffect(() => {
-    if (entered.current === person.name) return;
-    entered.current = person.name;
-    room.reconnect(); // the others see the name that the session had when the room was entered
-  }, [person.name, room]);
+    if (entered.current === who) return;
+    entered.current = who;
+    room.reconnect(); // under the session and the name that the person has now
+  }, [who, room]);
   if (link.state === "refused" && link.why === "no-such-graph" && link.seq === 0) return <Gone />;
   return (
     <Editor
