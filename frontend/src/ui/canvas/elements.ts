@@ -15,6 +15,7 @@ import {
 } from "../../graph/model";
 import { OUTCOMES, outcomeWord } from "../outcome";
 import { CARD, PILL, type Places } from "./arrange";
+import { alongCurve, alongLane, anchorOf, placeLabels, sizeOf, type Wish } from "./labels";
 import { type Box, laneBack, laneFor, MOST_CARDS } from "./lanes";
 import { type Mark, type Marks, markWords } from "./marks";
 
@@ -51,9 +52,17 @@ export type Arrow = Edge<
     lane: number | null;
     entry: boolean;
     lit: boolean;
+    /** Where the label stands; null: in the middle of the way. */
+    label: Label | null;
   },
   "outcome"
 >;
+
+export interface Label {
+  readonly x: number;
+  readonly y: number;
+  readonly anchor: Wish["anchor"];
+}
 
 /** The outcomes that get the same response, together, in the fixed order of outcomes. */
 export function answersOf(relation: Relation): Answer[] {
@@ -136,6 +145,11 @@ function boxesOf(graph: Graph, options: NodeOptions): Map<Key, Box> {
   return boxes;
 }
 
+/** Where on the lower edge of a card an arrow begins, from its left. */
+function shareOf(entry: boolean, outcome: Precondition): number {
+  return entry ? 0.5 : 0.14 + 0.24 * OUTCOMES.indexOf(outcome);
+}
+
 const LANE_WIDTH = 9; // px between the lanes of one relation's outcomes
 
 function laneOf(relation: Relation, outcome: Precondition, boxes: Map<Key, Box>): number | null {
@@ -143,7 +157,7 @@ function laneOf(relation: Relation, outcome: Precondition, boxes: Map<Key, Box>)
   const to = boxes.get(relation.child);
   if (!from || !to || relation.parent === relation.child) return null;
   const at = OUTCOMES.indexOf(outcome);
-  const share = relation.parent === ENTRY ? 0.5 : 0.14 + 0.24 * at;
+  const share = shareOf(relation.parent === ENTRY, outcome);
   const start = { x: from.x + from.width * share, y: from.y + from.height };
   const others = [...boxes]
     .filter(([key]) => key !== relation.parent && key !== relation.child)
@@ -209,6 +223,7 @@ function arrowsOf(relation: Relation, options: NodeOptions, { boxes, names }: Ar
       lane: laneOf(relation, outcome, boxes),
       entry,
       lit: isLit(relation, outcome, options),
+      label: null,
     },
   }));
 }
@@ -216,9 +231,57 @@ function arrowsOf(relation: Relation, options: NodeOptions, { boxes, names }: Ar
 export function edgesOf(graph: Graph, options: NodeOptions): Arrow[] {
   const there = new Set<Key>([ENTRY, EXIT, ...graph.actions.map((action) => action.key)]);
   const around = { boxes: boxesOf(graph, options), names: namesOf(graph) };
-  return graph.relations
+  const arrows = graph.relations
     .filter(({ parent, child }) => there.has(parent) && there.has(child))
     .flatMap((relation) => arrowsOf(relation, options, around));
+  return labelled(arrows, around.boxes);
+}
+
+/** The same arrows with places for their labels. */
+function labelled(arrows: Arrow[], boxes: Map<Key, Box>): Arrow[] {
+  const wishes = arrows.flatMap((arrow) => wishOf(arrow, arrows, boxes) ?? []);
+  const places = placeLabels(wishes, [...boxes.values()]);
+  const anchors = new Map(wishes.map(({ id, anchor }) => [id, anchor]));
+  return arrows.map((arrow) => {
+    const at = places.get(arrow.id);
+    const anchor = anchors.get(arrow.id);
+    if (!at || !anchor || !arrow.data) return arrow;
+    const label = { x: Math.round(at.x), y: Math.round(at.y), anchor };
+    return { ...arrow, data: { ...arrow.data, label } };
+  });
+}
+
+function wishOf(arrow: Arrow, arrows: readonly Arrow[], boxes: Map<Key, Box>): Wish | null {
+  const { data, source, target } = arrow;
+  const [from, to] = [boxes.get(source), boxes.get(target)];
+  if (!data || (!data.answers && !data.mark) || !from || !to || source === target) return null;
+  const optional = data.optional ? " · optional" : "";
+  const lines = (data.answers ?? []).map(({ outcomes, response }) => ({
+    text: `${outcomes.map((outcome) => outcomeWord[outcome]).join(" ")} → ${response}${optional}`,
+    signs: outcomes.length,
+  }));
+  const size = sizeOf(lines);
+  const wide = data.mark ? { ...size, width: size.width + 34 } : size;
+  // The label speaks for all arrows of its relation: it stands between them.
+  const shares = arrows
+    .filter((other) => other.data?.relation === data.relation && other.data.lane === null)
+    .map((other) => shareOf(other.data?.entry === true, other.data?.outcome ?? "on_true"));
+  const lead = shareOf(data.entry, data.outcome);
+  const mean = shares.reduce((sum, share) => sum + share, 0) / Math.max(1, shares.length);
+  const start = {
+    x: from.x + from.width * (data.lane === null ? mean : lead),
+    y: from.y + from.height,
+  };
+  const end = { x: to.x + to.width / 2, y: to.y };
+  if (data.lane === null) {
+    if (end.y < start.y + 8) return null;
+    return { id: arrow.id, ...wide, anchor: "middle", points: alongCurve(start, end) };
+  }
+  const down = end.y > start.y;
+  const points = down
+    ? alongLane(data.lane, start.y + 30, end.y - 30)
+    : alongLane(data.lane, start.y + 20, end.y - 20);
+  return { id: arrow.id, ...wide, anchor: anchorOf(data.lane, start.x, end.x), points };
 }
 
 /** `next`, with every element of `before` that says the same in its place. */

@@ -9,6 +9,7 @@ import {
 import { memo } from "react";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../outcome";
 import type { Answer, Arrow } from "./elements";
+import { anchorOf } from "./labels";
 import style from "./outcome-arrow.module.css";
 import { ProblemBadge } from "./problem-badge";
 
@@ -30,12 +31,6 @@ function backwards(sx: number, sy: number, tx: number, ty: number, side: number)
     `Q${side} ${low} ${side} ${low - r}V${high + r}Q${side} ${high} ${side + back * r} ${high}` +
     `H${tx - back * r}Q${tx} ${high} ${tx} ${high + r}V${ty}`;
   return { path, x: side, y: (low + high) / 2, anchor: anchorOf(side, sx, tx) };
-}
-
-/** A label on a lane hangs on the side that is away from the cards. */
-function anchorOf(lane: number, sx: number, tx: number): Line["anchor"] {
-  if (lane < Math.min(sx, tx)) return "right";
-  return lane > Math.max(sx, tx) ? "left" : "middle";
 }
 
 /** Down a lane beside the cards that stand in the way. */
@@ -99,8 +94,9 @@ const SHIFTS = { left: "-10px", middle: "-50%", right: "calc(-100% + 10px)" } as
 export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) {
   const { id, data, selected } = props;
   const store = useStoreApi();
-  const { path, x, y, anchor } = lineOf(props);
+  const { path, ...middle } = lineOf(props);
   if (!data) return null;
+  const { x, y, anchor } = data.label ?? middle;
   const color = data.entry
     ? "var(--ink3)"
     : data.response === "ignore"
