@@ -125,6 +125,22 @@ export function importGraph(text: string): Promise<GraphSummary> {
   return ask("/api/graphs", { method: "POST", body: text });
 }
 
+/** An edit of the graph's own document: whoever has it open sees it. */
+export function renameGraph(id: string, name: string): Promise<GraphSummary> {
+  return ask(`/api/graphs/${encodeURIComponent(id)}`, { method: "PATCH", body: { name } });
+}
+
+/** The same graph once more under another name; edits of one do not touch the other. */
+export async function duplicateGraph(id: string, name: string): Promise<GraphSummary> {
+  const made = await importGraph(await graphText(id));
+  try {
+    return await renameGraph(made.id, name);
+  } catch (error) {
+    await deleteGraph(made.id); // two of one name would be worse than none
+    throw error;
+  }
+}
+
 export function deleteGraph(id: string): Promise<void> {
   return ask(`/api/graphs/${encodeURIComponent(id)}`, { method: "DELETE" });
 }

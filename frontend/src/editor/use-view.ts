@@ -34,6 +34,8 @@ export function useView({ flow, frame, places, sizes, phone, begun, progress, ru
   now.current = { places, sizes };
   const least = phone ? READABLE.phone : READABLE.desktop;
 
+  // What was fitted stays fitted while the canvas changes its size, until somebody moves the view.
+  const fitted = useRef<Looking | null>(null);
   const showAll = useCallback(
     (duration: number) => {
       const [box, room] = [boundsOf(now.current.places, now.current.sizes), frame.current];
@@ -43,7 +45,9 @@ export function useView({ flow, frame, places, sizes, phone, begun, progress, ru
       const first = readable(box, size, x + CARD.width / 2, least);
       // Pressed once more, it shows the rest too.
       const again = duration > 0 && alike(first, flow.getViewport());
-      void flow.setViewport(again ? whole(box, size) : first, { duration });
+      const next = again ? whole(box, size) : first;
+      fitted.current = again ? null : next;
+      void flow.setViewport(next, { duration });
     },
     [flow, frame, least],
   );
@@ -58,6 +62,16 @@ export function useView({ flow, frame, places, sizes, phone, begun, progress, ru
     }, 60);
     return () => clearTimeout(timer);
   }, [begun, showAll]);
+
+  useEffect(() => {
+    const room = frame.current;
+    if (room === null) return;
+    const watch = new ResizeObserver(() => {
+      if (fitted.current && alike(fitted.current, flow.getViewport())) showAll(0);
+    });
+    watch.observe(room);
+    return () => watch.disconnect();
+  }, [flow, frame, showAll]);
 
   const show = useCallback(
     (keys: readonly Key[], goal: "near" | "middle") => {

@@ -1,29 +1,15 @@
 /** The first page: every graph, and how to begin. */
-import { Button, Menu, Skeleton } from "@mantine/core";
-import { notifications } from "@mantine/notifications";
-import {
-  IconAlertTriangle,
-  IconDots,
-  IconFileImport,
-  IconPlus,
-  IconShare3,
-  IconTrash,
-} from "@tabler/icons-react";
-import { useQueryClient } from "@tanstack/react-query";
+import { Button, Skeleton } from "@mantine/core";
+import { IconAlertTriangle, IconFileImport, IconPlus } from "@tabler/icons-react";
 import { Link } from "wouter";
-import {
-  deleteGraph,
-  type GraphSummary,
-  recoverGraph,
-  refreshGraphs,
-  useGraphs,
-} from "../api/graphs";
+import { type GraphSummary, useGraphs } from "../api/graphs";
 import { sentence } from "../api/http";
 import { endWords, runWord } from "../api/progress";
 import { newestRun, useLive } from "../api/use-live";
 import { Empty } from "../ui/empty";
 import { StateWord } from "../ui/state-word";
 import { ago, instant, useNow } from "../ui/when";
+import { GraphMenu } from "./graph-menu";
 import style from "./home.module.css";
 import { Preview } from "./preview";
 
@@ -44,61 +30,7 @@ function Problems({ graph }: { graph: GraphSummary }) {
   );
 }
 
-function CardMenu({ graph }: { graph: GraphSummary }) {
-  const client = useQueryClient();
-  const bringBack = async (notice: string) => {
-    notifications.hide(notice);
-    try {
-      await recoverGraph(graph.id);
-    } catch (error) {
-      notifications.show({ color: "red", title: "Not brought back", message: sentence(error) });
-    }
-    await refreshGraphs(client);
-  };
-  const remove = async () => {
-    try {
-      await deleteGraph(graph.id);
-      const id = `deleted-${graph.id}`;
-      notifications.show({
-        id,
-        title: `${graph.name} is deleted`,
-        message: (
-          <Button size="compact-sm" mt="xs" onClick={() => void bringBack(id)}>
-            Bring it back
-          </Button>
-        ),
-        autoClose: 12_000,
-      });
-    } catch (error) {
-      notifications.show({ color: "red", title: "Not deleted", message: sentence(error) });
-    }
-    await refreshGraphs(client);
-  };
-  return (
-    <Menu>
-      <Menu.Target>
-        <button type="button" className={style.more} aria-label={`More about ${graph.name}`}>
-          <IconDots size={16} aria-hidden />
-        </button>
-      </Menu.Target>
-      <Menu.Dropdown>
-        <Menu.Item
-          component="a"
-          href={`/api/graphs/${encodeURIComponent(graph.id)}/umrf`}
-          download={`${graph.name || "graph"}.umrf.graph.json`}
-          leftSection={<IconShare3 size={15} />}
-        >
-          Export as UMRF
-        </Menu.Item>
-        <Menu.Item color="red" leftSection={<IconTrash size={15} />} onClick={() => void remove()}>
-          Delete
-        </Menu.Item>
-      </Menu.Dropdown>
-    </Menu>
-  );
-}
-
-function GraphCard({ graph }: { graph: GraphSummary }) {
+function GraphCard({ graph, names }: { graph: GraphSummary; names: readonly string[] }) {
   const { now: live } = useLive();
   const now = useNow(20_000);
   const run = newestRun(live, graph.id);
@@ -127,7 +59,7 @@ function GraphCard({ graph }: { graph: GraphSummary }) {
           </div>
         </div>
       </Link>
-      <CardMenu graph={graph} />
+      <GraphMenu graph={graph} names={names} />
     </article>
   );
 }
@@ -194,7 +126,7 @@ export function Home({ onNew, onImport }: Props) {
         {list.length > 0 && (
           <div className={style.cards}>
             {list.map((graph) => (
-              <GraphCard key={graph.id} graph={graph} />
+              <GraphCard key={graph.id} graph={graph} names={list.map(({ name }) => name)} />
             ))}
           </div>
         )}

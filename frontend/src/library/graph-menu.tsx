@@ -1,0 +1,151 @@
+/** What can be done to a graph as a whole: rename, duplicate, export, delete and bring back. */
+import { Button, Group, Menu, Modal, TextInput } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconCopy, IconDots, IconPencil, IconShare3, IconTrash } from "@tabler/icons-react";
+import { type QueryClient, useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import {
+  deleteGraph,
+  duplicateGraph,
+  type GraphSummary,
+  recoverGraph,
+  refreshGraphs,
+  renameGraph,
+} from "../api/graphs";
+import { sentence } from "../api/http";
+import style from "./home.module.css";
+
+/** "x copy", "x copy 2" …: the first that no graph is called. */
+export function copyName(name: string, taken: readonly string[]): string {
+  const stem = `${name || "untitled"} copy`;
+  for (let n = 1; ; n += 1) {
+    const next = n === 1 ? stem : `${stem} ${n}`;
+    if (!taken.includes(next)) return next;
+  }
+}
+
+/** Does it, says so if it fails, and reads the list again either way. True when it is done. */
+async function attempt(
+  client: QueryClient,
+  failed: string,
+  work: () => Promise<unknown>,
+): Promise<boolean> {
+  try {
+    await work();
+    return true;
+  } catch (error) {
+    notifications.show({ color: "red", title: failed, message: sentence(error) });
+    return false;
+  } finally {
+    await refreshGraphs(client);
+  }
+}
+
+function offerBack(client: QueryClient, graph: GraphSummary): void {
+  const id = `deleted-${graph.id}`;
+  const bringBack = () => {
+    notifications.hide(id);
+    void attempt(client, "Not brought back", () => recoverGraph(graph.id));
+  };
+  notifications.show({
+    id,
+    title: `${graph.name} is deleted`,
+    message: (
+      <Button size="compact-sm" mt="xs" onClick={bringBack}>
+        Bring it back
+      </Button>
+    ),
+    autoClose: 12_000,
+  });
+}
+
+interface RenameProps {
+  graph: GraphSummary;
+  onClose: () => void;
+}
+
+function Rename({ graph, onClose }: RenameProps) {
+  const client = useQueryClient();
+  const [name, setName] = useState(graph.name);
+  const fits = name.trim() !== "" && name.trim() !== graph.name;
+  const save = async () => {
+    const work = () => renameGraph(graph.id, name.trim());
+    if (await attempt(client, "Not renamed", work)) onClose();
+  };
+  return (
+    <form
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (fits) void save();
+      }}
+    >
+      <TextInput
+        label="Name of the graph"
+        value={name}
+        data-autofocus
+        onFocus={(event) => event.currentTarget.select()}
+        onChange={(event) => setName(event.currentTarget.value)}
+      />
+      <Group justify="flex-end" mt="md">
+        <Button onClick={onClose}>Cancel</Button>
+        <Button type="submit" variant="filled" disabled={!fits}>
+          Rename
+        </Button>
+      </Group>
+    </form>
+  );
+}
+
+export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readonly string[] }) {
+  const client = useQueryClient();
+  const [renaming, setRenaming] = useState(false);
+  const duplicate = () =>
+    attempt(client, "Not duplicated", () => duplicateGraph(graph.id, copyName(graph.name, names)));
+  const remove = async () => {
+    const done = await attempt(client, "Not deleted", () => deleteGraph(graph.id));
+    if (done) offerBack(client, graph);
+  };
+  return (
+    <>
+      <Menu>
+        <Menu.Target>
+          <button type="button" className={style.more} aria-label={`More about ${graph.name}`}>
+            <IconDots size={16} aria-hidden />
+          </button>
+        </Menu.Target>
+        <Menu.Dropdown>
+          <Menu.Item leftSection={<IconPencil size={15} />} onClick={() => setRenaming(true)}>
+            Rename …
+          </Menu.Item>
+          <Menu.Item leftSection={<IconCopy size={15} />} onClick={() => void duplicate()}>
+            Duplicate
+          </Menu.Item>
+          <Menu.Item
+            component="a"
+            href={`/api/graphs/${encodeURIComponent(graph.id)}/umrf`}
+            download={`${graph.name || "graph"}.umrf.graph.json`}
+            leftSection={<IconShare3 size={15} />}
+          >
+            Export as UMRF
+          </Menu.Item>
+          <Menu.Item
+            color="red"
+            leftSection={<IconTrash size={15} />}
+            onClick={() => void remove()}
+          >
+            Delete
+          </Menu.Item>
+        </Menu.Dropdown>
+      </Menu>
+      <Modal
+        opened={renaming}
+        onClose={() => setRenaming(false)}
+        title={`Rename ${graph.name}`}
+        closeButtonProps={{ "aria-label": "Close" }}
+        centered
+      >
+        <Rename graph={graph} onClose={() => setRenaming(false)} />
+      </Modal>
+    </>
+  );
+}
