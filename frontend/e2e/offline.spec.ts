@@ -12,6 +12,7 @@ test.afterAll(() => product.dispose());
 
 interface Graph {
   id: string;
+  seq: number;
 }
 
 async function newGraph(name: string): Promise<string> {
@@ -125,6 +126,47 @@ test("on a shared tablet nobody's edits are sent under another name", async ({ b
   expect(await stored(graph)).toEqual(["First", "OfAda", "OfMari"]);
   const done = await product.ask<{ author: { name: string } }[]>(`/api/graphs/${graph}/history`);
   expect(done[0]?.author.name).toBe("Ada");
+  await ada.context.close();
+  await mari.context.close();
+});
+
+test("200 edits without a network and those of others meet: nothing is lost, and Saved means stored", async ({
+  browser,
+}) => {
+  test.setTimeout(180_000);
+  const ada = await product.person(browser, "Ada");
+  const mari = await product.person(browser, "Mari");
+  const graph = await newGraph("many");
+  await enter(ada.page, graph);
+  await add(ada.page, "Part");
+  await saved(ada.page);
+  await enter(mari.page, graph);
+  await ada.context.setOffline(true);
+  await card(ada.page, "Part").click({ position: { x: 50, y: 30 } });
+  for (let n = 0; n < 200; n += 1) await ada.page.keyboard.press("Control+d");
+  for (let n = 0; n < 5; n += 1) await add(mari.page, `Meanwhile${n}`);
+  await saved(mari.page);
+  await offline(ada.page, 200);
+  await expect.poll(() => waiting(ada.page).then(Object.values)).toEqual([200]);
+  expect((await stored(graph)).length).toBe(6);
+
+  await ada.context.setOffline(false);
+  await saved(ada.page);
+  await product.kill();
+  await product.start();
+  const names = await stored(graph);
+  expect(names.filter((name) => name === "Part")).toHaveLength(201);
+  expect(names.filter((name) => name.startsWith("Meanwhile"))).toHaveLength(5);
+  await saved(ada.page);
+  expect(await waiting(ada.page)).toEqual({});
+  const { seq } = await product.ask<Graph>(`/api/graphs/${graph}`);
+  for (const { page } of [ada, mari]) {
+    await saved(page);
+    await expect(page.getByTitle(`Moment ${seq}`, { exact: true })).toBeVisible();
+    await expect(card(page, "Part", 1)).toBeVisible();
+    await expect(card(page, "Meanwhile0")).toBeVisible();
+  }
+  expect([...ada.failures, ...mari.failures]).toEqual([]);
   await ada.context.close();
   await mari.context.close();
 });

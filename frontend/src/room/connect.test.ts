@@ -1,4 +1,5 @@
 import fc from "fast-check";
+import * as encoding from "lib0/encoding";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import type * as Y from "yjs";
 import { connect, type Room, roomUrl, type Why } from "./connect";
@@ -338,6 +339,19 @@ test("a message that cannot be read ends the socket and harms nothing else", () 
   server.last.deliver(new Uint8Array([77, 1, 2])); // a kind that we do not know
   expect(room.link().state).toBe("live");
   noise.mockRestore();
+});
+
+test("a graph that can only be read says why, until a socket comes without that", () => {
+  const socket = server.accept();
+  const encoder = encoding.createEncoder();
+  encoding.writeVarUint(encoder, 102);
+  encoding.writeVarString(encoder, "change 12 is damaged");
+  socket.deliver(encoding.toUint8Array(encoder));
+  expect(room.link()).toMatchObject({ state: "live", readOnly: "change 12 is damaged" });
+  socket.end(1006);
+  vi.advanceTimersByTime(300);
+  server.accept();
+  expect(room.link()).not.toHaveProperty("readOnly");
 });
 
 test("others are out of sight while offline, and back on return with the clock they had", () => {

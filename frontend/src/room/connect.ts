@@ -40,6 +40,8 @@ export interface Link {
   readonly unsaved: number;
   /** Whether those edits survive closing this page. Absent for a room that keeps nothing. */
   readonly kept?: boolean;
+  /** Why nobody may change this graph now, in a sentence of the server's; absent when one may. */
+  readonly readOnly?: string;
   /** The page shows the log up to this entry, plus what is `unsaved`. 0 before the first sync. */
   readonly seq: number;
 }
@@ -61,6 +63,11 @@ export interface Room {
   /** Leaves the room. Edits that were not stored stay in `doc`, and on the device if there is one. */
   close(): void;
 }
+
+type Change = Partial<Omit<Link, "why" | "readOnly">> & {
+  why?: Why | undefined;
+  readOnly?: string | undefined;
+};
 
 /** The part of `WebSocket` that a room uses, so that tests can bring their own. */
 export interface Socket {
@@ -112,6 +119,7 @@ const SYNC = 0;
 const AWARENESS = 1;
 const QUERY_AWARENESS = 3;
 const ACK = 100;
+const READ_ONLY = 102;
 
 /** The server says something at least every 15 s; a socket this silent is dead. */
 const SILENCE_MS = 30_000;
@@ -260,16 +268,17 @@ class Connection implements Room {
     this.say({ unsaved: 0 });
   }
 
-  private say(change: Partial<Omit<Link, "why">> & { why?: Why | undefined }): void {
-    const { why, ...rest } = { ...this.current, ...change };
+  private say(change: Change): void {
+    const { why, readOnly, ...rest } = { ...this.current, ...change };
     const kept = this.keeping && { kept: this.keeping.kept };
-    const next: Link = { ...rest, ...kept, ...(why && { why }) };
+    const next: Link = { ...rest, ...kept, ...(why && { why }), ...(readOnly && { readOnly }) };
     const old = this.current;
     if (
       old.state === next.state &&
       old.why === next.why &&
       old.unsaved === next.unsaved &&
       old.kept === next.kept &&
+      old.readOnly === next.readOnly &&
       old.seq === next.seq &&
       !this.closed
     )
@@ -347,6 +356,7 @@ class Connection implements Room {
     if (socket !== this.socket) return;
     this.heardAt = Date.now();
     this.outbox.fresh();
+    this.say({ readOnly: undefined });
     const encoder = encoding.createEncoder();
     encoding.writeVarUint(encoder, SYNC);
     sync.writeSyncStep1(encoder, this.doc);
@@ -471,6 +481,9 @@ class Connection implements Room {
         this.say({ unsaved: this.outbox.unsaved, seq });
         break;
       }
+      case READ_ONLY:
+        this.say({ readOnly: decoding.readVarString(decoder) });
+        break;
     }
   }
 

@@ -9,6 +9,7 @@ export function whyNot(link: Link): string | null {
   const keeps = link.unsaved === 0 ? "" : ` ${where(link)}`;
   switch (link.state) {
     case "live":
+      if (link.readOnly !== undefined) return `${link.readOnly}${keeps}`;
       return link.unsaved === 0 ? null : `${edits} on the way to the server.`;
     case "refused":
       return `${refusals[link.why ?? "not-accepted"]}${keeps}`;
