@@ -1,6 +1,5 @@
 """Journals to test: every kind that there is."""
 
-import itertools
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from pathlib import Path
 
@@ -8,18 +7,18 @@ import pytest
 
 from action_assistant.journal.events import Fold, nothing
 from action_assistant.journal.journal import Journal
-from journal.servers import Server, binaries, server
+from journal import servers
+from journal.servers import Server
 
 Open = Callable[..., Awaitable[Journal]]
-_NUMBERS = itertools.count()
 
 
 @pytest.fixture(scope="session")
 def postgres() -> Iterator[Server]:
     """A Postgres server that no test harms."""
-    if binaries() is None:
+    if servers.binaries() is None:
         pytest.skip("Postgres is not installed (Debian: postgresql)")
-    with server() as one:
+    with servers.server() as one:
         yield one
 
 
@@ -30,16 +29,10 @@ def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
         case "sqlite":
             return f"sqlite:///{tmp_path / 'editor.db'}"
         case "postgres":
-            return new_database(request.getfixturevalue("postgres"))
+            server: Server = request.getfixturevalue("postgres")
+            return server.new_database()
         case other:
             raise AssertionError(other)
-
-
-def new_database(server: Server) -> str:
-    """The URL of an empty database."""
-    name = f"test_{next(_NUMBERS)}"
-    server.sql(f"CREATE DATABASE {name}")
-    return server.url(name)
 
 
 @pytest.fixture

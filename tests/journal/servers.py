@@ -40,6 +40,7 @@ class Server:
     def __init__(self, folder: Path, bin_: Path) -> None:
         self._bin = bin_
         self._home = folder
+        self._databases = 0
         self._data = folder / "data"
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
@@ -53,6 +54,12 @@ class Server:
     def url(self, database: str, port: int | None = None) -> str:
         """How a journal is told of a database here."""
         return f"postgresql://aa@127.0.0.1:{port or self.port}/{database}"
+
+    def new_database(self) -> str:
+        """The URL of an empty database."""
+        self._databases += 1
+        self.sql(f"CREATE DATABASE test_{self._databases}")
+        return self.url(f"test_{self._databases}")
 
     def start(self) -> None:
         """Start, and wait until it answers."""

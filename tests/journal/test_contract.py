@@ -7,7 +7,7 @@ import msgspec
 import pytest
 from sqlalchemy import Executable, insert, select
 
-from action_assistant.errors import CannotStart, Conflict
+from action_assistant.errors import BadInput, CannotStart, Conflict
 from action_assistant.journal import tables
 from action_assistant.journal.events import Addition, Draft, Event
 from action_assistant.journal.journal import Journal
@@ -146,6 +146,21 @@ async def test_a_fold_that_breaks_is_the_callers_error_and_harms_no_other(
     with pytest.raises(ValueError, match="cannot fold"):
         await journal.append("a", [draft("bad")])
     assert await journal.append("a", [draft("good")]) == 1
+
+
+@pytest.mark.parametrize("name", ["nul \0", "half \ud83d", "byte \udcff"])
+async def test_a_name_that_no_database_can_hold_is_refused_and_harms_no_other(
+    journal: Journal, name: str
+) -> None:
+    outcomes = await asyncio.gather(
+        journal.append("a", [draft("before")]),
+        journal.append("a", [draft(author=name)]),
+        journal.append(name, [draft()]),
+        journal.append("a", [draft("after")]),
+        return_exceptions=True,
+    )
+    assert outcomes[0::3] == [1, 2]
+    assert [type(each) for each in outcomes[1:3]] == [BadInput, BadInput]
 
 
 async def test_tables_made_again_are_the_same(open_journal: Open) -> None:

@@ -1,10 +1,11 @@
 """What a journal needs of a database: the seam behind which SQLite and Postgres stand."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, Protocol, TypeAlias, TypeVar
 
 from sqlalchemy import Connection, make_url
-from sqlalchemy.exc import ArgumentError
+from sqlalchemy.exc import ArgumentError, DBAPIError
 
 from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Head
@@ -97,3 +98,11 @@ def database_of(url: str) -> Database:
 
         return Sqlite(parsed.database)
     raise CannotStart(f"Databases of the kind {parsed.drivername!r} are not supported.")
+
+
+def cause_of(error: Exception) -> str:
+    """What a fault says, without a full stop."""
+    cause: object = error.orig if isinstance(error, DBAPIError) else error
+    if isinstance(cause, OSError) and cause.errno is not None:
+        return os.strerror(cause.errno)
+    return str(cause).strip().rstrip(".") or type(cause).__name__

@@ -9,11 +9,10 @@ from functools import partial
 from typing import Any, Final, TypeVar
 
 from sqlalchemy import Connection, Row, Select, delete, func, insert, select
-from sqlalchemy.exc import DBAPIError
 
 from action_assistant.errors import Unavailable
 from action_assistant.journal.chain import Damage, Head, Inspector
-from action_assistant.journal.database import Branch, Database, Session, database_of
+from action_assistant.journal.database import Branch, Database, Session, cause_of, database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold, Snapshot
 from action_assistant.journal.follower import Follower
 from action_assistant.journal.migrate import BRANCHES
@@ -227,8 +226,7 @@ class Journal:
         try:
             return await self._database.ask(question)
         except self._database.faults as error:
-            cause = error.orig if isinstance(error, DBAPIError) else error
-            raise Unavailable(f"The journal cannot be read: {cause}.") from error
+            raise Unavailable(f"The journal cannot be read: {cause_of(error)}.") from error
 
     async def _events(self, chosen: Select[Any]) -> list[Event]:
         return await self._ask(lambda c: [Event(*row) for row in c.execute(chosen)])

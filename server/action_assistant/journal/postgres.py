@@ -10,13 +10,13 @@ from typing import Any, Final, TypeVar
 
 import asyncpg  # type: ignore[import-untyped]
 from sqlalchemy import URL, Connection, NullPool, select
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
 from sqlalchemy.util import await_only
 
 from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Head
-from action_assistant.journal.database import Branch
+from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.events import Event
 from action_assistant.journal.migrate import upgrade_to
 from action_assistant.journal.tables import editor_event
@@ -67,6 +67,7 @@ class PostgresSession:
         self._engine = engine
         self._loop = asyncio.new_event_loop()
         self._open: AsyncConnection | None = None
+        self._raw: Any = None
         try:
             self._loop.run_until_complete(self._connect(begin))
         except BaseException:
@@ -75,7 +76,7 @@ class PostgresSession:
 
     async def _connect(self, begin: Callable[[Any], Awaitable[None]]) -> None:
         self._open = await self._engine.connect()
-        self._raw: Any = (await self._open.get_raw_connection()).driver_connection
+        self._raw = (await self._open.get_raw_connection()).driver_connection
         await begin(self._raw)
         sync = self._open.sync_connection
         assert sync is not None
@@ -113,13 +114,11 @@ class PostgresSession:
 
     async def _end(self) -> None:
         if self._open is not None:
-            raw: Any = (await self._open.get_raw_connection()).driver_connection
-            if raw.is_in_transaction():
-                raw.terminate()
+            if self._raw is None or self._raw.is_in_transaction():
+                await _quietly(self._open.invalidate())
             else:
-                await _quietly(raw.close(timeout=1))
-            await self._open.invalidate()
-            await self._open.close()
+                await _quietly(self._raw.close(timeout=1))
+            await _quietly(self._open.close())
         await self._engine.dispose()
         await _hear()
 
@@ -141,7 +140,11 @@ class Postgres:
         self.name: Final = f"The database {url.set(username=None, password=None, query={})}"
         self._me = f"action-assistant {os.getpid()} {secrets.token_hex(8)}"
         self._key = 0
-        self._readers = self._engine(f"{self._me} reads", pool_size=_READERS, pool_pre_ping=True)
+        self._readers = self._engine(
+            {"application_name": f"{self._me} reads", "default_transaction_read_only": "on"},
+            pool_size=_READERS,
+            pool_pre_ping=True,
+        )
 
     def open(self, branch: Branch) -> PostgresSession:
         """Lock the database for this process, check that it keeps what it confirms, migrate."""
@@ -150,7 +153,7 @@ class Postgres:
         try:
             session = self.connect()
         except self.faults as error:
-            raise CannotStart(f"Cannot use {self._the}: {_cause(error)}.") from error
+            raise CannotStart(f"Cannot use {self._the}: {cause_of(error)}.") from error
         try:
             self.migrate(upgrade_to(branch))
         except BaseException:
@@ -173,7 +176,7 @@ class Postgres:
         try:
             return asyncio.run(change())
         except self.faults as error:
-            raise CannotStart(f"Cannot use {self._the}: {_cause(error)}.") from error
+            raise CannotStart(f"Cannot use {self._the}: {cause_of(error)}.") from error
 
     def connect(self) -> PostgresSession:
         """Connect, and become the only writer (again).
@@ -181,7 +184,9 @@ class Postgres:
         The lock belongs to a session: once it is ours, our last session has ended on the server,
         and whatever it was committing has either happened or never will.
         """
-        return PostgresSession(self._engine(self._me, poolclass=NullPool), self._take_over)
+        return PostgresSession(
+            self._engine({"application_name": self._me}, poolclass=NullPool), self._take_over
+        )
 
     async def _take_over(self, raw: Any) -> None:
         for name, (allowed, why) in _SETTINGS.items():
@@ -228,14 +233,14 @@ class Postgres:
     def disown(self) -> None:
         """Nothing: the lock went with the session that wrote."""
 
-    def _engine(self, name: str, **options: Any) -> AsyncEngine:
+    def _engine(self, server: dict[str, str], **options: Any) -> AsyncEngine:
         return create_async_engine(
             self._url,
             isolation_level="AUTOCOMMIT",  # BEGIN and COMMIT are ours to say
             connect_args={
                 "timeout": _CONNECT,
                 "command_timeout": _ANSWER,
-                "server_settings": {"application_name": name},
+                "server_settings": server,
             },
             **options,
         )
@@ -258,10 +263,5 @@ async def _hear() -> None:
 async def _quietly(closing: Awaitable[None]) -> None:
     try:
         await closing
-    except Postgres.faults:
+    except (asyncpg.PostgresError, asyncpg.InterfaceError, SQLAlchemyError, OSError):
         return  # it is gone, which is what was wanted
-
-
-def _cause(error: Exception) -> str:
-    cause = error.orig if isinstance(error, DBAPIError) else error
-    return str(cause).strip().rstrip(".") or type(cause).__name__

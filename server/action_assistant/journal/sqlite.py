@@ -20,7 +20,7 @@ from sqlalchemy.exc import (
 
 from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Head
-from action_assistant.journal.database import Branch
+from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.events import Event
 from action_assistant.journal.migrate import upgrade_to
 
@@ -111,7 +111,11 @@ class Sqlite:
     """A SQLite file that this process owns."""
 
     patience: Final = 0.0
-    faults: Final[tuple[type[Exception], ...]] = (sqlite3.Error, DatabaseError)
+    faults: Final[tuple[type[Exception], ...]] = (
+        sqlite3.Error,
+        DatabaseError,
+        UnicodeDecodeError,  # the driver's, where damage has reached the schema
+    )
 
     def __init__(self, path: str | Path, *, driver: Any = sqlite3) -> None:
         self._path: Final = Path(path)
@@ -128,7 +132,7 @@ class Sqlite:
         try:
             return self.connect()
         except self.faults as error:
-            raise CannotStart(f"Cannot open {self._the}: {_cause(error)}.") from error
+            raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
         """Run a change of the schema in one transaction. Raises CannotStart."""
@@ -137,7 +141,7 @@ class Sqlite:
             with engine.begin() as connection:
                 return upgrade(connection)
         except self.faults as error:
-            raise CannotStart(f"Cannot open {self._the}: {_cause(error)}.") from error
+            raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
         finally:
             engine.dispose()
 
@@ -147,7 +151,10 @@ class Sqlite:
 
     def lost(self, error: Exception) -> bool:
         """Whether the file is at fault."""
-        return not isinstance(error, IntegrityError | ProgrammingError | InterfaceError | DataError)
+        return not isinstance(
+            error,
+            IntegrityError | ProgrammingError | InterfaceError | DataError | UnicodeDecodeError,
+        )
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
         """Read, on a thread."""
@@ -243,7 +250,3 @@ def _reading(path: Path, driver: Any) -> Engine:
 
 def _lenient(text: bytes) -> str:
     return text.decode("utf-8", "surrogateescape")
-
-
-def _cause(error: Exception) -> object:
-    return error.orig if isinstance(error, DatabaseError) else error

@@ -14,7 +14,7 @@ from sqlalchemy.exc import DBAPIError, IntegrityError
 from action_assistant.errors import BadInput, Conflict, Unavailable
 from action_assistant.journal import tables
 from action_assistant.journal.chain import NOTHING, Head, link
-from action_assistant.journal.database import Database, Session
+from action_assistant.journal.database import Database, Session, cause_of
 from action_assistant.journal.events import Addition, Event, Fold
 
 log: Final = logging.getLogger(__name__)
@@ -89,13 +89,12 @@ class Pen:
     def add(self, addition: Addition) -> int:
         """Append to one stream and fold; the newest seq. Raises Conflict, BadInput."""
         stream = addition.stream
+        _check_text(stream, *(each.kind + each.author for each in addition.drafts))
         head = self._head(stream)
         if addition.expected is not None and addition.expected != head.seq:
             raise Conflict(f"{stream} has gone on to {head.seq}; {addition.expected} was expected.")
         at = self._clock()
         for draft in addition.drafts:
-            if "\0" in stream + draft.kind + draft.author:
-                raise BadInput("A name cannot hold the character NUL.")
             self._position += 1
             event = Event(
                 stream, head.seq + 1, draft.kind, draft.author, at, draft.body, self._position
@@ -228,9 +227,10 @@ class Writer:
         try:
             session, pen = self._connected()
             session.run(lambda: self._together(pen, jobs, done))
-        except self._database.faults as error:
+        except Exception as error:  # whatever it is, the thread lives on, and all who wait hear it
             # After a failed commit nobody knows what the disk holds: begin again from there.
-            log.error("%s cannot be written: %s", self._database.name, _cause(error))
+            ours = not isinstance(error, self._database.faults)
+            log.error("%s was not written: %s", self._database.name, cause_of(error), exc_info=ours)
             self._disconnect()
             done = self._settled(pen, done, len(jobs), error)
         for job, (result, error_, events) in zip(jobs, done, strict=True):
@@ -245,13 +245,13 @@ class Writer:
         self, pen: Pen | None, done: list[Outcome], jobs: int, error: Exception
     ) -> list[Outcome]:
         """What became of jobs whose transaction failed: everything or nothing, or nobody knows."""
-        text = f"Nothing can be stored at the moment: {_cause(error)}."
+        text = f"Nothing can be stored at the moment: {cause_of(error)}."
         if pen is not None and pen.committing and pen.last is not None:
             match self._stored(*pen.last):
                 case True:
                     return done
                 case None:
-                    text = f"It is not known whether this was stored: {_cause(error)}."
+                    text = f"It is not known whether this was stored: {cause_of(error)}."
         return [(None, Unavailable(text), [])] * jobs
 
     def _stored(self, event: Event, chain: bytes) -> bool | None:
@@ -264,7 +264,7 @@ class Writer:
                 session, _ = self._connected()
                 return session.run(partial(_scalar, session, found)) == chain
             except self._database.faults as error:
-                log.warning("%s does not answer: %s", self._database.name, _cause(error))
+                log.warning("%s does not answer: %s", self._database.name, cause_of(error))
                 self._disconnect()
             if time.monotonic() > until:
                 return None
@@ -289,6 +289,16 @@ def _scalar(session: Session, chosen: Select[Any]) -> object:
     return session.connection.execute(chosen).scalar()
 
 
+def _check_text(*texts: str) -> None:
+    """Raise BadInput for what some database cannot hold: found at the commit, it would harm others."""
+    try:
+        if b"\0" not in "".join(texts).encode():
+            return
+    except UnicodeEncodeError as error:
+        raise BadInput("A name cannot hold half of a character.") from error
+    raise BadInput("A name cannot hold the character NUL.")
+
+
 def _told(error: Exception) -> Exception:
     """What a job's own failure is to the one who asked for it."""
     if isinstance(error, IntegrityError):
@@ -296,8 +306,3 @@ def _told(error: Exception) -> Exception:
     if isinstance(error, DBAPIError):
         return BadInput(f"This cannot be stored: {error.orig}.")
     return error
-
-
-def _cause(error: Exception) -> str:
-    cause = error.orig if isinstance(error, DBAPIError) else error
-    return str(cause).strip().rstrip(".") or type(cause).__name__

@@ -1,0 +1,68 @@
+"""`verify` and `rebuild`, on a data folder as it lies."""
+
+import argparse
+import asyncio
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from action_assistant.commands import maintenance
+from action_assistant.editor import happenings as h
+from action_assistant.errors import CannotStart
+from action_assistant.journal.journal import Journal
+
+
+def run(*arguments: str) -> int:
+    parser = argparse.ArgumentParser()
+    maintenance.add_to(parser.add_subparsers())
+    options = parser.parse_args(arguments)
+    code: int = options.deed(options)
+    return code
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A folder with an editor's journal of three events."""
+
+    async def fill() -> None:
+        url = f"sqlite:///{tmp_path / 'editor.db'}"
+        journal = await Journal.open(url, branch="editor", fold=h.fold)
+        for name in ("Ada", "Ada L.", "Ada Lovelace"):
+            await journal.append(h.PEOPLE, [h.draft(h.NAMED, "ada", h.Named(name))])
+        await journal.close()
+
+    asyncio.run(fill())
+    return tmp_path
+
+
+def change(data: Path, sql: str) -> None:
+    with closing(sqlite3.connect(data / "editor.db")) as connection, connection:
+        connection.execute(sql)
+
+
+def test_a_sound_journal_is_called_sound(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("verify", "--data", str(data)) == 0
+    assert capsys.readouterr().out == "editor: 3 events, all of them sound\n"
+
+
+def test_damage_is_told_by_stream_and_event(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change(data, "UPDATE event SET author = 'eve' WHERE seq = 2")
+    assert run("verify", "--data", str(data)) == 1
+    assert "people is sound up to 1; at event 2: it is not what" in capsys.readouterr().out
+
+
+def test_tables_are_made_again(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change(data, "DELETE FROM person")
+    assert run("rebuild", "--data", str(data)) == 0
+    assert capsys.readouterr().out == "editor: tables made again from 3 events\n"
+    with closing(sqlite3.connect(data / "editor.db")) as connection:
+        assert connection.execute("SELECT id, name FROM person").fetchall() == [
+            ("ada", "Ada Lovelace")
+        ]
+
+
+def test_a_folder_without_a_journal_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(CannotStart, match="no journal"):
+        run("verify", "--data", str(tmp_path))
