@@ -7,6 +7,7 @@ from pycrdt import Doc, Map
 from action_assistant.editor import wire
 from action_assistant.editor.member import Member
 from action_assistant.editor.room import Room
+from action_assistant.editor.sameness import Fingerprint
 from action_assistant.web.keys import Person
 
 
@@ -22,6 +23,7 @@ class Client:
         self.room: Room | None = None
         self.seq = 0
         self.read_only = ""
+        self.told: Fingerprint | None = None
         self.durable = 0
         self.sent = 0
         self.others: dict[int, bytes] = {}
@@ -90,6 +92,8 @@ class Client:
                 self._remote = True
                 self.doc.apply_update(update)
                 self._remote = False
+            case wire.Comparison(_, entries, total):
+                self.told = Fingerprint(entries, total)
             case wire.Presence(entries):
                 for entry in entries:
                     self.others[entry.client] = entry.state

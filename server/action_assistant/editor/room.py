@@ -12,7 +12,7 @@ from typing import Any, Final, TypeAlias, TypeVar
 import msgspec
 from pycrdt import merge_updates
 
-from action_assistant.editor import wire
+from action_assistant.editor import document, wire
 from action_assistant.editor.happenings import DEFERRED, UPDATED
 from action_assistant.editor.member import Member
 from action_assistant.editor.presence import Attendance
@@ -26,6 +26,7 @@ from action_assistant.editor.replica import (
     TooMuchWaits,
     load,
 )
+from action_assistant.editor.sameness import Fingerprint, fingerprint
 from action_assistant.editor.wire import Entry, Malformed
 from action_assistant.errors import BadInput, Conflict, Refused, TooLarge, Unavailable
 from action_assistant.journal.events import Draft
@@ -59,6 +60,13 @@ class Ask(msgspec.Struct, frozen=True):
     state: bytes
 
 
+class Compare(msgspec.Struct, frozen=True):
+    """A socket says what it shows, and wants to know whether that is right."""
+
+    member: Member
+    shown: wire.Comparison
+
+
 class Look(msgspec.Struct, frozen=True):
     """Somebody wants to see the document at a moment when all of it is committed."""
 
@@ -66,7 +74,7 @@ class Look(msgspec.Struct, frozen=True):
     done: "asyncio.Future[Any]"
 
 
-Item: TypeAlias = Offer | Ask | Look
+Item: TypeAlias = Offer | Ask | Compare | Look
 
 
 class Room:
@@ -84,6 +92,8 @@ class Room:
         self._kept = loaded.kept
         self.damaged: Final = loaded.damaged
         self._gone = gone
+        self.divergences = 0
+        self._fingerprint: tuple[int, Fingerprint] | None = None
         self._waiting: list[Item] = []
         self._in_hand: list[Item] = []
         self._ended = False
@@ -122,6 +132,8 @@ class Room:
             case wire.Question(state):
                 if member.asks():
                     self._enter(Ask(member, state))
+            case wire.Comparison():
+                self._enter(Compare(member, message))
             case wire.Presence(entries):
                 self._tell_presence(self.attendance.hear(member.seat, entries), member)
             case wire.WhoIsThere():
@@ -226,6 +238,8 @@ class Room:
             await self._reload()
         for ask in taken.asks:
             self._answer(ask)
+        for compare in taken.compares:
+            self._compare(compare)
         for look in taken.looks:
             self._show(look)
         if self.seq - self._kept >= SNAPSHOT_EVERY:
@@ -239,6 +253,9 @@ class Room:
         for n, item in enumerate(batch):
             if isinstance(item, Ask):
                 taken.asks.append(item)
+                continue
+            if isinstance(item, Compare):
+                taken.compares.append(item)
                 continue
             if isinstance(item, Look):
                 taken.looks.append(item)
@@ -316,6 +333,21 @@ class Room:
         ask.member.synced = True
         ask.member.post_ack(self.seq)
 
+    def _compare(self, compare: Compare) -> None:
+        """Tell a client what it should show, if nothing has changed since it looked."""
+        said = compare.shown
+        if said.seq != self.seq:
+            return
+        if self._fingerprint is None or self._fingerprint[0] != self.seq:
+            self._fingerprint = self.seq, fingerprint(document.maps_of(self._replica.doc))
+        found = self._fingerprint[1]
+        if (said.entries, said.total) != (found.entries, found.total):
+            self.divergences += 1
+            log.error(
+                "%s: %s shows something else at %d", self.stream, compare.member.person.id, self.seq
+            )
+        compare.member.post(wire.compared(self.seq, found.entries, found.total))
+
     def _show(self, look: Look) -> None:
         if look.done.done():  # nobody waits any more
             return
@@ -346,7 +378,11 @@ class Room:
         """Nobody is told anything that is not stored; everyone may come again."""
         self._ended = True
         for item in [*self._in_hand, *self._waiting]:
-            if not isinstance(item, Ask) and item.done is not None and not item.done.done():
+            if (
+                not isinstance(item, Ask | Compare)
+                and item.done is not None
+                and not item.done.done()
+            ):
                 item.done.set_exception(reason)
         self._waiting = []
         self._quiet.set()
@@ -365,6 +401,7 @@ class Taken:
         self.for_all = False  # something that waited is among it
         self.handled: list[Offer] = []
         self.asks: list[Ask] = []
+        self.compares: list[Compare] = []
         self.looks: list[Look] = []
         self.panicked = False
 

@@ -9,6 +9,7 @@ SYNC: Final = 0
 AWARENESS: Final = 1
 QUERY_AWARENESS: Final = 3
 ACKS: Final = 100
+COMPARE: Final = 101
 READ_ONLY: Final = 102
 STEP_1: Final = 0
 STEP_2: Final = 1
@@ -75,7 +76,15 @@ class WhoIsThere(msgspec.Struct, frozen=True):
     """Query awareness."""
 
 
-Message: TypeAlias = Question | Edit | Presence | WhoIsThere
+class Comparison(msgspec.Struct, frozen=True):
+    """What the client shows at `seq`, as a fingerprint (`sameness`)."""
+
+    seq: int
+    entries: int
+    total: int
+
+
+Message: TypeAlias = Question | Edit | Presence | WhoIsThere | Comparison
 
 
 class Reader:
@@ -140,6 +149,8 @@ def parse(data: bytes) -> Message | None:
         return Presence(tuple(_entries(reader.text())))
     if kind == QUERY_AWARENESS:
         return WhoIsThere()
+    if kind == COMPARE:
+        return Comparison(reader.number(), reader.number(), reader.number())
     return None
 
 
@@ -197,6 +208,11 @@ def presence(entries: Iterable[Entry]) -> bytes:
 def acks(messages: int, seq: int) -> bytes:
     """The first `messages` edits of this socket are durable; it was sent the log up to `seq`."""
     return bytes((ACKS,)) + number(messages) + number(seq)
+
+
+def compared(seq: int, entries: int, total: int) -> bytes:
+    """A fingerprint of the document at `seq`."""
+    return bytes((COMPARE,)) + number(seq) + number(entries) + number(total)
 
 
 def read_only(why: str) -> bytes:
