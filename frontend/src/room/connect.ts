@@ -11,115 +11,18 @@
  */
 
 import * as decoding from "lib0/decoding";
-import * as encoding from "lib0/encoding";
 import * as awarenessProtocol from "y-protocols/awareness";
 import { Awareness, removeAwarenessStates } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
-import { type Device, deviceOf, freshId, type Kept, type Shelf, type Waiting } from "./device";
+import { browser, freshId, type Kept, type Waiting } from "./device";
+import * as frames from "./frames";
 import { type Stranded, strandedIn, wentBack } from "./history";
 import { Keeping } from "./keeping";
 import { Outbox } from "./outbox";
+import type { Admit, ConnectOptions, Keep, Link, Room, Socket, Why } from "./room";
 
-/** Why a room does not let this page in, or let it go. */
-export type Why =
-  | "session-ended"
-  | "other-person"
-  | "forbidden"
-  | "no-such-graph"
-  | "other-epoch"
-  | "not-accepted"
-  | "restarting"
-  | "too-slow";
-
-export interface Link {
-  /** `refused` does not come back by itself: see `why` and `reconnect`. */
-  readonly state: "connecting" | "live" | "offline" | "refused";
-  readonly why?: Why;
-  /** Edits of this person that are not durable yet. */
-  readonly unsaved: number;
-  /** Whether those edits survive closing this page. Absent for a room that keeps nothing. */
-  readonly kept?: boolean;
-  /** Why nobody may change this graph now, in a sentence of the server's; absent when one may. */
-  readonly readOnly?: string;
-  /** The page shows the log up to this entry, plus what is `unsaved`. 0 before the first sync. */
-  readonly seq: number;
-}
-
-export interface Room {
-  readonly doc: Y.Doc;
-  readonly awareness: Awareness;
-  /** The same object until something of it changes. */
-  link(): Link;
-  onLink(listener: () => void): () => void;
-  /** Resolves with `seq` once everything is stored; rejects when the room closes or `signal` aborts. */
-  settled(signal?: AbortSignal): Promise<number>;
-  /** Tries at once, also after a refusal (the person signed in again, say). */
-  reconnect(): void;
-  /** The edits that wait on another history of the graph; null unless `why` is `other-epoch`. */
-  stranded(): Stranded | null;
-  /** Forgets everything kept here of this history, edits that wait included. */
-  forget(): Promise<void>;
-  /** Leaves the room. Edits that were not stored stay in `doc`, and on the device if there is one. */
-  close(): void;
-}
-
-type Change = Partial<Omit<Link, "why" | "readOnly">> & {
-  why?: Why | undefined;
-  readOnly?: string | undefined;
-};
-
-/** The part of `WebSocket` that a room uses, so that tests can bring their own. */
-export interface Socket {
-  binaryType: BinaryType;
-  readonly readyState: number;
-  onopen: (() => void) | null;
-  onmessage: ((event: { data: unknown }) => void) | null;
-  onclose: ((event: { code: number }) => void) | null;
-  onerror: (() => void) | null;
-  send(data: Uint8Array<ArrayBuffer>): void;
-  close(code?: number): void;
-}
-
-export interface ConnectOptions {
-  /** `wss://host/api/graphs/ID/room`; `roomUrl` makes it. */
-  readonly url: string;
-  readonly doc?: Y.Doc;
-  /** Opens a socket; the browser's by default. */
-  readonly open?: (url: string) => Socket;
-  /** 0 … 1, for the spread of reconnects. */
-  readonly random?: () => number;
-  /** Keeps the graph and the edits that wait on this device, for this person only. */
-  readonly keep?: Keep;
-  /**
-   * Asked before each attempt: why not to come in, or null. A browser cannot tell a refused upgrade
-   * from a dead server, nor whose cookie an upgrade carries. `again` after an attempt or a connection broke off.
-   * Throwing means that nobody answers.
-   */
-  readonly admit?: Admit;
-}
-
-export type Admit = (again: boolean) => Promise<Why | null>;
-
-export interface Keep extends Shelf {
-  /** The browser's storage by default. */
-  readonly device?: Device;
-  /** Begins anew: what is kept of an older history stays where it is and is not shown. */
-  readonly anew?: boolean;
-}
-
-/** The address of a graph's room on the server that the page came from. */
-export function roomUrl(graph: string, base: string | URL = window.location.href): string {
-  const url = new URL(`/api/graphs/${encodeURIComponent(graph)}/room`, base);
-  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
-  return url.href;
-}
-
-const SYNC = 0;
-const AWARENESS = 1;
-const QUERY_AWARENESS = 3;
-const ACK = 100;
-const READ_ONLY = 102;
+export * from "./room";
 
 /** The server says something at least every 15 s; a socket this silent is dead. */
 const SILENCE_MS = 30_000;
@@ -132,34 +35,14 @@ const HIDDEN_RETRY_MS = 60_000;
 const PROBE_MS = 5_000;
 /** Above this, edits that wait travel one by one; a message may have 1 MiB. */
 const LARGE = 1 << 19;
-const NOTHING = new Uint8Array([0, 0]);
 const OPEN = 1;
-const OTHER_EPOCH = 4409;
 
-const REFUSED: ReadonlyMap<number, Why> = new Map([
-  [1003, "not-accepted"],
-  [1007, "not-accepted"],
-  [1008, "forbidden"],
-  [1009, "not-accepted"],
-  [4401, "session-ended"],
-  [4403, "forbidden"],
-  [4404, "no-such-graph"],
-  [OTHER_EPOCH, "other-epoch"],
-]);
-const PASSING: ReadonlyMap<number, Why> = new Map([
-  [1012, "restarting"],
-  [1013, "too-slow"],
-]);
+type Change = Partial<Omit<Link, "why" | "readOnly">> & {
+  why?: Why | undefined;
+  readOnly?: string | undefined;
+};
 
 const madeNow = (update: Uint8Array): Waiting => ({ id: freshId(), update, at: Date.now() });
-
-let ofBrowser: Device | null = null;
-
-/** The storage of this browser, the same for all rooms. */
-export function browser(): Device {
-  ofBrowser ??= deviceOf();
-  return ofBrowser;
-}
 
 export function connect(options: ConnectOptions): Room {
   return new Connection(options);
@@ -357,10 +240,7 @@ class Connection implements Room {
     this.heardAt = Date.now();
     this.outbox.fresh();
     this.say({ readOnly: undefined });
-    const encoder = encoding.createEncoder();
-    encoding.writeVarUint(encoder, SYNC);
-    sync.writeSyncStep1(encoder, this.doc);
-    this.send(encoder);
+    this.send(frames.question(this.doc));
     // The others saw us go: only a newer clock brings us back.
     const state = this.awareness.getLocalState();
     if (state !== null) this.awareness.setLocalState(state);
@@ -369,12 +249,12 @@ class Connection implements Room {
   private onClose(socket: Socket, code: number): void {
     if (socket !== this.socket) return;
     this.drop();
-    const refused = REFUSED.get(code);
+    const refused = frames.REFUSED.get(code);
     if (refused !== undefined) {
       this.say({ state: "refused", why: refused });
       return;
     }
-    this.stayAway(PASSING.get(code));
+    this.stayAway(frames.PASSING.get(code));
   }
 
   private stayAway(why: Why | undefined): void {
@@ -420,10 +300,7 @@ class Connection implements Room {
 
   private probe(): void {
     this.probedAt = Date.now();
-    const encoder = encoding.createEncoder();
-    encoding.writeVarUint(encoder, SYNC);
-    sync.writeSyncStep1(encoder, this.doc);
-    this.send(encoder);
+    this.send(frames.question(this.doc));
   }
 
   private reconnectNow(): void {
@@ -440,9 +317,8 @@ class Connection implements Room {
     if (mute || now - this.heardAt > limit) this.onClose(this.socket, 1006);
   };
 
-  private send(encoder: encoding.Encoder): void {
-    if (this.socket?.readyState !== OPEN) return;
-    this.socket.send(encoding.toUint8Array(encoder) as Uint8Array<ArrayBuffer>);
+  private send(frame: Uint8Array<ArrayBuffer>): void {
+    if (this.socket?.readyState === OPEN) this.socket.send(frame);
   }
 
   // -- what comes in --------------------------------------------------------------------------
@@ -462,18 +338,18 @@ class Connection implements Room {
 
   private take(socket: Socket, decoder: decoding.Decoder): void {
     switch (decoding.readVarUint(decoder)) {
-      case SYNC:
+      case frames.SYNC:
         this.takeSync(socket, decoder);
         break;
-      case AWARENESS: {
+      case frames.AWARENESS: {
         const update = decoding.readVarUint8Array(decoder);
         awarenessProtocol.applyAwarenessUpdate(this.awareness, update, this);
         break;
       }
-      case QUERY_AWARENESS:
+      case frames.QUERY_AWARENESS:
         this.sendAwareness();
         break;
-      case ACK: {
+      case frames.ACK: {
         const stored = this.outbox.durable(decoding.readVarUint(decoder));
         const seq = decoding.readVarUint(decoder);
         if (stored.length > 0) this.keeping?.stored(stored);
@@ -481,7 +357,7 @@ class Connection implements Room {
         this.say({ unsaved: this.outbox.unsaved, seq });
         break;
       }
-      case READ_ONLY:
+      case frames.READ_ONLY:
         this.say({ readOnly: decoding.readVarString(decoder) });
         break;
     }
@@ -492,7 +368,8 @@ class Connection implements Room {
     const content = decoding.readVarUint8Array(decoder);
     switch (step) {
       case sync.messageYjsSyncStep1:
-        if (wentBack(this.doc, this.outbox.edits, content)) this.onClose(socket, OTHER_EPOCH);
+        if (wentBack(this.doc, this.outbox.edits, content))
+          this.onClose(socket, frames.OTHER_EPOCH);
         else this.give(content);
         break;
       case sync.messageYjsSyncStep2:
@@ -519,23 +396,15 @@ class Connection implements Room {
     const edits = this.outbox.edits;
     if (whole.length <= LARGE || edits.length === 0) {
       this.outbox.sentAll();
-      this.sendUpdate(sync.messageYjsSyncStep2, whole);
+      this.send(frames.answer(whole));
       return;
     }
     this.outbox.sentSome(0);
-    this.sendUpdate(sync.messageYjsSyncStep2, NOTHING);
+    this.send(frames.answer(frames.NOTHING));
     edits.forEach(({ update }, n) => {
       this.outbox.sentSome(n + 1);
-      this.sendUpdate(sync.messageYjsUpdate, update);
+      this.send(frames.change(update));
     });
-  }
-
-  private sendUpdate(step: number, update: Uint8Array): void {
-    const encoder = encoding.createEncoder();
-    encoding.writeVarUint(encoder, SYNC);
-    encoding.writeVarUint(encoder, step);
-    encoding.writeVarUint8Array(encoder, update);
-    this.send(encoder);
   }
 
   private readonly onUpdate = (
@@ -549,7 +418,7 @@ class Connection implements Room {
     // Until the room asked for what it lacks, everything travels with that answer, in order.
     if (this.outbox.answered && this.socket?.readyState === OPEN) {
       this.outbox.sentAll();
-      this.sendUpdate(sync.messageYjsUpdate, update);
+      this.send(frames.change(update));
     }
     this.say({ unsaved: this.outbox.unsaved });
   };
@@ -563,12 +432,6 @@ class Connection implements Room {
   };
 
   private sendAwareness(): void {
-    const encoder = encoding.createEncoder();
-    encoding.writeVarUint(encoder, AWARENESS);
-    encoding.writeVarUint8Array(
-      encoder,
-      awarenessProtocol.encodeAwarenessUpdate(this.awareness, [this.doc.clientID]),
-    );
-    this.send(encoder);
+    this.send(frames.presence(this.awareness));
   }
 }

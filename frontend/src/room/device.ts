@@ -128,6 +128,14 @@ export function deviceOf(factory: IDBFactory | undefined = globalThis.indexedDB)
   };
 }
 
+let ofBrowser: Device | null = null;
+
+/** The storage of this browser, the same for all rooms. */
+export function browser(): Device {
+  ofBrowser ??= deviceOf();
+  return ofBrowser;
+}
+
 function openDatabase(factory: IDBFactory | undefined, onLost: () => void): Promise<IDBDatabase> {
   return new Promise((resolve, reject) => {
     if (factory === undefined) throw new Error("This browser stores nothing for this page");

@@ -1,0 +1,74 @@
+/** The messages and close codes of a room's socket: y-protocols, and ours. */
+
+import * as encoding from "lib0/encoding";
+import { type Awareness, encodeAwarenessUpdate } from "y-protocols/awareness";
+import * as sync from "y-protocols/sync";
+import type * as Y from "yjs";
+import type { Why } from "./room";
+
+export const SYNC = 0;
+export const AWARENESS = 1;
+export const QUERY_AWARENESS = 3;
+/** How many document messages of this socket are durable, and up to where it was sent the log. */
+export const ACK = 100;
+/** A sentence: why nobody may change this document. */
+export const READ_ONLY = 102;
+
+export const OTHER_EPOCH = 4409;
+/** Close codes after which coming again by itself is of no use. */
+export const REFUSED: ReadonlyMap<number, Why> = new Map([
+  [1003, "not-accepted"],
+  [1007, "not-accepted"],
+  [1008, "forbidden"],
+  [1009, "not-accepted"],
+  [4401, "session-ended"],
+  [4403, "forbidden"],
+  [4404, "no-such-graph"],
+  [OTHER_EPOCH, "other-epoch"],
+]);
+/** Close codes of what passes. */
+export const PASSING: ReadonlyMap<number, Why> = new Map([
+  [1012, "restarting"],
+  [1013, "too-slow"],
+]);
+
+/** An update that brings nothing. */
+export const NOTHING = new Uint8Array([0, 0]);
+
+type Bytes = Uint8Array<ArrayBuffer>;
+
+/** Sync step 1: what we have. */
+export function question(doc: Y.Doc): Bytes {
+  return message(SYNC, (encoder) => sync.writeSyncStep1(encoder, doc));
+}
+
+/** Sync step 2, what the server lacks. */
+export function answer(update: Uint8Array): Bytes {
+  return edit(sync.messageYjsSyncStep2, update);
+}
+
+/** One update. */
+export function change(update: Uint8Array): Bytes {
+  return edit(sync.messageYjsUpdate, update);
+}
+
+/** What we say about ourselves. */
+export function presence(awareness: Awareness): Bytes {
+  return message(AWARENESS, (encoder) =>
+    encoding.writeVarUint8Array(encoder, encodeAwarenessUpdate(awareness, [awareness.clientID])),
+  );
+}
+
+function edit(step: number, update: Uint8Array): Bytes {
+  return message(SYNC, (encoder) => {
+    encoding.writeVarUint(encoder, step);
+    encoding.writeVarUint8Array(encoder, update);
+  });
+}
+
+function message(kind: number, write: (encoder: encoding.Encoder) => void): Bytes {
+  const encoder = encoding.createEncoder();
+  encoding.writeVarUint(encoder, kind);
+  write(encoder);
+  return encoding.toUint8Array(encoder) as Bytes;
+}

@@ -1,0 +1,95 @@
+/** What a room is to those who use it, and what it needs to be opened. */
+
+import type { Awareness } from "y-protocols/awareness";
+import type * as Y from "yjs";
+import type { Device, Shelf } from "./device";
+import type { Stranded } from "./history";
+
+/** Why a room does not let this page in, or let it go. */
+export type Why =
+  | "session-ended"
+  | "other-person"
+  | "forbidden"
+  | "no-such-graph"
+  | "other-epoch"
+  | "not-accepted"
+  | "restarting"
+  | "too-slow";
+
+export interface Link {
+  /** `refused` does not come back by itself: see `why` and `reconnect`. */
+  readonly state: "connecting" | "live" | "offline" | "refused";
+  readonly why?: Why;
+  /** Edits of this person that are not durable yet. */
+  readonly unsaved: number;
+  /** Whether those edits survive closing this page. Absent for a room that keeps nothing. */
+  readonly kept?: boolean;
+  /** Why nobody may change this graph now, in a sentence of the server's; absent when one may. */
+  readonly readOnly?: string;
+  /** The page shows the log up to this entry, plus what is `unsaved`. 0 before the first sync. */
+  readonly seq: number;
+}
+
+export interface Room {
+  readonly doc: Y.Doc;
+  readonly awareness: Awareness;
+  /** The same object until something of it changes. */
+  link(): Link;
+  onLink(listener: () => void): () => void;
+  /** Resolves with `seq` once everything is stored; rejects when the room closes or `signal` aborts. */
+  settled(signal?: AbortSignal): Promise<number>;
+  /** Tries at once, also after a refusal (the person signed in again, say). */
+  reconnect(): void;
+  /** The edits that wait on another history of the graph; null unless `why` is `other-epoch`. */
+  stranded(): Stranded | null;
+  /** Forgets everything kept here of this history, edits that wait included. */
+  forget(): Promise<void>;
+  /** Leaves the room. Edits that were not stored stay in `doc`, and on the device if there is one. */
+  close(): void;
+}
+
+/** The part of `WebSocket` that a room uses, so that tests can bring their own. */
+export interface Socket {
+  binaryType: BinaryType;
+  readonly readyState: number;
+  onopen: (() => void) | null;
+  onmessage: ((event: { data: unknown }) => void) | null;
+  onclose: ((event: { code: number }) => void) | null;
+  onerror: (() => void) | null;
+  send(data: Uint8Array<ArrayBuffer>): void;
+  close(code?: number): void;
+}
+
+export interface ConnectOptions {
+  /** `wss://host/api/graphs/ID/room`; `roomUrl` makes it. */
+  readonly url: string;
+  readonly doc?: Y.Doc;
+  /** Opens a socket; the browser's by default. */
+  readonly open?: (url: string) => Socket;
+  /** 0 … 1, for the spread of reconnects. */
+  readonly random?: () => number;
+  /** Keeps the graph and the edits that wait on this device, for this person only. */
+  readonly keep?: Keep;
+  /**
+   * Asked before each attempt: why not to come in, or null. A browser cannot tell a refused upgrade
+   * from a dead server, nor whose cookie an upgrade carries. `again` after an attempt or a connection broke off.
+   * Throwing means that nobody answers.
+   */
+  readonly admit?: Admit;
+}
+
+export type Admit = (again: boolean) => Promise<Why | null>;
+
+export interface Keep extends Shelf {
+  /** The browser's storage by default. */
+  readonly device?: Device;
+  /** Begins anew: what is kept of an older history stays where it is and is not shown. */
+  readonly anew?: boolean;
+}
+
+/** The address of a graph's room on the server that the page came from. */
+export function roomUrl(graph: string, base: string | URL = window.location.href): string {
+  const url = new URL(`/api/graphs/${encodeURIComponent(graph)}/room`, base);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  return url.href;
+}
