@@ -320,10 +320,10 @@ def test_bytes_that_are_no_utf_8_are_refused() -> None:
     ids=lambda text: text[:20],
 )
 def test_hostile_texts_cost_no_more_than_their_size(text: str) -> None:
-    started = time.perf_counter()
+    started = time.process_time()
     with suppress(Unreadable):
         read(text)
-    assert time.perf_counter() - started < 10
+    assert time.process_time() - started < 10
 
 
 @given(st.recursive(

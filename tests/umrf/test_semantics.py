@@ -412,7 +412,7 @@ def test_any_graph_gives_one_trace_that_ends(graph: Graph, response: str, error:
 
 def test_a_day_of_work_is_simulated_in_a_moment() -> None:
     graph = optional(graph_of("entry>A", "A>B", "B>A", "B>exit", Bexit=Conditions()), "B>A")
-    started = time.perf_counter()
+    started = time.process_time()
     traces = list(simulate(graph))
     assert len(traces) == 100_000
-    assert time.perf_counter() - started < 2
+    assert time.process_time() - started < 2

@@ -112,7 +112,7 @@ def renumber(file: dict[str, Json]) -> list[str]:
     used: dict[str, set[int]] = {}
     large: list[tuple[str, str]] = []
     for action in actions:
-        if isinstance(action, dict) and isinstance(name := action.get("name"), str):
+        if isinstance(action, dict) and isinstance(name := action.get("name", ""), str):
             number, fits = whole_of(action.get("instance_id", Number("0")))
             if fits and number <= MAX_REFERRED_ID:
                 used.setdefault(name, set()).add(number)
@@ -150,7 +150,7 @@ def _renumbered_action(action: Json, new: dict[tuple[str, str], int]) -> Json:
 def _renumbered(item: Json, new: dict[tuple[str, str], int]) -> Json:
     if not isinstance(item, dict):
         return item
-    name, spelled = item.get("name"), item.get("instance_id")
+    name, spelled = item.get("name", ""), item.get("instance_id")
     if isinstance(name, str) and isinstance(spelled, Number) and (name, spelled.text) in new:
         return {**item, "instance_id": Number(str(new[name, spelled.text]))}
     return dict(item)
