@@ -85,9 +85,13 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
       ),
     );
   }, [me, people]);
-  const options = { others, places, selected: selection, progress, marks, measured: sizes };
-  const nodes = keep(drawn.current.nodes, nodesOf(graph, options));
-  const edges = keep(drawn.current.edges, edgesOf(graph, options));
+  const { nodes, edges } = useMemo(() => {
+    const options = { others, places, selected: selection, progress, marks, measured: sizes };
+    return {
+      nodes: keep(drawn.current.nodes, nodesOf(graph, options)),
+      edges: keep(drawn.current.edges, edgesOf(graph, options)),
+    };
+  }, [graph, others, places, selection, progress, marks, sizes]);
   useEffect(() => {
     drawn.current = { nodes, edges };
   }, [nodes, edges]);

@@ -1,0 +1,91 @@
+/** What is seen: text stays readable on opening, Fit twice shows the whole, the view follows a run. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { card, saved, start } from "./bench";
+import { Product } from "./product";
+
+const product = new Product();
+
+test.beforeAll(() => product.start());
+test.afterAll(() => product.dispose());
+
+async function chain(length: number): Promise<string> {
+  const named = (instance: number) => ({ name: "Wait", instance_id: instance });
+  const graph = {
+    graph_name: `tall_${length}`,
+    graph_entry: [named(0)],
+    graph_exit: [named(length - 1)],
+    actions: Array.from({ length }, (_, i) => ({
+      ...named(i),
+      type: "sync",
+      parents: i === 0 ? [] : [named(i - 1)],
+      children: i === length - 1 ? [] : [named(i + 1)],
+    })),
+  };
+  const { id } = await product.ask<{ id: string }>("/api/graphs", {
+    method: "POST",
+    body: JSON.stringify(graph),
+    headers: { "content-type": "application/json" },
+  });
+  return `${product.url}/graphs/${id}`;
+}
+
+const zoom = (page: Page) =>
+  page
+    .locator(".react-flow__viewport")
+    .evaluate((element) => new DOMMatrix(getComputedStyle(element).transform).a);
+
+for (const [what, viewport, least] of [
+  ["a desktop", { width: 1440, height: 900 }, 0.75],
+  ["a phone", { width: 390, height: 844 }, 0.6],
+] as const) {
+  test(`a tall graph opens at its top and readable on ${what}`, async ({ browser }) => {
+    const { page, context } = await product.person(browser, "Ada", { viewport });
+    await page.goto(await chain(20));
+    await saved(page);
+    await expect.poll(() => zoom(page)).toBeCloseTo(least, 2);
+    await expect(card(page, "Wait", 0)).toBeInViewport();
+    await expect(card(page, "Wait", 19)).not.toBeInViewport();
+
+    // Fit once more shows the rest too; and again the readable part.
+    const fit = page.getByRole("button", { name: "Fit", exact: true });
+    await fit.click();
+    await expect(card(page, "Wait", 19)).toBeInViewport();
+    await expect.poll(() => zoom(page)).toBeLessThan(least);
+    await fit.click();
+    await expect.poll(() => zoom(page)).toBeCloseTo(least, 2);
+    await context.close();
+  });
+}
+
+test("the view follows what runs until the person moves it, and again when asked", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.goto(await chain(40));
+  await saved(page);
+  await start(page);
+  await expect(card(page, "Wait", 8)).toBeInViewport({ timeout: 30_000 });
+  await expect(page.getByRole("list", { name: /Actions of the run/ })).toBeVisible();
+
+  await page.getByRole("button", { name: "Hide the lanes" }).click();
+  await expect(page.getByRole("list", { name: /Actions of the run/ })).toHaveCount(0);
+  await page.getByRole("button", { name: "Show the lanes" }).click();
+
+  const box = await page.locator(".react-flow__pane").boundingBox();
+  if (box === null) throw new Error("no canvas");
+  await page.mouse.move(box.x + 60, box.y + 100);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 60, box.y + 500, { steps: 5 });
+  await page.mouse.up();
+  const follow = page.getByRole("button", { name: "Follow the run" });
+  await expect(follow).toBeVisible();
+  await follow.click();
+  await expect(follow).toBeHidden();
+  await expect(
+    page.locator(".react-flow__node-action").filter({ hasText: "running" }).first(),
+  ).toBeInViewport();
+  await page.getByRole("button", { name: /^Stop run/ }).click();
+  expect(failures).toEqual([]);
+  await context.close();
+});
