@@ -171,6 +171,19 @@ def test_a_browser_trades_the_token_for_a_cookie_and_gives_a_name(
     assert client.get("/api/me").text == "Ada K"
 
 
+def test_the_link_again_in_the_same_browser_is_the_same_person(
+    client: httpx.Client, port: int
+) -> None:
+    client.headers["origin"] = f"http://127.0.0.1:{port}"
+    client.post("/api/session", json={"token": KEYS.token, "name": "Ada"})
+    first = client.get("/api/session").json()
+    assert client.post("/api/session", json={"token": KEYS.token}).json() == first
+    client.delete("/api/session")
+    other = client.post("/api/session", json={"token": KEYS.token}).json()
+    assert other["person"]["id"] != first["person"]["id"]
+    assert other["named"] is False
+
+
 def test_a_cookie_without_an_origin_changes_nothing(client: httpx.Client, port: int) -> None:
     headers = cookie(port, expires=1e12)
     assert client.post("/api/runs", json={"n": 1}, headers=headers).status_code == 403

@@ -57,7 +57,13 @@ def session_routes(keys: Keys, page_port: int) -> list[ControllerRouterHandler]:
         if data.token is not None:
             if not keys.opens(data.token):
                 raise Unauthenticated("This is not the token of this server.")
-            return signed_in(keys.new_session(name))
+            session = session_of(request)
+            if session is None:
+                return signed_in(keys.new_session(name))
+            # The link again, in a browser that is signed in: the same person, since what older tabs
+            # have written belongs to them.
+            person = session.person
+            return signed_in(keys.new_session(name or person.name, person_id=person.id))
         person = _live(request).person
         return signed_in(keys.new_session(name or person.name, person_id=person.id))
 
