@@ -8,7 +8,9 @@ import style from "./review-dialog.module.css";
 const MOST_PROBLEMS = 8;
 
 function Problems({ waiting }: { waiting: Waiting }) {
-  const problems = bySeverity(waiting.preview.problems);
+  // That it is an old form is solved by keeping it.
+  const left = waiting.preview.problems.filter(({ code }) => code !== "dialect-old");
+  const problems = bySeverity(left);
   if (problems.length === 0) return null;
   const error = problems.filter(({ severity }) => severity === "error").length;
   const more = problems.length - MOST_PROBLEMS;
