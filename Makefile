@@ -61,6 +61,15 @@ e2e: setup ## tests in Chromium against the real processes
 	@echo "» Playwright"
 	@$(NPM) run --silent e2e
 
+.PHONY: soak
+soak: setup ## what takes longer than CI may: crashes, power cuts, floods and fuzzing by the thousand
+	@$(BIN)/pip install --quiet atheris
+	TEST_KILLS=1000 TEST_MUTANTS=1000000 TEST_RECONNECTS=10000 SOAK_STOPS=100 SOAK_CUTS=1000 \
+		SOAK_IMAGES=10000 SOAK_FAULTS=500 SOAK_FLIPS=10000 TEST_IDLE_SECONDS=61 \
+		$(BIN)/pytest -q --timeout=0 tests/journal tests/editor tests/test_room_clients.py
+	FUZZ_EXAMPLES=10000 $(BIN)/pytest -q --timeout=0 tests/fuzz
+	$(BIN)/python tests/fuzz/soak_umrf.py 300
+
 .PHONY: pictures
 pictures: setup ## take the pictures of the documentation from the running product
 	@scripts/need chromium=chromium
