@@ -299,3 +299,14 @@ def socket_to(port: int, headers: dict[str, str]) -> Any:
         proxy=None,
         open_timeout=5,
     )
+
+
+def test_who_signs_in_again_after_the_session_expired_is_the_same_person(
+    client: httpx.Client, port: int
+) -> None:
+    headers = {**cookie(port, expires=time.time() - 60), "origin": f"http://localhost:{port}"}
+    answer = client.post("/api/session", json={"token": KEYS.token}, headers=headers)
+    assert answer.json()["person"] == {"id": "p", "name": "Ada"}
+    forged = {**headers, "cookie": headers["cookie"][:-2] + "xx"}
+    stranger = client.post("/api/session", json={"token": KEYS.token}, headers=forged)
+    assert stranger.json()["person"]["id"] != "p"

@@ -46,6 +46,13 @@ def session_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None
     return session
 
 
+def known_person(connection: ASGIConnection[Any, Any, Any, Any]) -> Person | None:
+    """Who this browser speaks for, or spoke for until the session expired."""
+    state = connection.scope["state"]
+    session: Session | None = state.get("session") or state.get("expired")
+    return session.person if session is not None else None
+
+
 class Access:
     """An ASGI middleware that lets in who may come in.
 
@@ -124,6 +131,8 @@ class Access:
             state["person"] = session.person
             state["session"] = session
             return
+        if session is not None:  # genuine, yet good for nothing but being the same person again
+            state["expired"] = session
         if not self._is_open(path, "text/html" in headers.get("accept", "")):
             raise Unauthenticated(
                 "Your session has ended: open the link that the server printed."

@@ -9,7 +9,7 @@ from litestar.params import JSONBody
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import Unauthenticated
-from action_assistant.web.access import cookie_name, session_of
+from action_assistant.web.access import cookie_name, known_person, session_of
 from action_assistant.web.keys import SESSION_SECONDS, Keys, Person, Session
 
 _NAME: Final = 60  # characters
@@ -57,13 +57,12 @@ def session_routes(keys: Keys, page_port: int) -> list[ControllerRouterHandler]:
         if data.token is not None:
             if not keys.opens(data.token):
                 raise Unauthenticated("This is not the token of this server.")
-            session = session_of(request)
-            if session is None:
+            known = known_person(request)
+            if known is None:
                 return signed_in(keys.new_session(name))
-            # The link again, in a browser that is signed in: the same person, since what older tabs
-            # have written belongs to them.
-            person = session.person
-            return signed_in(keys.new_session(name or person.name, person_id=person.id))
+            # The link again, in a browser that is or was signed in: the same person, since what
+            # older tabs have written belongs to them.
+            return signed_in(keys.new_session(name or known.name, person_id=known.id))
         person = _live(request).person
         return signed_in(keys.new_session(name or person.name, person_id=person.id))
 
