@@ -21,28 +21,6 @@ interface Run {
   detail: string;
 }
 
-/** A graph of one action after the other. The simulator gives each a second. */
-async function chain(length: number): Promise<string> {
-  const named = (instance: number) => ({ name: "Wait", instance_id: instance });
-  const graph = {
-    graph_name: `chain_${length}`,
-    graph_entry: [named(0)],
-    graph_exit: [named(length - 1)],
-    actions: Array.from({ length }, (_, i) => ({
-      ...named(i),
-      type: "sync",
-      parents: i === 0 ? [] : [named(i - 1)],
-      children: i === length - 1 ? [] : [named(i + 1)],
-    })),
-  };
-  const made = await product.ask<Graph>("/api/graphs", {
-    method: "POST",
-    body: JSON.stringify(graph),
-    headers: { "content-type": "application/json" },
-  });
-  return made.id;
-}
-
 async function runs(graph: string): Promise<Run[]> {
   return product.ask<Run[]>(`/api/runs?graph=${graph}`, {}, product.runnerUrl);
 }
@@ -68,7 +46,7 @@ async function drop(page: Page, name: string, text: string): Promise<void> {
 
 test("Stop stops, and the page shows it only when it is proven", async ({ browser }) => {
   const { page, context, failures } = await product.person(browser, "Ada");
-  const graph = await chain(60);
+  const graph = await product.chain(60);
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
   await start(page);
@@ -87,7 +65,7 @@ test("a run that was going when everything died is called lost, with the reason"
   browser,
 }) => {
   const { page, context } = await product.person(browser, "Ada");
-  const graph = await chain(61);
+  const graph = await product.chain(61);
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
   await start(page);

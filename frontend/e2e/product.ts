@@ -76,6 +76,28 @@ export class Product {
     return (await answer.json()) as T;
   }
 
+  /** The id of a new graph of one action after the other. The simulator gives each a second. */
+  async chain(length: number): Promise<string> {
+    const named = (instance: number) => ({ name: "Wait", instance_id: instance });
+    const graph = {
+      graph_name: `chain_${length}`,
+      graph_entry: [named(0)],
+      graph_exit: [named(length - 1)],
+      actions: Array.from({ length }, (_, i) => ({
+        ...named(i),
+        type: "sync",
+        parents: i === 0 ? [] : [named(i - 1)],
+        children: i === length - 1 ? [] : [named(i + 1)],
+      })),
+    };
+    const { id } = await this.ask<{ id: string }>("/api/graphs", {
+      method: "POST",
+      body: JSON.stringify(graph),
+      headers: { "content-type": "application/json" },
+    });
+    return id;
+  }
+
   /** A person with a browser of their own, signed in, on the first page. */
   async person(
     browser: Browser,

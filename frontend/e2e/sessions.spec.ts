@@ -27,31 +27,10 @@ async function endSession(context: BrowserContext, seconds: number): Promise<voi
   await context.addCookies([{ ...cookie, value: `${payload}.${signature}` }]);
 }
 
-async function chain(length: number): Promise<string> {
-  const named = (instance: number) => ({ name: "Wait", instance_id: instance });
-  const graph = {
-    graph_name: `chain_${length}`,
-    graph_entry: [named(0)],
-    graph_exit: [named(length - 1)],
-    actions: Array.from({ length }, (_, i) => ({
-      ...named(i),
-      type: "sync",
-      parents: i === 0 ? [] : [named(i - 1)],
-      children: i === length - 1 ? [] : [named(i + 1)],
-    })),
-  };
-  const { id } = await product.ask<{ id: string }>("/api/graphs", {
-    method: "POST",
-    body: JSON.stringify(graph),
-    headers: { "content-type": "application/json" },
-  });
-  return id;
-}
-
 test("edits stay, Stop stops by POST, and the page goes on where it was", async ({ browser }) => {
   test.setTimeout(120_000);
   const { page, context, failures } = await product.person(browser, "Ada");
-  const graph = await chain(60);
+  const graph = await product.chain(60);
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
   await start(page);

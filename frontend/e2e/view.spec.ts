@@ -9,27 +9,6 @@ const product = new Product();
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
-async function chain(length: number): Promise<string> {
-  const named = (instance: number) => ({ name: "Wait", instance_id: instance });
-  const graph = {
-    graph_name: `tall_${length}`,
-    graph_entry: [named(0)],
-    graph_exit: [named(length - 1)],
-    actions: Array.from({ length }, (_, i) => ({
-      ...named(i),
-      type: "sync",
-      parents: i === 0 ? [] : [named(i - 1)],
-      children: i === length - 1 ? [] : [named(i + 1)],
-    })),
-  };
-  const { id } = await product.ask<{ id: string }>("/api/graphs", {
-    method: "POST",
-    body: JSON.stringify(graph),
-    headers: { "content-type": "application/json" },
-  });
-  return `${product.url}/graphs/${id}`;
-}
-
 const zoom = (page: Page) =>
   page
     .locator(".react-flow__viewport")
@@ -41,7 +20,7 @@ for (const [what, viewport, least] of [
 ] as const) {
   test(`a tall graph opens at its top and readable on ${what}`, async ({ browser }) => {
     const { page, context } = await product.person(browser, "Ada", { viewport });
-    await page.goto(await chain(20));
+    await page.goto(`${product.url}/graphs/${await product.chain(20)}`);
     await saved(page);
     await expect.poll(() => zoom(page)).toBeCloseTo(least, 2);
     await expect(card(page, "Wait", 0)).toBeInViewport();
@@ -62,7 +41,7 @@ test("the view follows what runs until the person moves it, and again when asked
   browser,
 }) => {
   const { page, context, failures } = await product.person(browser, "Ada");
-  await page.goto(await chain(40));
+  await page.goto(`${product.url}/graphs/${await product.chain(40)}`);
   await saved(page);
   await start(page);
   await expect(card(page, "Wait", 8)).toBeInViewport({ timeout: 30_000 });
