@@ -1,5 +1,6 @@
 """What is true of one engine build; kept with a robot's profile, taken by check, simulator and link."""
 
+from collections.abc import Mapping
 from typing import Final
 
 import msgspec
@@ -55,3 +56,46 @@ def facts_for(commit: str | None) -> EngineFacts:
         if commit.startswith(known):
             return facts
     return msgspec.structs.replace(PINNED, commit=commit)
+
+
+class BadProfile(ValueError):
+    """A profile that says something about an engine that cannot be said; `path` is a JSON pointer."""
+
+    def __init__(self, message: str, path: str) -> None:
+        super().__init__(message)
+        self.message = message
+        self.path = path
+
+
+def facts_of(profile: Mapping[str, object]) -> EngineFacts:
+    """The facts of a robot's engine: those of its `commit` (without one, of the pinned engine), and
+    whatever else the profile says of it, by the names of `EngineFacts`. Raises BadProfile."""
+    for key in profile:
+        if key not in EngineFacts.__struct_fields__:
+            known = ", ".join(EngineFacts.__struct_fields__)
+            raise BadProfile(
+                f"Nothing is known by the name {key!r}; there are: {known}.", f"/{key}"
+            )
+    said = {key: _said(key, value) for key, value in profile.items()}
+    commit = said.pop("commit", None)
+    base = facts_for(commit if isinstance(commit, str) else None)
+    return msgspec.structs.replace(base, **said)
+
+
+def _said(key: str, value: object) -> object:
+    """One value of a profile, of the type that its field has."""
+    try:
+        fitting: EngineFacts = msgspec.convert({"commit": "", key: value}, EngineFacts)
+    except msgspec.ValidationError as wrong:
+        what = str(wrong).partition(" - at `$")[0]
+        raise BadProfile(f"{key}: {what}.", f"/{key}") from wrong
+    said = getattr(fitting, key)
+    match said:
+        case frozenset() if unknown := said - ALL_HAZARDS:
+            raise BadProfile(f"No hazard is called {min(unknown)!r}.", f"/{key}")
+        case bool():
+            return said
+        case int() if said <= 0:
+            raise BadProfile(f"{key} is a time in milliseconds, more than 0.", f"/{key}")
+        case _:
+            return said

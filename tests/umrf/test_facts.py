@@ -1,0 +1,39 @@
+"""What a robot's profile says of its engine."""
+
+import pytest
+
+from action_assistant.umrf.facts import PINNED, BadProfile, facts_of
+
+
+def test_a_profile_that_says_nothing_is_the_pinned_engine() -> None:
+    assert facts_of({}) == PINNED
+
+
+def test_a_profile_changes_what_it_names_and_nothing_else() -> None:
+    facts = facts_of({"commit": "5819055", "pauses_safely": True, "hazards": ["H3", "H5"]})
+    assert facts.pauses_safely
+    assert facts.hazards == frozenset({"H3", "H5"})
+    assert (facts.stop_topic, facts.stop_timeout_ms) == (PINNED.stop_topic, PINNED.stop_timeout_ms)
+
+
+def test_a_commit_that_nobody_measured_keeps_its_name() -> None:
+    assert facts_of({"commit": "abcdef0"}).commit == "abcdef0"
+
+
+@pytest.mark.parametrize(
+    ("profile", "path"),
+    [
+        ({"pauses": True}, "/pauses"),
+        ({"pauses_safely": "yes"}, "/pauses_safely"),
+        ({"hazards": ["H99"]}, "/hazards"),
+        ({"hazards": "H3"}, "/hazards"),
+        ({"stop_timeout_ms": 0}, "/stop_timeout_ms"),
+        ({"commit": 7}, "/commit"),
+    ],
+)
+def test_what_cannot_be_true_of_an_engine_is_refused_with_the_place(
+    profile: dict[str, object], path: str
+) -> None:
+    with pytest.raises(BadProfile) as refused:
+        facts_of(profile)
+    assert refused.value.path == path
