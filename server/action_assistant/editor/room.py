@@ -7,12 +7,20 @@ batch: apply, append, commit, and only then tell anyone.
 import asyncio
 import logging
 from collections.abc import Callable, Sequence
-from typing import Any, Final, TypeAlias, TypeVar
-
-import msgspec
-from pycrdt import merge_updates
+from typing import Final, TypeVar
 
 from action_assistant.editor import document, wire
+from action_assistant.editor.batch import (
+    Ask,
+    Compare,
+    Item,
+    Look,
+    Offer,
+    Taken,
+    batch_of,
+    merged,
+    refuse,
+)
 from action_assistant.editor.happenings import DEFERRED, UPDATED
 from action_assistant.editor.member import Member
 from action_assistant.editor.presence import Attendance
@@ -37,44 +45,7 @@ log: Final = logging.getLogger(__name__)
 T = TypeVar("T")
 
 SNAPSHOT_EVERY: Final = 1000  # events
-_BATCH: Final = 200  # items of one commit
-_BATCH_BYTES: Final = 512 * 1024
-_MERGED: Final = 50  # updates merged at once; merging more costs their square
-_MERGED_BYTES: Final = 128 * 1024
 _CLOSING: Final = "This graph is being closed; try again."
-
-
-class Offer(msgspec.Struct, frozen=True):
-    """An edit on its way in: from a socket, or from the server itself (`done` is told)."""
-
-    update: bytes
-    author: str
-    member: Member | None = None
-    done: "asyncio.Future[int] | None" = None
-
-
-class Ask(msgspec.Struct, frozen=True):
-    """A socket wants what it lacks."""
-
-    member: Member
-    state: bytes
-
-
-class Compare(msgspec.Struct, frozen=True):
-    """A socket says what it shows, and wants to know whether that is right."""
-
-    member: Member
-    shown: wire.Comparison
-
-
-class Look(msgspec.Struct, frozen=True):
-    """Somebody wants to see the document at a moment when all of it is committed."""
-
-    see: Callable[[Replica, int], Any]
-    done: "asyncio.Future[Any]"
-
-
-Item: TypeAlias = Offer | Ask | Compare | Look
 
 
 class Room:
@@ -226,7 +197,7 @@ class Room:
             self._end(reason)
 
     async def _handle(self) -> None:
-        batch, self._waiting = _batch(self._waiting)
+        batch, self._waiting = batch_of(self._waiting)
         self._in_hand = batch
         taken = self._take(batch)
         if taken.news:
@@ -247,7 +218,7 @@ class Room:
         if not taken.news:
             await asyncio.sleep(0)  # nothing was awaited; others want a turn
 
-    def _take(self, batch: Sequence[Item]) -> "Taken":
+    def _take(self, batch: Sequence[Item]) -> Taken:
         """Apply a batch. After a panic the rest of it waits for a sound document."""
         taken = Taken()
         for n, item in enumerate(batch):
@@ -263,18 +234,18 @@ class Room:
             try:
                 brought = self._brought(item)
             except Malformed as error:
-                _refuse(item, wire.MALFORMED, BadInput(f"The update cannot be read: {error}."))
+                refuse(item, wire.MALFORMED, BadInput(f"The update cannot be read: {error}."))
                 continue
             except Foreign as error:
                 log.warning("%s: %s forged an edit: %s", self.stream, item.author, error)
-                _refuse(item, wire.FORBIDDEN, BadInput("The update speaks for somebody else."))
+                refuse(item, wire.FORBIDDEN, BadInput("The update speaks for somebody else."))
                 continue
             except TooMuchWaits:
-                _refuse(item, wire.TOO_BIG, TooLarge("Too much waits for what never came."))
+                refuse(item, wire.TOO_BIG, TooLarge("Too much waits for what never came."))
                 continue
             except Panicked:
                 log.warning("%s: refused an update that makes the library panic", self.stream)
-                _refuse(item, wire.MALFORMED, BadInput("The update cannot be read."))
+                refuse(item, wire.MALFORMED, BadInput("The update cannot be read."))
                 taken.panicked = True
                 self._waiting = [*batch[n + 1 :], *self._waiting]
                 break
@@ -297,16 +268,16 @@ class Room:
             return None
         if member is not None and not member.edits:
             if not self._replica.adds_nothing(offer.update):
-                _refuse(offer, wire.FORBIDDEN, BadInput("Not allowed."))
+                refuse(offer, wire.FORBIDDEN, BadInput("Not allowed."))
                 return None
             return Brought.NOTHING
         return self._replica.take(offer.update, offer.author, self.attendance.holder)
 
     # --- telling --------------------------------------------------------------------------------
 
-    def _tell(self, taken: "Taken") -> None:
+    def _tell(self, taken: Taken) -> None:
         """What is committed: to the others as news, to those who sent it as an acknowledgement."""
-        frames = [wire.change(update) for update in _merged(taken.shown)]
+        frames = [wire.change(update) for update in merged(taken.shown)]
         own = {offer.member for offer, _ in taken.news}
         for member in self.members:
             if member.synced and (taken.for_all or own != {member}):
@@ -390,48 +361,3 @@ class Room:
             member.close(wire.RESTARTING)
         self._replica.close()
         self._gone(self)
-
-
-class Taken:
-    """What became of a batch."""
-
-    def __init__(self) -> None:
-        self.news: list[tuple[Offer, str]] = []  # to be stored, as which kind
-        self.shown: list[bytes] = []  # what the others can make use of
-        self.for_all = False  # something that waited is among it
-        self.handled: list[Offer] = []
-        self.asks: list[Ask] = []
-        self.compares: list[Compare] = []
-        self.looks: list[Look] = []
-        self.panicked = False
-
-
-def _refuse(offer: Offer, code: int, reason: Refused) -> None:
-    if offer.member is not None:
-        offer.member.refuse(code)
-    if offer.done is not None and not offer.done.done():
-        offer.done.set_exception(reason)
-
-
-def _batch(items: list[Item]) -> tuple[list[Item], list[Item]]:
-    """What one commit takes, and the rest. Small enough for readers that keep up."""
-    size = count = 0
-    for item in items[:_BATCH]:
-        size += len(item.update) if isinstance(item, Offer) else 0
-        if count and size > _BATCH_BYTES:
-            break
-        count += 1
-    return items[:count], items[count:]
-
-
-def _merged(updates: list[bytes]) -> list[bytes]:
-    """The same changes in few updates; none so large that a client that echoes would be refused."""
-    groups: list[list[bytes]] = []
-    size = 0
-    for update in updates:
-        size += len(update)
-        if not groups or len(groups[-1]) >= _MERGED or size > _MERGED_BYTES:
-            groups.append([])
-            size = len(update)
-        groups[-1].append(update)
-    return [merge_updates(*group) if len(group) > 1 else group[0] for group in groups]

@@ -1,0 +1,96 @@
+"""What enters a room, and what became of a batch of it."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any, Final, TypeAlias
+
+import msgspec
+from pycrdt import merge_updates
+
+from action_assistant.editor import wire
+from action_assistant.editor.member import Member
+from action_assistant.editor.replica import Replica
+from action_assistant.errors import Refused
+
+_BATCH: Final = 200  # items of one commit
+_BATCH_BYTES: Final = 512 * 1024
+_MERGED: Final = 50  # updates merged at once; merging more costs their square
+_MERGED_BYTES: Final = 128 * 1024
+
+
+class Offer(msgspec.Struct, frozen=True):
+    """An edit on its way in: from a socket, or from the server itself (`done` is told)."""
+
+    update: bytes
+    author: str
+    member: Member | None = None
+    done: "asyncio.Future[int] | None" = None
+
+
+class Ask(msgspec.Struct, frozen=True):
+    """A socket wants what it lacks."""
+
+    member: Member
+    state: bytes
+
+
+class Compare(msgspec.Struct, frozen=True):
+    """A socket says what it shows, and wants to know whether that is right."""
+
+    member: Member
+    shown: wire.Comparison
+
+
+class Look(msgspec.Struct, frozen=True):
+    """Somebody wants to see the document at a moment when all of it is committed."""
+
+    see: Callable[[Replica, int], Any]
+    done: "asyncio.Future[Any]"
+
+
+Item: TypeAlias = Offer | Ask | Compare | Look
+
+
+class Taken:
+    """What became of a batch."""
+
+    def __init__(self) -> None:
+        self.news: list[tuple[Offer, str]] = []  # to be stored, as which kind
+        self.shown: list[bytes] = []  # what the others can make use of
+        self.for_all = False  # something that waited is among it
+        self.handled: list[Offer] = []
+        self.asks: list[Ask] = []
+        self.compares: list[Compare] = []
+        self.looks: list[Look] = []
+        self.panicked = False
+
+
+def refuse(offer: Offer, code: int, reason: Refused) -> None:
+    if offer.member is not None:
+        offer.member.refuse(code)
+    if offer.done is not None and not offer.done.done():
+        offer.done.set_exception(reason)
+
+
+def batch_of(items: list[Item]) -> tuple[list[Item], list[Item]]:
+    """What one commit takes, and the rest. Small enough for readers that keep up."""
+    size = count = 0
+    for item in items[:_BATCH]:
+        size += len(item.update) if isinstance(item, Offer) else 0
+        if count and size > _BATCH_BYTES:
+            break
+        count += 1
+    return items[:count], items[count:]
+
+
+def merged(updates: list[bytes]) -> list[bytes]:
+    """The same changes in few updates; none so large that a client that echoes would be refused."""
+    groups: list[list[bytes]] = []
+    size = 0
+    for update in updates:
+        size += len(update)
+        if not groups or len(groups[-1]) >= _MERGED or size > _MERGED_BYTES:
+            groups.append([])
+            size = len(update)
+        groups[-1].append(update)
+    return [merge_updates(*group) if len(group) > 1 else group[0] for group in groups]
