@@ -10,7 +10,8 @@ from action_assistant.journal.tables import robot, run
 from action_assistant.runner import archive, shapes
 from action_assistant.runner.app import wall_clock
 from action_assistant.runner.control import Control
-from action_assistant.runner.robots import Registration, Robots
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.robots import Robots
 from runner.world import ANN, BEN, order, sequence, until
 
 

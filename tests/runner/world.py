@@ -24,7 +24,15 @@ from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.events import Author, RunEvent, decode
-from action_assistant.runner.links.port import Answer, EngineRefused, Link, NoAnswer, Order, Report
+from action_assistant.runner.links.port import (
+    Answer,
+    EngineRefused,
+    Link,
+    NoAnswer,
+    Order,
+    Report,
+    Standing,
+)
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run, replay
@@ -229,6 +237,15 @@ class Robot:
     async def pause(self, graph_name: str) -> None:
         """Arrives."""
         await self.engine.pause(graph_name)
+
+    @property
+    def standing(self) -> Standing:
+        """The engine's."""
+        return self.engine.standing
+
+    async def modify(self, order: Order, continue_from: str = "") -> None:
+        """Obeys."""
+        await self.engine.modify(order, continue_from)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
         """Arrives."""

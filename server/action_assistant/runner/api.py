@@ -20,8 +20,9 @@ from action_assistant.runner.admission import read_request
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import StartOperation, StopOperation
 from action_assistant.runner.events import Author
+from action_assistant.runner.links.port import Registration
 from action_assistant.runner.live import Hub, Stopping, attend
-from action_assistant.runner.robots import Registration, Robot
+from action_assistant.runner.robots import Robot
 from action_assistant.runner.runs import State
 from action_assistant.web.access import person_of
 

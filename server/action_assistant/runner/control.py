@@ -22,14 +22,13 @@ from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.events import Author, Ended, Requested, encode
 from action_assistant.runner.history import Aside, History, Ledger
 from action_assistant.runner.links.absent import AbsentLink
-from action_assistant.runner.links.port import Link, NoAnswer, NotSent, Order
+from action_assistant.runner.links.port import Link, NoAnswer, NotSent, Order, Registration
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.robots import (
     SIMULATOR,
     STREAM,
     Registered,
-    Registration,
     Robot,
     Robots,
     check_registration,

@@ -2,12 +2,12 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Annotated, ClassVar, Final, Literal, TypeAlias
+from typing import ClassVar, Final, Literal, TypeAlias
 
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict
-from action_assistant.runner.links.port import EngineState, Link
+from action_assistant.runner.links.port import EngineState, Link, Registration
 
 SIMULATOR: Final = "simulator"
 REGISTERED: Final = "robot.registered.v1"
@@ -22,16 +22,6 @@ _NO_LINK: Final = (
 )
 
 RobotState: TypeAlias = EngineState | Literal["no_link"]
-
-
-class Registration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How to reach a robot. `name` is the wake word that its engine answers to."""
-
-    name: str
-    domain: Annotated[int, msgspec.Meta(ge=0, le=232)] = 0
-    rmw: str = ""
-    get_service: str = "umrf_graph_get"
-    profile: dict[str, object] = {}
 
 
 class Registered(msgspec.Struct, frozen=True, kw_only=True):

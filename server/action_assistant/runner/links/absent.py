@@ -6,7 +6,7 @@ from typing import Final
 
 import anyio
 
-from action_assistant.runner.links.port import Answer, NoAnswer, NotSent, Order, Report
+from action_assistant.runner.links.port import Answer, NoAnswer, NotSent, Order, Report, Standing
 
 
 class AbsentLink:
@@ -17,6 +17,11 @@ class AbsentLink:
 
     def __init__(self, why: str) -> None:
         self._why = why
+
+    @property
+    def standing(self) -> Standing:
+        """Gone, for all anybody knows."""
+        return Standing(state="gone", why=self._why)
 
     async def start(self, order: Order) -> None:
         """Refuses."""
@@ -31,6 +36,10 @@ class AbsentLink:
         raise NotSent(self._why)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
+        """Refuses."""
+        raise NotSent(self._why)
+
+    async def modify(self, order: Order, continue_from: str = "") -> None:
         """Refuses."""
         raise NotSent(self._why)
 

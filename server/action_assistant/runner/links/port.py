@@ -1,5 +1,7 @@
 """The port between the runner and an engine: commands without answers, one question, reports.
 
+`Link` is one engine, `Reach` is how links to robots come to be.
+
 A command's return says that the message has left, never that it was obeyed. Only `get` is answered.
 Whoever implements this keeps messages on one topic apart as the engine needs (the runner may call
 `stop` for several graphs at once) and never repeats a start.
@@ -7,14 +9,18 @@ Whoever implements this keeps messages on one topic apart as the engine needs (t
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Literal, Protocol, TypeAlias
+from typing import Annotated, Literal, Protocol, TypeAlias
 
 import msgspec
 
 from action_assistant.runner.seen import Exact, Snapshot
+from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph
 
 EngineState: TypeAlias = Literal["answering", "busy", "gone", "restarted"]
+Command: TypeAlias = Literal["start", "stop", "pause", "resume", "modify"]
+#: Which `temoto_msgs` the peer speaks. Only `current` ones can be talked to.
+Generation: TypeAlias = Literal["current", "older", "unknown"]
 
 
 class NotSent(Exception):
@@ -42,12 +48,35 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
     """What an engine answered to one get: every graph it holds, ended ones too.
 
     `asked_at` and `at` are microseconds UTC; `incarnation` changes when the engine is restarted.
+    `texts` are those graphs as the engine wrote them, by running name. `known_actions` and
+    `known_graphs` are the UMRF texts of its index, as it wrote them.
     """
 
     asked_at: int
     at: int
     incarnation: str
     graphs: tuple[Snapshot, ...]
+    texts: dict[str, str] = {}
+    known_actions: tuple[str, ...] = ()
+    known_graphs: tuple[str, ...] = ()
+
+
+class Standing(msgspec.Struct, frozen=True, kw_only=True):
+    """What is known of an engine at this moment without asking it.
+
+    `servers`: how many answer on the path of its get; only one of them makes answers a proof.
+    `listeners`: matched subscriptions by command (`start`, `stop` …). `others`: publishers of starts
+    that are not ours. `actor`: what its feedback calls itself, "" until it said something.
+    """
+
+    state: EngineState
+    why: str = ""
+    incarnation: str = ""
+    generation: Generation = "unknown"
+    servers: int = 0
+    listeners: dict[str, int] = {}
+    others: int = 0
+    actor: str = ""
 
 
 class Transitions(msgspec.Struct, frozen=True, kw_only=True):
@@ -82,12 +111,14 @@ class EngineChanged(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ForeignCommand(msgspec.Struct, frozen=True, kw_only=True):
-    """Somebody else published a command to this engine."""
+    """Somebody else published a command to this engine. `sender` tells publishers apart."""
 
     at: int
-    command: Literal["start", "stop", "pause", "resume", "modify"]
+    command: Command
     graph: str
     umrf: str = ""
+    targets: tuple[str, ...] = ()
+    sender: str = ""
 
 
 Report: TypeAlias = Transitions | Feedback | EngineLog | EngineChanged | ForeignCommand
@@ -106,6 +137,11 @@ class Link(Protocol):
         """Whether pausing is safe on this engine."""
         ...
 
+    @property
+    def standing(self) -> Standing:
+        """What is known of the engine now; every change of its state is also reported."""
+        ...
+
     async def start(self, order: Order) -> None:
         """Publish one start message. Raises NotSent, EngineRefused."""
         ...
@@ -120,6 +156,11 @@ class Link(Protocol):
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
         """Publish one resume message. Raises NotSent."""
+        ...
+
+    async def modify(self, order: Order, continue_from: str = "") -> None:
+        """Publish one modify message: the order's graph takes the place of the one of its name.
+        Raises NotSent, EngineRefused."""
         ...
 
     async def get(self) -> Answer:
@@ -137,4 +178,51 @@ class Link(Protocol):
 
     async def aclose(self) -> None:
         """Let go of the engine. A real one goes on; a simulated one ends."""
+        ...
+
+
+class Registration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How to reach a robot. `name` is the wake word that its engine answers to; without `rmw` the
+    middleware of this process is meant."""
+
+    name: str
+    domain: Annotated[int, msgspec.Meta(ge=0, le=232)] = 0
+    rmw: str = ""
+    get_service: str = "umrf_graph_get"
+    profile: dict[str, object] = {}
+
+
+class Candidate(msgspec.Struct, frozen=True, kw_only=True):
+    """An engine that discovery shows. An idle one does not say its name: `actor` is "" until its
+    feedback was heard, and a person has to know the name."""
+
+    domain: int
+    rmw: str
+    get_service: str
+    servers: int = 1
+    actor: str = ""
+    generation: Generation = "unknown"
+    problem: str = ""
+
+
+class Reach(Protocol):
+    """What makes links to robots. One per process; owns what the links share."""
+
+    @property
+    def rmw(self) -> str:
+        """The middleware of this process; robots on another one are out of reach."""
+        ...
+
+    def link(self, registration: Registration, facts: EngineFacts) -> Link:
+        """A link to a robot. Never waits and never fails: a robot that cannot be reached has a link
+        that says why. The link hears and answers only while its `run` is kept going."""
+        ...
+
+    async def candidates(self) -> tuple[Candidate, ...]:
+        """Engines that can be seen now: on the domain of this process's environment and on those
+        of links. Takes up to a second."""
+        ...
+
+    async def aclose(self) -> None:
+        """Let go of everything. Links are closed before."""
         ...

@@ -20,6 +20,7 @@ from action_assistant.runner.links.port import (
     NoAnswer,
     Order,
     Report,
+    Standing,
     Transitions,
 )
 from action_assistant.runner.seen import (
@@ -54,6 +55,15 @@ class SimulatorLink:
         self._wake = anyio.Event()
         self._dead: str | None = None
 
+    @property
+    def standing(self) -> Standing:
+        """Answering until it has crashed or hangs."""
+        if self._dead is not None:
+            return Standing(state="gone", why=self._dead, incarnation=self._incarnation)
+        return Standing(
+            state="answering", incarnation=self._incarnation, generation="current", servers=1
+        )
+
     async def start(self, order: Order) -> None:
         """Start at this moment. Raises EngineRefused."""
         self._alive()
@@ -78,6 +88,15 @@ class SimulatorLink:
         """Resume at this moment."""
         if self._dead is None:
             self._tell(self._engine.resume(graph_name, self._now(), continue_from=continue_from))
+
+    async def modify(self, order: Order, continue_from: str = "") -> None:
+        """Change the graph at this moment. Raises EngineRefused."""
+        self._alive()
+        try:
+            self._tell(self._engine.modify(order.graph, self._now(), continue_from=continue_from))
+        except semantics.EngineRefused as refused:
+            self._wake.set()
+            raise EngineRefused(str(refused)) from refused
 
     async def get(self) -> Answer:
         """What the engine holds right now."""
