@@ -14,6 +14,7 @@ from action_assistant.editor.catalogue import GraphView, Preview, Reading
 from action_assistant.editor.diff import Difference, difference
 from action_assistant.editor.history import Entry
 from action_assistant.editor.house import Door
+from action_assistant.editor.rewriting import Rewriting, rewriting
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Problem
 from action_assistant.web.access import person_of
@@ -142,7 +143,19 @@ def _contents(door: Door) -> list[ControllerRouterHandler]:
         moment = await house.sights.moment(graph_id, seq)
         return Problems(moment.seq, tuple(house.sights.problems(graph_id, moment)))
 
-    return [get_umrf, get_problems]
+    @post(
+        "/api/graphs/{graph_id:str}/rewriting",
+        status_code=200,
+        summary="What an edited text of a graph would change, key by key; stores nothing",
+        operation_id="getRewriting",
+    )
+    async def get_rewriting(graph_id: str, seq: Seq, request: Asking) -> Rewriting:
+        house = door.house
+        await house.catalogue.require(graph_id)
+        then = await house.sights.at(graph_id, seq)
+        return await asyncio.to_thread(rewriting, then, await request.body())
+
+    return [get_umrf, get_problems, get_rewriting]
 
 
 def _past(door: Door) -> list[ControllerRouterHandler]:
