@@ -59,7 +59,7 @@ export function addAction(doc: Y.Doc, action: NewAction): Key {
 }
 
 /** The lowest number that no real action of that name has. */
-function freeNumber(actions: readonly Action[], name: string, except?: Key): number {
+export function freeNumber(actions: readonly Action[], name: string, except?: Key): number {
   const taken = new Set(
     actions
       .filter((action) => action.name === name && !action.missing && action.key !== except)

@@ -12,7 +12,7 @@ from litestar.types import ASGIApp
 
 from action_assistant import places
 from action_assistant.editor import happenings as h
-from action_assistant.editor.api import about, graphs, room, versions
+from action_assistant.editor.api import about, drawing, graphs, room, versions
 from action_assistant.editor.house import Door, House
 from action_assistant.editor.people import People
 from action_assistant.errors import BadInput
@@ -64,6 +64,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
             *about.routes(door),
             *graphs.routes(door),
             *versions.routes(door),
+            *drawing.routes(door),
             *room.routes(door),
         ],
         title="TeMoto Action Assistant: editor",

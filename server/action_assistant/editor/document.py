@@ -62,7 +62,7 @@ def maps_of(doc: Doc) -> Maps:  # type: ignore[type-arg]
 def fill(doc: Doc, graph: Graph) -> None:  # type: ignore[type-arg]
     """Writes a graph into an empty document. Keys that are no aids are replaced by fresh ones."""
     with doc.transaction():
-        for root, fields in flatten(_with_aids(graph)).items():
+        for root, fields in flatten(with_aids(graph)).items():
             _root(doc, cast(Root, root)).update(fields)
 
 
@@ -166,7 +166,7 @@ def _place(positions: dict[str, object], key: Key, position: Position | None) ->
         positions[key] = [float(position[0]), float(position[1])]
 
 
-def _with_aids(graph: Graph) -> Graph:
+def with_aids(graph: Graph) -> Graph:
     """The graph with a fresh aid for every key that is none, or that stands twice."""
     seen: set[Key] = set()
     actions: list[Action] = []

@@ -1,0 +1,93 @@
+"""Rehearsals: what a graph would do, played by the engine's rules, and recorded nowhere."""
+
+import asyncio
+from typing import Any, Final, Literal
+
+import msgspec
+
+from action_assistant.errors import BadInput, TooMany
+from action_assistant.umrf import semantics
+from action_assistant.umrf.model import Graph
+
+EVENTS: Final = 4_000  # of one rehearsal; the page shows no more
+HOUR_MS: Final = 3_600_000.0
+_AT_ONCE: Final = 2  # each holds the interpreter for some milliseconds at a time
+_WAITING: Final = 16
+_SCRIPT_LIMIT: Final = 500  # behaviours
+
+
+class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a person does to the graph, and when."""
+
+    at_ms: float
+    verb: Literal["stop", "pause", "resume"]
+
+
+class Rehearsing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What to play: the graph after its change `seq` (left out: now), what its actions do as in
+    a script of `simulate`, and what people do meanwhile."""
+
+    seq: int | None = None
+    script: Any = None
+    commands: tuple[Command, ...] = ()
+    for_ms: float = HOUR_MS
+
+
+class Rehearsal(msgspec.Struct, frozen=True):
+    """Everything that would happen, in order. `cut`: there is more than is told."""
+
+    seq: int
+    trace: tuple[semantics.Trace, ...]
+    cut: bool
+
+
+class Stage:
+    """Plays graphs beside the event loop, a few at a time."""
+
+    def __init__(self) -> None:
+        self._turns = asyncio.Semaphore(_AT_ONCE)
+        self._waiting = 0
+
+    async def play(self, seq: int, graph: Graph, wanted: Rehearsing) -> Rehearsal:
+        """Play a graph to its end, or as far as limits let it. Raises BadInput, TooMany."""
+        script = _script(wanted.script)
+        if not 0 < wanted.for_ms <= 24 * HOUR_MS:
+            raise BadInput("A rehearsal lasts up to a day.", where={"path": "/for_ms"})
+        if len(wanted.commands) > 100:
+            raise BadInput("A rehearsal takes up to 100 commands.", where={"path": "/commands"})
+        if self._waiting >= _WAITING:
+            raise TooMany("Too many rehearsals wait already; try again in a moment.")
+        self._waiting += 1
+        try:
+            async with self._turns:
+                return await asyncio.to_thread(_played, seq, graph, script, wanted)
+        finally:
+            self._waiting -= 1
+
+
+def _script(value: Any) -> semantics.Script:
+    if value is None:
+        return semantics.Script({})
+    try:
+        script = semantics.script_from(value)
+    except ValueError as error:
+        raise BadInput(str(error), where={"path": "/script"}) from error
+    if sum(len(calls) for calls in script.behaviours.values()) > _SCRIPT_LIMIT:
+        raise BadInput(
+            f"A script for a rehearsal has up to {_SCRIPT_LIMIT} behaviours.",
+            where={"path": "/script"},
+        )
+    return script
+
+
+def _played(seq: int, graph: Graph, script: semantics.Script, wanted: Rehearsing) -> Rehearsal:
+    trace = tuple(
+        semantics.simulate(
+            graph,
+            script=script,
+            commands=[(command.at_ms, command.verb, None) for command in wanted.commands],
+            until_ms=wanted.for_ms,
+            max_events=EVENTS + 1,
+        )
+    )
+    return Rehearsal(seq, trace[:EVENTS], len(trace) > EVENTS)
