@@ -11,6 +11,7 @@ export PYTHONNOUSERSITE := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 BIN := .venv/bin
+ROS := .venv-ros/bin
 NODE := scripts/with-node
 NPM := $(NODE) npm --prefix frontend
 PAGE_SOURCES := $(shell find frontend/src frontend/public frontend/index.html frontend/vite.config.ts frontend/tsconfig.json -type f 2>/dev/null)
@@ -21,6 +22,9 @@ help: ## this list
 
 .PHONY: setup
 setup: .venv/.done frontend/dist/index.html ## everything that running and testing needs
+
+.PHONY: ros
+ros: .venv-ros/.done ## what reaching robots over ROS 2 needs, on a machine without ROS: .venv-ros
 
 .PHONY: run
 run: setup ## start the editor and the runner, and open the page (ARGS="--port 9000 --no-open")
@@ -54,6 +58,11 @@ unit: setup ## the tests of the server and of the page's pure parts
 	@$(BIN)/pytest -q $(PYTEST)
 	@echo "» vitest"
 	@$(NPM) run --silent test
+
+.PHONY: ros-test
+ros-test: ros ## tests over real rclpy, on loopback
+	@echo "» pytest over rclpy"
+	@$(ROS)/python -m pytest -q tests/ros $(PYTEST)
 
 .PHONY: e2e
 e2e: setup ## tests in Chromium against the real processes
@@ -94,6 +103,9 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@$(BIN)/pip install --quiet uv
 	@$(BIN)/uv pip compile --quiet --generate-hashes --universal --python-version 3.11 --no-header \
 		--no-annotate --upgrade pyproject.toml requirements/dev.in --output-file requirements/dev.txt
+	@$(BIN)/uv pip compile --quiet --generate-hashes --universal --python-version 3.11 --no-header \
+		--no-annotate --upgrade --extra ros pyproject.toml requirements/ros.in \
+		--output-file requirements/ros.txt
 
 .venv/.done: requirements/dev.txt pyproject.toml scripts/need
 	@scripts/need python3=python3 || exit 1
@@ -104,6 +116,17 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@test -x $(BIN)/python || python3 -m venv .venv
 	@$(BIN)/pip install --quiet --require-hashes --requirement requirements/dev.txt
 	@$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# The wheels of rclpy start every interpreter of their environment anew, so they have one of their own.
+.venv-ros/.done: requirements/ros.txt pyproject.toml scripts/build-messages $(wildcard ros/temoto_msgs/* ros/temoto_msgs/*/*)
+	@scripts/need cmake=cmake ninja=ninja-build g++=g++ || exit 1
+	@echo "» rclpy and Python packages into .venv-ros"
+	@test -x $(ROS)/python || python3 -m venv .venv-ros
+	@$(ROS)/python -m pip install --quiet --require-hashes --requirement requirements/ros.txt
+	@$(ROS)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@echo "» messages of TeMoto into .venv-ros"
+	@scripts/build-messages .venv-ros ros/temoto_msgs
 	@touch $@
 
 frontend/node_modules/.done: frontend/package-lock.json scripts/with-node
