@@ -17,11 +17,12 @@ from litestar.params import JSONBody
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from action_assistant.web.access import person_of
+from action_assistant.web.access import Needs, person_of
 from action_assistant.web.addresses import Addresses
 from action_assistant.web.asgi import application
 from action_assistant.web.keys import Keys, Person, Session
 from action_assistant.web.listen import bound
+from action_assistant.web.roles import Role
 from action_assistant.web.sessions import session_routes
 
 KEYS = Keys("k" * 43)
@@ -34,16 +35,22 @@ async def me(request: Request[Any, Any, Any]) -> str:
     return person_of(request).name
 
 
-@post("/api/stop", status_code=200)
+@post("/api/stop", status_code=200, guards=[Needs("stop")])
 async def stop() -> str:
     """Something that an expired session may do."""
     return "stopping"
 
 
-@post("/api/runs", status_code=200)
+@post("/api/runs", status_code=200, guards=[Needs("simulate")])
 async def start(data: JSONBody[dict[str, int]]) -> str:
     """Something that an expired session may not do."""
     return f"starting {data['n']}"
+
+
+@post("/api/novelty", status_code=200)
+async def novelty() -> str:
+    """Something that nobody decided about."""
+    return "done"
 
 
 @get("/api/broken")
@@ -68,7 +75,7 @@ def served(folder: Path) -> Iterator[int]:
         other.close()
     port: int = listener.getsockname()[1]
     app = application(
-        [me, stop, start, broken, live, *session_routes(KEYS, port)],
+        [me, stop, start, novelty, broken, live, *session_routes(KEYS, port)],
         title="test",
         keys=KEYS,
         addresses=Addresses(host="127.0.0.1", page_port=port),
@@ -108,9 +115,9 @@ def client(port: int) -> Iterator[httpx.Client]:
         yield http
 
 
-def cookie(port: int, *, expires: float) -> dict[str, str]:
+def cookie(port: int, *, expires: float, role: Role = "owner") -> dict[str, str]:
     """The header of a browser that signed in."""
-    session = Session("s", Person("p", "Ada"), expires)
+    session = Session("s", Person("p", "Ada", role), expires)
     return {"cookie": f"aa_{port}={KEYS.sealed(session)}"}
 
 
@@ -167,7 +174,8 @@ def test_a_browser_trades_the_token_for_a_cookie_and_gives_a_name(
     client.post(
         "/api/session", json={"name": " Ada  K "}, headers={"origin": f"http://127.0.0.1:{port}"}
     )
-    assert client.get("/api/session").json()["person"] == {"id": first["id"], "name": "Ada K"}
+    ada = {"id": first["id"], "name": "Ada K", "role": "owner"}
+    assert client.get("/api/session").json()["person"] == ada
     assert client.get("/api/me").text == "Ada K"
 
 
@@ -189,6 +197,13 @@ def test_a_cookie_without_an_origin_changes_nothing(client: httpx.Client, port: 
     assert client.post("/api/runs", json={"n": 1}, headers=headers).status_code == 403
     own = {**headers, "origin": f"http://127.0.0.1:{port}"}
     assert client.post("/api/runs", json={"n": 1}, headers=own).text == "starting 1"
+
+
+def test_what_nobody_decided_about_is_for_owners(client: httpx.Client, port: int) -> None:
+    origin = {"origin": f"http://127.0.0.1:{port}"}
+    for role, status in (("owner", 200), ("operator", 403), ("viewer", 403)):
+        headers = {**cookie(port, expires=1e12, role=role), **origin}
+        assert client.post("/api/novelty", headers=headers).status_code == status
 
 
 def test_an_expired_session_may_still_stop_and_nothing_else(
@@ -306,7 +321,7 @@ def test_who_signs_in_again_after_the_session_expired_is_the_same_person(
 ) -> None:
     headers = {**cookie(port, expires=time.time() - 60), "origin": f"http://localhost:{port}"}
     answer = client.post("/api/session", json={"token": KEYS.token}, headers=headers)
-    assert answer.json()["person"] == {"id": "p", "name": "Ada"}
+    assert answer.json()["person"] == {"id": "p", "name": "Ada", "role": "owner"}
     forged = {**headers, "cookie": headers["cookie"][:-2] + "xx"}
     stranger = client.post("/api/session", json={"token": KEYS.token}, headers=forged)
     assert stranger.json()["person"]["id"] != "p"

@@ -1,10 +1,12 @@
 """Tokens and sealed sessions."""
 
+import base64
 import stat
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from hypothesis import given
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 
 from action_assistant.errors import CannotStart
 from action_assistant.web.keys import Keys, Person, Session
+from action_assistant.web.roles import Role
 
 KEYS = Keys("k" * 43)
 
@@ -42,6 +45,21 @@ def test_a_cookie_with_one_character_changed_is_no_session(data: st.DataObject) 
 
 def test_a_session_of_another_server_is_no_session() -> None:
     assert Keys("o" * 43).session(KEYS.sealed(KEYS.new_session("Ada"))) is None
+
+
+@given(st.sampled_from(get_args(Role)), st.none() | st.text(max_size=20))
+def test_role_and_invitation_are_sealed_with_the_session(
+    role: Role, invitation: str | None
+) -> None:
+    session = KEYS.new_session("Ada", role=role, invitation=invitation)
+    assert KEYS.session(KEYS.sealed(session)) == session
+
+
+def test_a_cookie_of_before_there_were_roles_is_an_owners() -> None:
+    payload = base64.urlsafe_b64encode(b'["s","p","Ada",1e12]').rstrip(b"=").decode()
+    signature = base64.urlsafe_b64encode(KEYS._sign(payload)).rstrip(b"=").decode()
+    session = KEYS.session(f"{payload}.{signature}")
+    assert session == Session("s", Person("p", "Ada", "owner"), 1e12)
 
 
 def test_an_expired_session_is_genuine_and_says_so() -> None:

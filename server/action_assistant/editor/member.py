@@ -9,7 +9,7 @@ from typing import Final
 from action_assistant.editor import wire
 from action_assistant.editor.presence import Seat
 from action_assistant.editor.wire import Entry
-from action_assistant.web.keys import Person
+from action_assistant.web.keys import Author
 
 WAITING_FRAMES: Final = 256
 WAITING_BYTES: Final = 1 << 20
@@ -28,7 +28,7 @@ class _Answer(Enum):
 class Member:
     """Someone's socket. The room posts; whoever owns the socket takes and sends."""
 
-    def __init__(self, person: Person, *, edits: bool = True, acks: bool = False) -> None:
+    def __init__(self, person: Author, *, edits: bool = True, acks: bool = False) -> None:
         self.person: Final = person
         self.seat: Final = Seat(person)
         self.edits = edits

@@ -5,7 +5,7 @@ from sqlalchemy import select
 from action_assistant.editor.happenings import EXAMPLES, NAMED, PEOPLE, SERVER, Named, draft
 from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
-from action_assistant.web.keys import Person
+from action_assistant.web.keys import Author
 
 _OURS = {SERVER: "Action Assistant", EXAMPLES: "Examples"}
 
@@ -23,17 +23,17 @@ class People:
         rows = await journal.query(select(tables.person.c.id, tables.person.c.name))
         return cls(journal, {row.id: row.name for row in rows})
 
-    async def seen(self, person: Person) -> None:
+    async def seen(self, person: Author) -> None:
         """Somebody acts: remember the name, if it is new."""
         if self._names.get(person.id) == person.name:
             return
         self._names[person.id] = person.name
         await self._journal.append(PEOPLE, [draft(NAMED, person.id, Named(person.name))])
 
-    def person(self, author: str) -> Person:
+    def person(self, author: str) -> Author:
         """Who the author of an event is."""
-        return Person(author, self._names.get(author) or _OURS.get(author, ""))
+        return Author(author, self._names.get(author) or _OURS.get(author, ""))
 
-    def everyone(self) -> list[Person]:
+    def everyone(self) -> list[Author]:
         """All of them, by name."""
-        return sorted((Person(*item) for item in self._names.items()), key=lambda p: p.name)
+        return sorted((Author(*item) for item in self._names.items()), key=lambda p: p.name)

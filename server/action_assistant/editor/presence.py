@@ -6,7 +6,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.editor.wire import Entry
-from action_assistant.web.keys import Person
+from action_assistant.web.keys import Author
 
 STATE_LIMIT: Final = 32_768  # bytes of one client's entry
 _GONE: Final = b"null"
@@ -31,7 +31,7 @@ def colour_of(person_id: str) -> str:
     return _COLOURS[hashlib.sha256(person_id.encode()).digest()[0] % len(_COLOURS)]
 
 
-def stamp_of(person: Person) -> bytes:
+def stamp_of(person: Author) -> bytes:
     """The stamp as JSON."""
     return msgspec.json.encode(Stamp(person.id, person.name, colour_of(person.id)))
 
@@ -39,7 +39,7 @@ def stamp_of(person: Person) -> bytes:
 class Seat:
     """The one client id that a socket speaks for."""
 
-    def __init__(self, person: Person) -> None:
+    def __init__(self, person: Author) -> None:
         self.person: Final = person
         self.client: int | None = None
         self._stamp: Final = msgspec.Raw(stamp_of(person))

@@ -14,7 +14,7 @@ from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
-from action_assistant.web.keys import Person
+from action_assistant.web.keys import Author
 
 LABEL_LIMIT: Final = 200  # characters
 
@@ -27,7 +27,7 @@ class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
     label: str
     digest: str
     seq: int
-    author: Person
+    author: Author
     at: datetime
     umrf: Any = None
 
@@ -40,7 +40,7 @@ class Versions:
         self._sights = sights
 
     async def publish(
-        self, graph: str, author: Person, *, label: str = "", seq: int | None = None
+        self, graph: str, author: Author, *, label: str = "", seq: int | None = None
     ) -> tuple[VersionView, bool]:
         """The version of a graph at `seq`, or as it is, and whether it is new.
 
@@ -103,6 +103,6 @@ def _view(row: Row[Any]) -> VersionView:
         label=row.label,
         digest=row.digest,
         seq=row.seq,
-        author=Person(row.author_id, row.author_name),
+        author=Author(row.author_id, row.author_name),
         at=h.when(row.at),
     )

@@ -22,9 +22,9 @@ from action_assistant.runner.described import StartOperation, StopOperation
 from action_assistant.runner.events import Author
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.live import Hub, Stopping, attend
-from action_assistant.runner.robots import Robot
+from action_assistant.runner.robots import SIMULATOR, Robot
 from action_assistant.runner.runs import State
-from action_assistant.web.access import person_of
+from action_assistant.web.access import Needs, person_of, require
 
 _PAGE: Final = 500  # events read at once
 _ALIVE_S: Final = 15.0  # between two signs of life of an event stream
@@ -65,9 +65,12 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
         "/api/runs",
         summary="Start a version, at most once per request_id",
         operation_class=StartOperation,
+        guards=[Needs("simulate")],
     )
     async def start(request: _Asking) -> Response[shapes.RunShown]:
         asked = read_request(await request.body())
+        if asked.engine != SIMULATOR:
+            require(request, "operate")
         started = await house.control.start(asked, _author(request))
         return Response(
             _shown(house, started.run.id) or shapes.shown(started.run),
@@ -79,7 +82,13 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
 
 
 def _moves(house: House) -> list[ControllerRouterHandler]:
-    @post("/api/stop", status_code=202, summary="Stop everything", operation_class=StopOperation)
+    @post(
+        "/api/stop",
+        status_code=202,
+        summary="Stop everything",
+        operation_class=StopOperation,
+        guards=[Needs("stop")],
+    )
     async def stop_all(request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
         return Stopping(stop_id, house.control.stop_all(_author(request), stop_id))
@@ -89,21 +98,40 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
         status_code=202,
         summary="Stop a run",
         operation_class=StopOperation,
+        guards=[Needs("stop")],
     )
     async def stop(run: str, request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
         return Stopping(stop_id, await house.control.stop(run, _author(request), stop_id))
 
-    @post("/api/runs/{run:str}/pause", status_code=202, summary="Pause a run")
+    @post(
+        "/api/runs/{run:str}/pause",
+        status_code=202,
+        summary="Pause a run",
+        guards=[Needs("simulate")],
+    )
     async def pause(run: str, request: _Asking) -> shapes.RunShown:
+        await _require_hand_on(house, run, request)
         return shapes.shown(await house.control.pause(run, _author(request)))
 
-    @post("/api/runs/{run:str}/resume", status_code=202, summary="Let a paused run go on")
+    @post(
+        "/api/runs/{run:str}/resume",
+        status_code=202,
+        summary="Let a paused run go on",
+        guards=[Needs("simulate")],
+    )
     async def resume(run: str, request: _Asking) -> shapes.RunShown:
+        await _require_hand_on(house, run, request)
         return shapes.shown(await house.control.resume(run, _author(request)))
 
-    @post("/api/runs/{run:str}/modify", status_code=202, summary="Change a running graph")
-    async def modify(run: str) -> shapes.RunShown:
+    @post(
+        "/api/runs/{run:str}/modify",
+        status_code=202,
+        summary="Change a running graph",
+        guards=[Needs("simulate")],
+    )
+    async def modify(run: str, request: _Asking) -> shapes.RunShown:
+        await _require_hand_on(house, run, request)
         return shapes.shown(await house.control.modify(run))
 
     return [stop_all, stop, pause, resume, modify]
@@ -152,7 +180,7 @@ def _robots(house: House) -> list[ControllerRouterHandler]:
     async def robots() -> list[Robot]:
         return list(house.control.robots.all())
 
-    @post("/api/robots", summary="Register a robot")
+    @post("/api/robots", summary="Register a robot", guards=[Needs("register")])
     async def register(data: Registration, request: _Asking) -> Response[Robot]:
         robot = await house.control.register(data, _author(request))
         return Response(robot, status_code=201, headers={"location": f"/api/robots/{robot.name}"})
@@ -173,6 +201,12 @@ def _live(house: House) -> ControllerRouterHandler:
         await attend(socket, house.hub)
 
     return live
+
+
+async def _require_hand_on(house: House, run: str, request: _Asking) -> None:
+    """Who may steer this run: more is needed for one on a robot. Raises Forbidden, NotFound."""
+    if not (await house.control.find(run)).simulated:
+        require(request, "operate")
 
 
 def _author(request: _Asking) -> Author:

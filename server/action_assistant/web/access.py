@@ -9,12 +9,14 @@ from typing import Any, Final
 
 from litestar.connection import ASGIConnection
 from litestar.enums import ScopeType
+from litestar.handlers.base import BaseRouteHandler
 from litestar.types import ASGIApp, HTTPScope, Message, Receive, Scope, Send, WebSocketScope
 
-from action_assistant.errors import Refused, Unauthenticated, WrongHost, WrongOrigin
+from action_assistant.errors import Forbidden, Refused, Unauthenticated, WrongHost, WrongOrigin
 from action_assistant.web.addresses import Addresses
 from action_assistant.web.keys import Keys, Person, Session
 from action_assistant.web.problems import problem_of
+from action_assistant.web.roles import OWNER, Deed, allowed, may
 
 log: Final = logging.getLogger(__name__)
 
@@ -44,6 +46,24 @@ def session_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None
     """The browser's session; None for programs with a token."""
     session: Session | None = connection.scope["state"].get("session")
     return session
+
+
+def require(connection: ASGIConnection[Any, Any, Any, Any], deed: Deed) -> None:
+    """Refuse whoever's role does not allow this. Raises Forbidden."""
+    role = person_of(connection).role
+    if not allowed(role, deed):
+        raise Forbidden(f"You are here as {role}: you may {may(role)}.")
+
+
+class Needs:
+    """For `guards=[…]` of a route: who may not is refused before the request is looked at."""
+
+    def __init__(self, deed: Deed) -> None:
+        self.deed: Final = deed
+
+    def __call__(self, connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler) -> None:
+        """Raises Forbidden."""
+        require(connection, self.deed)
 
 
 def known_person(connection: ASGIConnection[Any, Any, Any, Any]) -> Person | None:
@@ -76,7 +96,7 @@ class Access:
         self._cookie = cookie_name(page_port)
         self._is_open = is_open
         self._policy = policy
-        self._local = Person("local", _user_name())
+        self._local = Person("local", _user_name(), OWNER)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse, or pass on with `state.person` set."""

@@ -1,29 +1,35 @@
 """How either process becomes an HTTP application: Litestar inside, the door around it."""
 
 import logging
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 from litestar import Litestar, MediaType, Request, Response, get
+from litestar.connection import ASGIConnection
+from litestar.handlers.base import BaseRouteHandler
 from litestar.openapi import OpenAPIConfig
 from litestar.openapi.plugins import JsonRenderPlugin
 from litestar.openapi.spec import Components, SecurityScheme
+from litestar.routes import HTTPRoute
 from litestar.types import ASGIApp, ControllerRouterHandler, Receive, Scope, Send
 
 from action_assistant.version import VERSION
-from action_assistant.web.access import Access
+from action_assistant.web.access import Access, Needs, require
 from action_assistant.web.addresses import Addresses, host_name
 from action_assistant.web.keys import Keys
 from action_assistant.web.page import Page
 from action_assistant.web.problems import problem_handlers
+from action_assistant.web.roles import Deed
 
 log: Final = logging.getLogger(__name__)
 
 BODY_LIMIT: Final = 10_000_000  # bytes; a graph file of 10 MB is refused with 413
 _OPEN: Final = frozenset({"/healthz", "/readyz", "/api/session"})
+_OPEN_BELOW: Final = "/api/invitations/"
+_SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class Readiness(msgspec.Struct, frozen=True):
@@ -53,14 +59,17 @@ def application(
 ) -> ASGIApp:
     """The whole application. `page` and `runner_port` are the editor's: it serves the page, whose
     Content-Security-Policy names the runner."""
+    decisions: dict[tuple[str, str], Deed] = {}
     inner = Litestar(
         [*route_handlers, *_health(ready, measures)],
+        guards=[_undecided],
         exception_handlers=problem_handlers(),
         lifespan=list(lifespan),
-        openapi_config=_openapi(title),
+        openapi_config=_openapi(title, decisions),
         request_max_body_size=BODY_LIMIT,
         logging_config=None,
     )
+    decisions.update(_decisions(inner))
     shown = Page(inner, page) if page is not None else None
     outer: ASGIApp = Access(
         shown or inner,
@@ -68,13 +77,50 @@ def application(
         addresses=addresses,
         page_port=page_port,
         is_open=lambda path, html: (
-            path in _OPEN
-            or path.startswith("/api/invitations/")
-            or (shown is not None and shown.knows(path, html))
+            _answers_strangers(path) or (shown is not None and shown.knows(path, html))
         ),
         policy=lambda host: _policy(host, page_port, runner_port),
     )
     return _Named(outer, inner)
+
+
+def _answers_strangers(path: str) -> bool:
+    return path in _OPEN or path.startswith(_OPEN_BELOW)
+
+
+def _decisions(inner: Litestar) -> dict[tuple[str, str], Deed]:
+    """What one must be allowed to do to call a route, by path and method.
+
+    Reading is everybody's who is signed in. Other routes have to say; those that do not are missing
+    here, and are for owners only.
+    """
+    found: dict[tuple[str, str], Deed] = {}
+    for route in inner.routes:
+        if not isinstance(route, HTTPRoute) or _answers_strangers(route.path_format):
+            continue
+        for handler in route.route_handlers:
+            said = _said(handler)
+            for method in handler.http_methods:
+                if said is not None:
+                    found[route.path_format, method.lower()] = said
+                elif method in _SAFE:
+                    found[route.path_format, method.lower()] = "see"
+    return found
+
+
+def _said(handler: BaseRouteHandler) -> Deed | None:
+    for guard in handler.guards or ():
+        if isinstance(guard, Needs):
+            return guard.deed
+    return None
+
+
+def _undecided(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler) -> None:
+    """A guard: what nobody decided about is not for everybody."""
+    if connection.scope.get("method", "GET") in _SAFE or _said(handler) is not None:
+        return
+    if not _answers_strangers(connection.scope["path"]):
+        require(connection, "restore")
 
 
 class _Named:
@@ -105,23 +151,30 @@ def _policy(host: str, page_port: int, runner_port: int | None) -> str:
 
 class _OpenApiText(JsonRenderPlugin):
     """OpenAPI as JSON. Litestar leaves out an empty `security`, which is how a route says that it
-    is open to strangers."""
+    is open to strangers; the others say in `x-needs` what one must be allowed to do."""
+
+    def __init__(self, decisions: Mapping[tuple[str, str], Deed]) -> None:
+        super().__init__(path="/openapi.json")
+        self._decisions = decisions
 
     def render(self, request: Request[Any, Any, Any], openapi_schema: dict[str, Any]) -> bytes:
         """The text of the schema."""
         for path, item in openapi_schema["paths"].items():
-            for operation in item.values() if path in _OPEN else ():
-                operation["security"] = []
+            for method, operation in item.items():
+                if _answers_strangers(path):
+                    operation["security"] = []
+                elif (path, method) in self._decisions:
+                    operation["x-needs"] = self._decisions[path, method]
         return msgspec.json.encode(openapi_schema)
 
 
-def _openapi(title: str) -> OpenAPIConfig:
+def _openapi(title: str, decisions: Mapping[tuple[str, str], Deed]) -> OpenAPIConfig:
     schemes: dict[str, Any] = {"token": SecurityScheme(type="http", scheme="bearer")}
     return OpenAPIConfig(
         title=title,
         version=VERSION,
         path="/schema",
-        render_plugins=[_OpenApiText(path="/openapi.json")],
+        render_plugins=[_OpenApiText(decisions)],
         components=Components(security_schemes=schemes),
         security=[{"token": []}],
     )

@@ -1,7 +1,9 @@
 """The secret of local mode: a token for programs, and sessions sealed with it for browsers.
 
 A session cookie is `payload.signature`, both base64url; the payload is JSON `[id, person id, name,
-expires]`. Either process can verify it by itself, because both read the same token.
+expires, role, invitation]`. Either process can verify it by itself, because both read the same token.
+Cookies of before there were roles end after `expires`: they were traded for the token, so they are an
+owner's.
 """
 
 import base64
@@ -16,30 +18,52 @@ from typing import Final
 import msgspec
 
 from action_assistant.errors import CannotStart
+from action_assistant.web.roles import OWNER, Role
 
 TOKEN_FILE: Final = "token"
 SESSION_SECONDS: Final = 30 * 24 * 3600
 _MIN_TOKEN: Final = 32  # characters; the tokens made here have 43 (256 bit)
 
 
-class Person(msgspec.Struct, frozen=True):
-    """Somebody who acts. `id` is opaque and stable for a browser; `name` is theirs to choose."""
+class Author(msgspec.Struct, frozen=True):
+    """Somebody who acted. `id` is opaque and stable for a browser; `name` is theirs to choose."""
 
     id: str
     name: str
 
 
+class Person(Author, frozen=True):
+    """Somebody who acts now, and may do what the role allows."""
+
+    role: Role = "viewer"
+
+
 class Session(msgspec.Struct, frozen=True):
-    """A browser that once presented the token. `expires` is in seconds since 1970."""
+    """A browser that once presented the token, or an invitation. `expires` is in seconds since 1970.
+
+    `invitation` is the id of the one it came in by; None for the token.
+    """
 
     id: str
     person: Person
     expires: float
+    invitation: str | None = None
 
     @property
     def expired(self) -> bool:
         """Whether it opens nothing but Stop any more."""
         return time.time() >= self.expires
+
+
+class Sealed(msgspec.Struct, frozen=True, array_like=True):
+    """What a cookie carries."""
+
+    id: str
+    person: str
+    name: str
+    expires: float
+    role: Role = OWNER
+    invitation: str | None = None
 
 
 class Keys:
@@ -61,14 +85,25 @@ class Keys:
         """Whether this is the token."""
         return hmac.compare_digest(token.encode(errors="replace"), self.token.encode())
 
-    def new_session(self, name: str, *, person_id: str | None = None) -> Session:
+    def new_session(
+        self,
+        name: str,
+        *,
+        role: Role = OWNER,
+        invitation: str | None = None,
+        person_id: str | None = None,
+    ) -> Session:
         """A fresh session; with `person_id` for somebody who is known already."""
-        person = Person(person_id or secrets.token_urlsafe(9), name)
-        return Session(secrets.token_urlsafe(12), person, time.time() + SESSION_SECONDS)
+        person = Person(person_id or secrets.token_urlsafe(9), name, role)
+        expires = time.time() + SESSION_SECONDS
+        return Session(secrets.token_urlsafe(12), person, expires, invitation)
 
     def sealed(self, session: Session) -> str:
         """The cookie's value."""
-        fields = [session.id, session.person.id, session.person.name, session.expires]
+        person = session.person
+        fields = Sealed(
+            session.id, person.id, person.name, session.expires, person.role, session.invitation
+        )
         payload = _text(msgspec.json.encode(fields))
         return f"{payload}.{_text(self._sign(payload))}"
 
@@ -79,10 +114,11 @@ class Keys:
             return None
         try:
             raw = base64.urlsafe_b64decode(payload + "=" * (-len(payload) % 4))
-            id_, person, name, expires = msgspec.json.decode(raw, type=tuple[str, str, str, float])
+            found = msgspec.json.decode(raw, type=Sealed)
         except (ValueError, msgspec.DecodeError):
             return None
-        return Session(id_, Person(person, name), expires)
+        person = Person(found.person, found.name, found.role)
+        return Session(found.id, person, found.expires, found.invitation)
 
     def _sign(self, payload: str) -> bytes:
         return hmac.digest(self._seal, payload.encode(errors="replace"), "sha256")

@@ -63,8 +63,15 @@ def session_routes(keys: Keys, page_port: int) -> list[ControllerRouterHandler]:
             # The link again, in a browser that is or was signed in: the same person, since what
             # older tabs have written belongs to them.
             return signed_in(keys.new_session(name or known.name, person_id=known.id))
-        person = _live(request).person
-        return signed_in(keys.new_session(name or person.name, person_id=person.id))
+        now = _live(request)
+        return signed_in(
+            keys.new_session(
+                name or now.person.name,
+                role=now.person.role,
+                invitation=now.invitation,
+                person_id=now.person.id,
+            )
+        )
 
     @delete("/api/session", summary="Sign out")
     async def sign_out() -> Response[None]:

@@ -20,7 +20,7 @@ from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.version import VERSION
 from action_assistant.web.addresses import host_name
-from action_assistant.web.keys import Person
+from action_assistant.web.keys import Author
 
 _SILENCE: Final = 10.0  # seconds after which a listener is told that we are still here
 
@@ -40,7 +40,7 @@ class Happened(msgspec.Struct, frozen=True, omit_defaults=True):
     stream: str
     seq: int
     kind: str
-    author: Person
+    author: Author
     at: datetime
     graph: str | None = None
 

@@ -10,6 +10,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.editor import catalogue, document
 from action_assistant.editor.house import Door
 from action_assistant.editor.rehearsal import Rehearsal, Rehearsing, Stage
+from action_assistant.web.access import Needs
 
 
 class Pieces(msgspec.Struct, frozen=True):
@@ -33,6 +34,7 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         summary="Read UMRF text of any dialect, a graph or one action, as pieces of a document; "
         "nothing is stored",
         operation_id="readPieces",
+        guards=[Needs("see")],
     )
     async def read_pieces(request: Request[Any, Any, Any]) -> Pieces:
         return await asyncio.to_thread(_pieces, await request.body())
@@ -42,6 +44,7 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="What a graph would do by the engine's rules: its trace; nothing is recorded",
         operation_id="rehearse",
+        guards=[Needs("see")],
     )
     async def rehearse(graph_id: str, data: Rehearsing) -> Rehearsal:
         house = door.house

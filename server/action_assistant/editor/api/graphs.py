@@ -17,7 +17,7 @@ from action_assistant.editor.house import Door
 from action_assistant.editor.rewriting import Rewriting, rewriting
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Problem
-from action_assistant.web.access import person_of
+from action_assistant.web.access import Needs, person_of
 
 Asking = Request[Any, Any, Any]
 Seq = Annotated[int, Parameter(ge=1)]
@@ -64,6 +64,7 @@ def _catalogue(door: Door) -> list[ControllerRouterHandler]:
         summary="Make a graph of a UMRF file of any dialect, or an empty one of {name}; "
         "with `preview` only say what a file would become, and store nothing",
         operation_id="createGraph",
+        guards=[Needs("edit")],
     )
     async def create_graph(
         request: Asking, preview: bool = False
@@ -85,6 +86,7 @@ def _catalogue(door: Door) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}",
         summary="Change the name or description of a graph",
         operation_id="describeGraph",
+        guards=[Needs("edit")],
     )
     async def describe_graph(graph_id: str, data: Describing, request: Asking) -> GraphView:
         house, person = door.house, person_of(request)
@@ -97,6 +99,7 @@ def _catalogue(door: Door) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}",
         summary="Delete a graph; it can be recovered",
         operation_id="deleteGraph",
+        guards=[Needs("edit")],
     )
     async def delete_graph(graph_id: str, request: Asking) -> None:
         house, person = door.house, person_of(request)
@@ -108,6 +111,7 @@ def _catalogue(door: Door) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="Bring a deleted graph back",
         operation_id="recoverGraph",
+        guards=[Needs("edit")],
     )
     async def recover_graph(graph_id: str, request: Asking) -> GraphView:
         house, person = door.house, person_of(request)
@@ -148,6 +152,7 @@ def _contents(door: Door) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="What an edited text of a graph would change, key by key; stores nothing",
         operation_id="getRewriting",
+        guards=[Needs("see")],
     )
     async def get_rewriting(graph_id: str, seq: Seq, request: Asking) -> Rewriting:
         house = door.house
@@ -194,6 +199,7 @@ def _past(door: Door) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="Make a graph what it was after an earlier change, as an edit that can be undone",
         operation_id="restoreGraph",
+        guards=[Needs("edit")],
     )
     async def restore_graph(graph_id: str, data: Restoring, request: Asking) -> GraphView:
         house, person = door.house, person_of(request)

@@ -16,6 +16,7 @@ from action_assistant.editor.room import Room
 from action_assistant.errors import Refused, TooMany
 from action_assistant.web.access import person_of
 from action_assistant.web.problems import PROBLEM_JSON, problem_of
+from action_assistant.web.roles import allowed
 
 log: Final = logging.getLogger(__name__)
 
@@ -38,7 +39,9 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
                 await house.people.seen(person)
                 async with house.rooms.enter(h.graph_stream(graph_id)) as found:
                     await socket.accept()
-                    await _converse(socket, found, Member(person, acks=_wants_acks(socket)))
+                    edits = allowed(person.role, "edit")
+                    member = Member(person, edits=edits, acks=_wants_acks(socket))
+                    await _converse(socket, found, member)
         except Refused as refused:
             await _refuse(socket, refused)
 

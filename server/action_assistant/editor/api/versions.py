@@ -8,7 +8,7 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.house import Door
 from action_assistant.editor.versions import VersionView
-from action_assistant.web.access import person_of
+from action_assistant.web.access import Needs, person_of
 
 
 class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -35,6 +35,7 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/versions",
         summary="Publish a graph as it is, or as it was after its change `seq`",
         operation_id="publishVersion",
+        guards=[Needs("edit")],
     )
     async def publish_version(
         graph_id: str, request: Request[Any, Any, Any], data: Publishing | None = None

@@ -1,0 +1,55 @@
+"""What each role may do: the one table that both processes and the page follow."""
+
+from collections.abc import Mapping
+from typing import Final, Literal, TypeAlias, get_args
+
+#: From the least to the most; each may do what those before it may.
+Role: TypeAlias = Literal["viewer", "editor", "operator", "owner"]
+
+#: Kinds of things to do. `see` and `stop` are everybody's who is signed in.
+Deed: TypeAlias = Literal[
+    "see",  # graphs, runs, robots, and who is there
+    "stop",  # any run
+    "edit",  # graphs: make, change, delete, go back to an earlier change, publish a version
+    "simulate",  # start, pause, resume and modify a run in the simulator
+    "operate",  # the same on a robot
+    "register",  # robots
+    "share",  # invite and revoke
+    "restore",  # a backup
+]
+
+#: Whoever holds the token of the server is an owner.
+OWNER: Final[Role] = "owner"
+
+_FROM: Final[Mapping[Deed, Role]] = {
+    "see": "viewer",
+    "stop": "viewer",
+    "edit": "editor",
+    "simulate": "editor",
+    "operate": "operator",
+    "register": "operator",
+    "share": "owner",
+    "restore": "owner",
+}
+_RANK: Final[Mapping[Role, int]] = {role: rank for rank, role in enumerate(get_args(Role))}
+_MAY: Final[Mapping[Role, str]] = {
+    "viewer": "look at everything and stop runs",
+    "editor": "edit graphs, run them in the simulator, and stop runs",
+    "operator": "edit graphs, run them on robots, and stop runs",
+    "owner": "do everything",
+}
+
+
+def allowed(role: Role, deed: Deed) -> bool:
+    """Whether somebody of this role may do that."""
+    return rank(role) >= rank(_FROM[deed])
+
+
+def rank(role: Role) -> int:
+    """How much a role may do, to compare it with others."""
+    return _RANK[role]
+
+
+def may(role: Role) -> str:
+    """What a role may do, in words that follow `may`."""
+    return _MAY[role]
