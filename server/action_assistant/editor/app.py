@@ -11,6 +11,7 @@ from litestar import Litestar
 from litestar.types import ASGIApp
 
 from action_assistant import places
+from action_assistant.editor import epochs
 from action_assistant.editor import happenings as h
 from action_assistant.editor.api import about, drawing, graphs, room, versions
 from action_assistant.editor.house import Door, House
@@ -31,16 +32,17 @@ async def open_house(settings: EditorSettings) -> AsyncIterator[House]:
     """The editor without its HTTP side. Raises CannotStart."""
     journal = await Journal.open(settings.database, branch="editor", fold=h.fold)
     try:
-        house = House(settings, journal, await People.known(journal))
-    except BaseException:
-        await journal.close()
-        raise
-    try:
-        if await journal.position() == 0:
-            await _greet(house, places.examples())
-        yield house
+        new = await journal.position() == 0
+        async with epochs.living_in(journal, settings.data) as epoch:
+            house = House(settings, journal, await People.known(journal), epoch)
+            try:
+                if new:
+                    await _greet(house, places.examples())
+                yield house
+            finally:
+                await house.rooms.close()
     finally:
-        await house.close()
+        await journal.close()
 
 
 def create_app(settings: EditorSettings) -> ASGIApp:

@@ -24,6 +24,7 @@ DELETED: Final = "graph.deleted.v1"
 RECOVERED: Final = "graph.recovered.v1"
 PUBLISHED: Final = "version.published.v1"
 NAMED: Final = "person.named.v1"
+EPOCH: Final = "epoch.begun.v1"
 
 PEOPLE: Final = "people"
 #: Not people: what this program does by itself, and the graphs that come with it.

@@ -15,9 +15,12 @@ from action_assistant.settings import EditorSettings
 class House:
     """The parts, put together around a journal that is open."""
 
-    def __init__(self, settings: EditorSettings, journal: Journal, people: People) -> None:
+    def __init__(
+        self, settings: EditorSettings, journal: Journal, people: People, epoch: str
+    ) -> None:
         self.settings = settings
         self.journal = journal
+        self.epoch = epoch
         self.people = people
         self.rooms = Rooms(journal)
         self.crowd = Crowd(limits=settings.limits)
@@ -26,11 +29,6 @@ class House:
         self.versions = Versions(journal, self.sights)
         self.library = Library(journal, self.sights)
         self.history = History(journal, people, self.versions)
-
-    async def close(self) -> None:
-        """Finish what has begun, and let go of the journal."""
-        await self.rooms.close()
-        await self.journal.close()
 
 
 class Door:

@@ -75,6 +75,11 @@ class Member:
         self._frames.append(frame)
         self._news.set()
 
+    def post_epoch(self, epoch: str) -> None:
+        """Say which history this is, to those who know our own messages."""
+        if self.acks:
+            self.post(wire.epoch(epoch))
+
     def post_read_only(self, why: str) -> None:
         """Say that nobody may change the document, to those who know our own messages."""
         if self.acks:

@@ -11,6 +11,7 @@ QUERY_AWARENESS: Final = 3
 ACKS: Final = 100
 COMPARE: Final = 101
 READ_ONLY: Final = 102
+EPOCH: Final = 103
 STEP_1: Final = 0
 STEP_2: Final = 1
 UPDATE: Final = 2
@@ -218,6 +219,11 @@ def compared(seq: int, entries: int, total: int) -> bytes:
 def read_only(why: str) -> bytes:
     """Nobody may change this document; a sentence says why."""
     return bytes((READ_ONLY,)) + text(why.encode())
+
+
+def epoch(name: str) -> bytes:
+    """Which history of the graph this is."""
+    return bytes((EPOCH,)) + text(name.encode())
 
 
 #: Says nothing; sent so that a client which drops silent sockets does not.

@@ -127,7 +127,7 @@ class Sqlite:
 
     def open(self, branch: Branch) -> SqliteSession:
         """Lock the file for this process, since two writers of one log would tear it; migrate."""
-        self._lock = _own(self._path)
+        self._lock = own(self._path)
         self.migrate(upgrade_to(branch))
         try:
             return self.connect()
@@ -215,7 +215,8 @@ def sqlite_engine(path: Path, *, wait: float, **options: Any) -> Engine:
     return engine
 
 
-def _own(path: Path) -> int:
+def own(path: Path) -> int:
+    """Lock a file for this process; closing the descriptor lets go. Raises CannotStart."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = path.with_name(f"{path.name}.lock").open("ab")

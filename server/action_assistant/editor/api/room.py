@@ -39,8 +39,12 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
                 await house.people.seen(person)
                 async with house.rooms.enter(h.graph_stream(graph_id)) as found:
                     await socket.accept()
+                    if _knows_another(socket, house.epoch, found):
+                        await _part(socket, house.epoch)
+                        return
                     edits = allowed(person.role, "edit")
                     member = Member(person, edits=edits, acks=_wants_acks(socket))
+                    member.post_epoch(house.epoch)
                     await _converse(socket, found, member)
         except Refused as refused:
             await _refuse(socket, refused)
@@ -50,6 +54,24 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
 
 def _wants_acks(socket: Socket) -> bool:
     return bool(socket.query_params.get("acks") == "1")
+
+
+def _knows_another(socket: Socket, epoch: str, room: Room) -> bool:
+    """Whether the client knows another history: by its name, or since this one is shorter."""
+    asked = socket.query_params
+    if asked.get("epoch", epoch) != epoch:
+        return True
+    seq = asked.get("seq", "")
+    number = int(seq) if seq.isascii() and seq.isdecimal() and len(seq) < 20 else 0
+    return number > room.seq and room.damaged is None
+
+
+async def _part(socket: Socket, epoch: str) -> None:
+    """Send away who knows another history, with the name of this one."""
+    with anyio.move_on_after(_GOODBYE):
+        if _wants_acks(socket):
+            await socket.send_bytes(wire.epoch(epoch))
+        await socket.close(wire.OTHER_EPOCH, wire.REASONS[wire.OTHER_EPOCH])
 
 
 async def _converse(socket: Socket, room: Room, member: Member) -> None:
