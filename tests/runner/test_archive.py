@@ -47,7 +47,7 @@ async def test_the_row_of_a_run_that_is_over_tells_what_the_run_tells(tmp_path: 
         await control.stop(started.run.id, BEN)  # takes so long that there is an alarm
         await until(lambda: not control.open)
         told = await control.find(started.run.id)
-        query = archive.listed(graph=None, engine=None, state=None, before=None, limit=9)
+        query = archive.listed(archive.Filter(), 9)
         (row,) = await control.history.rows(query)
     assert told.alarms
     assert shapes.summary_of_row(row) == shapes.summary(told)

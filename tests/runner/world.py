@@ -18,6 +18,7 @@ from sqlalchemy import Row, Select, StaticPool, create_engine
 
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.events import Draft, Event
+from action_assistant.journal.events import Snapshot as Kept
 from action_assistant.journal.tables import RUNNER
 from action_assistant.runner import archive
 from action_assistant.runner.admission import StartRequest
@@ -122,6 +123,7 @@ class MemoryLedger:
         self.forgetful = False
         self.slow = 0.0
         self.position = 0
+        self.snapshots: dict[str, Kept] = {}
         self._engine = create_engine("sqlite://", poolclass=StaticPool)
         RUNNER.create_all(self._engine)
 
@@ -170,6 +172,14 @@ class MemoryLedger:
         await anyio.lowlevel.checkpoint()
         with self._engine.connect() as connection:
             return list(connection.execute(statement).all())
+
+    async def snapshot(self, stream: str) -> Kept | None:
+        """As the journal's."""
+        return self.snapshots.get(stream)
+
+    async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
+        """As the journal's."""
+        self.snapshots[stream] = Kept(stream, seq, state)
 
     def told(self, run: str) -> list[RunEvent]:
         """The events of a run."""

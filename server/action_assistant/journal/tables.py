@@ -151,3 +151,48 @@ robot: Final = Table(
     Column("registered_at", BigInteger, nullable=False),
     Column("retired_at", BigInteger),
 )
+
+#: What people noted about a run, and what may be searched of it once it is over (`summed`).
+review: Final = Table(
+    "review",
+    RUNNER,
+    Column("run", Text, primary_key=True),
+    Column("pinned", Boolean(create_constraint=False), nullable=False),
+    Column("note", Text, nullable=False),
+    Column("words", Text, nullable=False),
+    Column("summed", Boolean(create_constraint=False), nullable=False),
+)
+
+#: The labels of runs.
+run_label: Final = Table(
+    "run_label",
+    RUNNER,
+    Column("run", Text, primary_key=True),
+    Column("label", Text, primary_key=True),
+    Index(None, "label"),
+)
+
+#: What one action of a run that is over adds up to; `took` are microseconds.
+action_sum: Final = Table(
+    "action_sum",
+    RUNNER,
+    Column("run", Text, primary_key=True),
+    Column("action", Text, primary_key=True),
+    Column("aid", Text),
+    Column("visits", Integer, nullable=False),
+    Column("results", JSON, nullable=False),
+    Column("inferred", Integer, nullable=False),
+    Column("took", JSON, nullable=False),
+)
+
+#: A run that shall go the same for ever. Its graph, script and course stand in the event.
+expectation: Final = Table(
+    "expectation",
+    RUNNER,
+    Column("name", Text, primary_key=True),
+    Column("graph", Text),
+    Column("graph_name", Text, nullable=False),
+    Column("run", Text, nullable=False),
+    Column("at", BigInteger, nullable=False),
+    Column("seq", BigInteger, nullable=False),
+)

@@ -1,8 +1,8 @@
 """The routes of the runner."""
 
-from collections.abc import AsyncIterator
-from datetime import datetime
-from typing import Annotated, Any, Final
+from collections.abc import AsyncIterator, Sequence
+from datetime import UTC, datetime
+from typing import Annotated, Any, Final, get_args
 
 import anyio
 import msgspec
@@ -22,6 +22,8 @@ from action_assistant.runner.described import StartOperation, StopOperation
 from action_assistant.runner.events import Author
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.live import Hub, Stopping, attend
+from action_assistant.runner.review import routes as review
+from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.robots import SIMULATOR, Robot
 from action_assistant.runner.runs import State
 from action_assistant.web.access import Needs, person_of, require
@@ -37,6 +39,7 @@ class House:
     control: Control
     hub: Hub
     journal: Journal
+    desk: Desk
 
 
 class StopAsked(msgspec.Struct, frozen=True):
@@ -57,7 +60,14 @@ class HistoryEvent(msgspec.Struct, frozen=True):
 
 def routes(house: House) -> list[ControllerRouterHandler]:
     """All routes."""
-    return [*_starts(house), *_moves(house), *_reads(house), *_robots(house), _live(house)]
+    return [
+        *_starts(house),
+        *_moves(house),
+        *_reads(house),
+        *_robots(house),
+        *review.routes(lambda: house.desk),
+        _live(house),
+    ]
 
 
 def _starts(house: House) -> list[ControllerRouterHandler]:
@@ -142,20 +152,45 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
     async def listed(
         graph: str | None = None,
         robot: str | None = None,
-        run_state: Annotated[State | None, Parameter(query="state")] = None,
+        run_state: Annotated[str | None, Parameter(query="state")] = None,
+        version: str | None = None,
+        person: str | None = None,
+        text: str | None = None,
+        label: str | None = None,
+        pinned: bool | None = None,
+        since: datetime | None = None,
+        until: datetime | None = None,
         before: str | None = None,
         limit: Annotated[int, Parameter(ge=1, le=1000)] = 200,
-    ) -> list[shapes.Summary]:
-        query = archive.listed(
-            graph=graph, engine=robot, state=run_state, before=before, limit=limit
+    ) -> list[shapes.Listed]:
+        states = _states(run_state)
+        wanted = archive.Filter(
+            graph=graph,
+            engine=robot,
+            states=states,
+            version=version,
+            person=person,
+            text=text.strip() or None if text is not None else None,
+            label=label,
+            pinned=pinned,
+            since=_us(since),
+            until=_us(until),
+            before=before,
         )
-        found = [_listed(house, row) for row in await house.control.history.rows(query)]
-        return [each for each in found if run_state is None or each.state == run_state]
+        rows = await house.control.history.rows(archive.listed(wanted, limit))
+        labels = await _labels(house, rows)
+        found = [_listed(house, row, labels.get(row.id, [])) for row in rows]
+        return [each for each in found if not states or each.state in states]
+
+    @get("/api/labels", summary="Labels of runs, the most used first")
+    async def every_label() -> list[str]:
+        rows = await house.control.history.rows(archive.all_labels())
+        return [row.label for row in rows]
 
     @get("/api/runs/{run:str}", summary="A run, and the graph as it was sent")
     async def one(run: str) -> shapes.RunWhole:
         umrf = await house.control.history.umrf(run)
-        found = await house.control.find(run)
+        found = await house.desk.known(run)
         opened = house.control.open.get(run)
         recorded = opened is None or opened.recorder.recorded
         return shapes.whole(found, umrf, recorded=recorded)
@@ -172,7 +207,7 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
             headers={"cache-control": "no-store"},
         )
 
-    return [listed, one, events]
+    return [listed, every_label, one, events]
 
 
 def _robots(house: House) -> list[ControllerRouterHandler]:
@@ -229,11 +264,36 @@ def _shown(house: House, run: str) -> shapes.RunShown | None:
     return shapes.shown(opened.run, recorded=opened.recorder.recorded)
 
 
-def _listed(house: House, row: Row[Any]) -> shapes.Summary:
+def _listed(house: House, row: Row[Any], labels: list[str]) -> shapes.Listed:
     opened = house.control.open.get(row.id)
     if opened is None:
-        return shapes.summary_of_row(row)
-    return shapes.summary(opened.run, recorded=opened.recorder.recorded)
+        found = shapes.summary_of_row(row)
+    else:
+        found = shapes.summary(opened.run, recorded=opened.recorder.recorded)
+    return shapes.listed(found, pinned=bool(row.pinned), note=row.note or "", labels=labels)
+
+
+async def _labels(house: House, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    if rows:
+        for row in await house.control.history.rows(archive.labels_of([row.id for row in rows])):
+            found.setdefault(row.run, []).append(row.label)
+    return found
+
+
+def _states(asked: str | None) -> tuple[str, ...]:
+    """States, separated by commas. Raises BadInput."""
+    states = tuple(each.strip() for each in (asked or "").split(",") if each.strip())
+    if unknown := [each for each in states if each not in get_args(State)]:
+        raise BadInput(f"No run is ever {unknown[0]!r}.", where={"path": "/state"})
+    return states
+
+
+def _us(moment: datetime | None) -> int | None:
+    if moment is None:
+        return None
+    whole = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
+    return round(whole.timestamp() * 1_000_000)
 
 
 def _last_event_id(request: _Asking) -> int:

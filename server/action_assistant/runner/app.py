@@ -4,6 +4,7 @@ import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+import anyio
 from litestar import Litestar
 from litestar.types import ASGIApp
 
@@ -13,6 +14,7 @@ from action_assistant.runner import archive
 from action_assistant.runner.api import House, routes
 from action_assistant.runner.control import Control
 from action_assistant.runner.live import Hub
+from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.robots import Robots
 from action_assistant.settings import RunnerSettings
 from action_assistant.web.addresses import Addresses
@@ -34,7 +36,11 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
         async with Control.opened(journal, Robots(), wall=wall_clock) as control:
             house.control, house.hub = control, Hub(control, wall_clock)
             house.journal = journal
-            yield house
+            house.desk = Desk(control, journal, anyio.to_thread.run_sync, wall_clock)
+            async with anyio.create_task_group() as tasks:
+                tasks.start_soon(house.desk.run)
+                yield house
+                tasks.cancel_scope.cancel()
     finally:
         await journal.close()
 

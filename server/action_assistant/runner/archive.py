@@ -4,15 +4,26 @@ Open runs live in memory; the table answers for those that are over, and says wh
 the process ended.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import msgspec
-from sqlalchemy import Executable, Select, func, insert, or_, select, update
+from sqlalchemy import (
+    ColumnElement,
+    Executable,
+    Select,
+    Text,
+    cast,
+    func,
+    insert,
+    or_,
+    select,
+    update,
+)
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Event
-from action_assistant.journal.tables import robot, run
+from action_assistant.journal.tables import review, robot, run, run_label
 from action_assistant.runner.events import (
     AlarmRaised,
     Answered,
@@ -24,6 +35,7 @@ from action_assistant.runner.events import (
     StopRequested,
     decode,
 )
+from action_assistant.runner.review import about, again
 from action_assistant.runner.robots import REGISTERED, Registered
 
 _OPEN: Final = "open"
@@ -33,6 +45,10 @@ def fold(event: Event) -> Sequence[Executable]:
     """What an event means for the tables."""
     if event.kind == REGISTERED:
         return (_robot(msgspec.json.decode(event.body, type=Registered)),)
+    if about.is_about(event.stream):
+        return about.fold(event)
+    if event.stream == again.STREAM:
+        return again.fold(event)
     if not event.stream.startswith("run/"):
         return ()
     change = update(run).where(run.c.id == event.stream.removeprefix("run/"))
@@ -126,27 +142,73 @@ def by_request(request_id: str) -> Select[Any]:
     return select(run.c.id, run.c.digest, run.c.engine).where(run.c.request_id == request_id)
 
 
-def listed(
-    *,
-    graph: str | None,
-    engine: str | None,
-    state: str | None,
-    before: str | None,
-    limit: int,
-) -> Select[Any]:
-    """Runs, newest first. `graph` is an id or a name, `before` a run's id. Which of its states an
-    open run is in the table does not know: with a `state` all open ones are there, too."""
-    query = select(run).order_by(run.c.number.desc()).limit(limit)
-    if graph is not None:
-        query = query.where(or_(run.c.graph == graph, run.c.graph_name == graph))
-    if engine is not None:
-        query = query.where(run.c.engine == engine)
-    if state is not None:
-        query = query.where(run.c.state.in_([state, _OPEN]))
-    if before is not None:
-        number = select(run.c.number).where(run.c.id == before).scalar_subquery()
+class Filter(msgspec.Struct, frozen=True, kw_only=True):
+    """Which runs are asked for; None asks for all. `graph` is an id or a name, `person` an id or a
+    part of a name, `text` a part of a name or of what was said, `before` a run's id."""
+
+    graph: str | None = None
+    engine: str | None = None
+    states: tuple[str, ...] = ()
+    version: str | None = None
+    person: str | None = None
+    text: str | None = None
+    label: str | None = None
+    pinned: bool | None = None
+    since: int | None = None
+    until: int | None = None
+    before: str | None = None
+
+
+def listed(wanted: Filter, limit: int) -> Select[Any]:
+    """Runs and what was noted about them, newest first. Which of its states an open run is in the
+    table does not know: with `states` all open ones are there, too."""
+    noted = (review.c.pinned, review.c.note)
+    query = select(run, *noted).outerjoin(review, review.c.run == run.c.id)
+    query = query.order_by(run.c.number.desc()).limit(limit)
+    for condition in _conditions(wanted):
+        query = query.where(condition)
+    if wanted.before is not None:
+        number = select(run.c.number).where(run.c.id == wanted.before).scalar_subquery()
         query = query.where(run.c.number < number)
     return query
+
+
+def _conditions(wanted: Filter) -> Iterator[ColumnElement[bool]]:
+    if wanted.graph is not None:
+        yield or_(run.c.graph == wanted.graph, run.c.graph_name == wanted.graph)
+    if wanted.engine is not None:
+        yield run.c.engine == wanted.engine
+    if wanted.states:
+        yield run.c.state.in_([*wanted.states, _OPEN])
+    if wanted.version is not None:
+        yield or_(run.c.version == wanted.version, run.c.digest.startswith(wanted.version))
+    if wanted.person is not None:
+        named = run.c.author_name.icontains(wanted.person, autoescape=True)
+        yield or_(run.c.author_id == wanted.person, named)
+    if wanted.text is not None:
+        places = (run.c.graph_name, run.c.engine, run.c.author_name, review.c.words, review.c.note)
+        found = (each.icontains(wanted.text, autoescape=True) for each in places)
+        yield or_(*found, cast(run.c.number, Text) == wanted.text)
+    if wanted.label is not None:
+        yield run.c.id.in_(select(run_label.c.run).where(run_label.c.label == wanted.label))
+    if wanted.pinned is not None:
+        yield func.coalesce(review.c.pinned, False) == wanted.pinned
+    if wanted.since is not None:
+        yield run.c.requested_at >= wanted.since
+    if wanted.until is not None:
+        yield run.c.requested_at <= wanted.until
+
+
+def labels_of(runs: Sequence[str]) -> Select[Any]:
+    """The labels of these runs."""
+    query = select(run_label).where(run_label.c.run.in_(runs))
+    return query.order_by(run_label.c.run, run_label.c.label)
+
+
+def all_labels() -> Select[Any]:
+    """Every label, the most used first."""
+    query = select(run_label.c.label).group_by(run_label.c.label)
+    return query.order_by(func.count().desc(), run_label.c.label).limit(200)
 
 
 def all_robots() -> Select[Any]:

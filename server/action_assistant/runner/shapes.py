@@ -7,7 +7,7 @@ import msgspec
 from sqlalchemy import Row
 
 from action_assistant.runner.events import Author, Override
-from action_assistant.runner.runs import ActionRun, Desired, How, Outcome, Run, State
+from action_assistant.runner.runs import ActionRun, Desired, How, Outcome, Run, State, Visit
 
 _LIVE: Final = 3_000  # visits in one live message, over all actions
 _WHOLE: Final = 20_000
@@ -77,6 +77,14 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     recorded: bool
 
 
+class Listed(Summary, frozen=True, kw_only=True):
+    """A run of the list, with what people noted about it."""
+
+    pinned: bool
+    note: str
+    labels: list[str]
+
+
 class RunShown(Summary, frozen=True, kw_only=True):
     """A run with its actions, by full name."""
 
@@ -144,6 +152,12 @@ def summary_of_row(row: Row[Any]) -> Summary:
     )
 
 
+def listed(found: Summary, *, pinned: bool, note: str, labels: list[str]) -> Listed:
+    """A summary with its marks."""
+    fields = {name: getattr(found, name) for name in Summary.__struct_fields__}
+    return Listed(**fields, pinned=pinned, note=note, labels=labels)
+
+
 def _fields(run: Run, recorded: bool) -> dict[str, Any]:
     return {
         "id": run.id,
@@ -170,6 +184,18 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
     }
 
 
+def visit(each: Visit) -> VisitShown:
+    """One execution of an action."""
+    return VisitShown(
+        time(each.start),
+        time(each.not_before),
+        _time(each.not_after),
+        _time(each.until),
+        each.result,
+        each.how,
+    )
+
+
 def _actions(run: Run, visits: int) -> dict[str, ActionShown]:
     """Encoding holds up everything else, a Stop too, so very many visits are not shown."""
     most = max(1, visits // max(1, len(run.actions)))
@@ -177,17 +203,7 @@ def _actions(run: Run, visits: int) -> dict[str, ActionShown]:
 
 
 def _action(action: ActionRun, most: int) -> ActionShown:
-    visits = [
-        VisitShown(
-            time(each.start),
-            time(each.not_before),
-            _time(each.not_after),
-            _time(each.until),
-            each.result,
-            each.how,
-        )
-        for each in action.visits[-most:]
-    ]
+    visits = [visit(each) for each in action.visits[-most:]]
     messages = [MessageShown(time(each.at), each.text) for each in action.messages]
     older = action.older + len(action.visits) - len(visits)
     return ActionShown(action.aid, action.state, visits, older, messages)

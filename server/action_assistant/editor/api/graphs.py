@@ -11,11 +11,11 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.editor import catalogue, edits
 from action_assistant.editor import happenings as h
 from action_assistant.editor.catalogue import GraphView, Preview, Reading
-from action_assistant.editor.diff import Difference, difference
 from action_assistant.editor.history import Entry
 from action_assistant.editor.house import Door
 from action_assistant.editor.rewriting import Rewriting, rewriting
 from action_assistant.umrf import codec
+from action_assistant.umrf.difference import Difference, difference
 from action_assistant.umrf.model import Problem
 from action_assistant.web.access import Needs, person_of
 

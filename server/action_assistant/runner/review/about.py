@@ -1,0 +1,157 @@
+"""What is told about a run besides its own events: marks of people, and its sum after the end.
+
+It has a stream of its own, `about/RUN`: whatever people write down never mixes with what a robot
+did. The tables here are folds of these streams.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar, Final
+
+import msgspec
+from sqlalchemy import Executable, delete, insert
+from sqlalchemy.dialects.sqlite import insert as upsert
+
+from action_assistant.journal.events import Draft, Event
+from action_assistant.journal.tables import action_sum, review, run_label
+from action_assistant.runner.events import Author
+from action_assistant.runner.runs import ActionRun, Run
+
+_PREFIX: Final = "about/"
+_WORDS: Final = 8_000  # characters of messages that a search looks through
+_TOOK: Final = 100  # durations kept per action and run
+
+Label = Annotated[str, msgspec.Meta(min_length=1, max_length=60, pattern=r"^\S(.*\S)?$")]
+
+
+class Marks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What a person changes about a run: only what is given."""
+
+    pinned: bool | None = None
+    note: Annotated[str, msgspec.Meta(max_length=4_000)] | None = None
+    labels: Annotated[tuple[Label, ...], msgspec.Meta(max_length=20)] | None = None
+
+
+class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Somebody pinned a run, wrote a note or chose its labels."""
+
+    kind: ClassVar[str] = "run.marked.v1"
+
+    at: int
+    author: Author
+    marks: Marks
+
+
+class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """One action of a run that is over. `results` counts results that are known; `took` has the
+    durations (microseconds) of visits whose both ends were seen, the newest hundred at most."""
+
+    aid: str | None = None
+    visits: int = 0
+    results: dict[str, int] = {}
+    inferred: int = 0
+    took: tuple[int, ...] = ()
+
+
+class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A run that is over, as lists and statistics need it: they must not read every run again."""
+
+    kind: ClassVar[str] = "run.summed_up.v1"
+
+    at: int
+    actions: dict[str, ActionSum]
+    words: str = ""
+
+
+def stream_about(run: str) -> str:
+    """The stream of what is told about a run."""
+    return f"{_PREFIX}{run}"
+
+
+def is_about(stream: str) -> bool:
+    """Whether this stream is one of those."""
+    return stream.startswith(_PREFIX)
+
+
+def draft(event: Marked | SummedUp) -> Draft:
+    """The event before it has a place."""
+    author = event.author.id if isinstance(event, Marked) else ""
+    return Draft(event.kind, author, msgspec.json.encode(event))
+
+
+def sum_of(run: Run, at: int) -> SummedUp:
+    """What a run adds up to."""
+    said = itertools.chain(
+        [run.detail],
+        (alarm.text for alarm in run.alarms),
+        (message.text for action in run.actions.values() for message in action.messages),
+    )
+    words = "\n".join(dict.fromkeys(text for text in said if text))[:_WORDS]
+    return SummedUp(at, {name: _sum(each) for name, each in run.actions.items()}, words)
+
+
+def _sum(action: ActionRun) -> ActionSum:
+    results: dict[str, int] = {}
+    for visit in action.visits:
+        if visit.result is not None:
+            results[visit.result] = results.get(visit.result, 0) + 1
+    took = [v.until - v.start for v in action.visits if v.until is not None and v.how == "observed"]
+    return ActionSum(
+        aid=action.aid,
+        visits=action.older + len(action.visits),
+        results=results,
+        inferred=sum(visit.how == "inferred" for visit in action.visits),
+        took=tuple(took[-_TOOK:]),
+    )
+
+
+def fold(event: Event) -> Sequence[Executable]:
+    """What an event means for the tables."""
+    run = event.stream.removeprefix(_PREFIX)
+    match event.kind:
+        case Marked.kind:
+            return _mark(run, msgspec.json.decode(event.body, type=Marked).marks)
+        case SummedUp.kind:
+            return _put_sum(run, msgspec.json.decode(event.body, type=SummedUp))
+        case _:
+            return ()
+
+
+def _mark(run: str, marks: Marks) -> Sequence[Executable]:
+    given = {"pinned": marks.pinned, "note": marks.note}
+    fields = {name: value for name, value in given.items() if value is not None}
+    statements: list[Executable] = []
+    if fields:
+        statements.append(_review(run, fields))
+    if marks.labels is not None:
+        statements.append(delete(run_label).where(run_label.c.run == run))
+        rows = [{"run": run, "label": label} for label in dict.fromkeys(marks.labels)]
+        if rows:
+            statements.append(insert(run_label).values(rows))
+    return statements
+
+
+def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
+    rows = [
+        {
+            "run": run,
+            "action": name,
+            "aid": each.aid,
+            "visits": each.visits,
+            "results": each.results,
+            "inferred": each.inferred,
+            "took": list(each.took),
+        }
+        for name, each in summed.actions.items()
+    ]
+    return [
+        _review(run, {"words": summed.words, "summed": True}),
+        delete(action_sum).where(action_sum.c.run == run),
+        *(insert(action_sum).values(rows[i : i + 100]) for i in range(0, len(rows), 100)),
+    ]
+
+
+def _review(run: str, fields: Mapping[str, object]) -> Executable:
+    blank: dict[str, object] = {"pinned": False, "note": "", "words": "", "summed": False}
+    statement = upsert(review).values(run=run, **{**blank, **fields})
+    return statement.on_conflict_do_update(index_elements=["run"], set_=dict(fields))

@@ -1,0 +1,203 @@
+"""A run once more, in the simulator: what it did as a script, and what it is expected to do again.
+
+A recorded run becomes a script in which every action does what it was seen to do. An expectation is
+a graph, such a script and the course they took; simulating them later, with a newer graph or a newer
+product, must take the same course.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias
+
+import msgspec
+from sqlalchemy import Executable
+from sqlalchemy.dialects.sqlite import insert as upsert
+
+from action_assistant.journal.events import Event
+from action_assistant.journal.tables import expectation
+from action_assistant.runner.events import Author
+from action_assistant.runner.runs import ActionRun, Run, Visit
+from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics import (
+    Dispatch,
+    GraphResult,
+    GraphState,
+    Hazard,
+    NodeResult,
+    Script,
+    Trace,
+    simulate,
+)
+
+#: The stream of all expectations.
+STREAM: Final = "expectations"
+_MOST: Final = 20_000  # steps of a course
+_DAY_MS: Final = 86_400_000.0
+
+Fault: TypeAlias = Literal["error", "false", "hang", "init_error"]
+
+
+class Doubt(msgspec.Struct, frozen=True):
+    """Something that the run does not tell, so that the script had to choose."""
+
+    action: str
+    text: str
+
+
+class Recorded(msgspec.Struct, frozen=True):
+    """A run as a script (`behaviours`, DESIGN 8), and what in it is a guess."""
+
+    behaviours: dict[str, list[dict[str, Any]]]
+    doubts: list[Doubt]
+
+
+class Step(msgspec.Struct, frozen=True):
+    """One step of a course: `what` happened to `node` (empty: the graph), and how."""
+
+    graph: str
+    node: str
+    what: Literal["runs", "result", "state", "ends", "hazard"]
+    how: str
+
+
+class Expected(msgspec.Struct, frozen=True, kw_only=True):
+    """Somebody expects a graph under a script to take this course for ever."""
+
+    kind: ClassVar[str] = "expectation.saved.v1"
+
+    at: int
+    name: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
+    author: Author
+    run: str
+    graph: str | None
+    graph_name: str
+    umrf: str
+    script: str
+    course: tuple[Step, ...]
+
+
+class Retired(msgspec.Struct, frozen=True):
+    """Nobody expects this any more."""
+
+    kind: ClassVar[str] = "expectation.retired.v1"
+
+    at: int
+    name: str
+    author: Author
+
+
+class Departure(msgspec.Struct, frozen=True):
+    """The first step in which a course is another one. None where a course has ended."""
+
+    place: int
+    expected: Step | None
+    found: Step | None
+
+
+def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
+    """What the actions of a run did, as a script. `fault` makes one action (full name) fail at its
+    last visit instead."""
+    behaviours: dict[str, list[dict[str, Any]]] = {}
+    doubts: list[Doubt] = []
+    for name, action in run.actions.items():
+        if not action.visits:
+            continue
+        if action.older:
+            doubts.append(Doubt(name, f"Its first {action.older} visits are not kept singly."))
+        said = iter(_spread(action))
+        behaviours[name] = [
+            _behaviour(name, visit, next(said, ""), doubts) for visit in action.visits
+        ]
+    if fault is not None:
+        name, how = fault
+        behaviours[name] = [*behaviours.get(name, [])[:-1], _failing(how)]
+    return Recorded(behaviours, doubts)
+
+
+def _spread(action: ActionRun) -> Iterable[str]:
+    """Messages by visit: an action says one thing per visit at most that a script can repeat."""
+    for visit in action.visits:
+        until = visit.not_after or visit.until
+        yield next(
+            (
+                each.text
+                for each in action.messages
+                if each.at >= visit.not_before and (until is None or each.at <= until)
+            ),
+            "",
+        )
+
+
+def _behaviour(name: str, visit: Visit, said: str, doubts: list[Doubt]) -> dict[str, Any]:
+    if visit.until is None or visit.result == "stopped":
+        return {"never": True}
+    took = round((visit.until - visit.start) / 1e6, 3)
+    if visit.result is None:
+        doubts.append(Doubt(name, "Its result was not seen; the script says true."))
+    if visit.how == "inferred":
+        doubts.append(Doubt(name, "Its duration is inferred."))
+    found: dict[str, Any] = {"after_s": took, "result": f"on_{visit.result or 'true'}"}
+    return found | ({"message": said} if said else {})
+
+
+def _failing(how: Fault) -> dict[str, Any]:
+    match how:
+        case "hang":
+            return {"never": True, "ignores_stop": True}
+        case "init_error":
+            return {"init_error": True}
+        case "error" | "false":
+            return {"after_s": 0.1, "result": f"on_{how}"}
+
+
+def course(graph: Graph, script: Script) -> tuple[Step, ...]:
+    """What happens when this graph runs under this script, without times. Deterministic."""
+    traces = simulate(graph, script=script, facts=SIMULATED, until_ms=_DAY_MS, max_events=_MOST)
+    return tuple(step for trace in traces if (step := _step(trace)) is not None)
+
+
+def _step(trace: Trace) -> Step | None:
+    match trace:
+        case NodeResult():
+            return Step(trace.graph, trace.node, "result", trace.result)
+        case Dispatch():
+            return Step(trace.graph, trace.node, "runs", trace.response)
+        case GraphResult():
+            return Step(trace.graph, "", "ends", trace.value)
+        case GraphState():
+            return Step(trace.graph, "", "state", trace.state)
+        case Hazard():
+            return Step(trace.graph, trace.node or "", "hazard", trace.code)
+        case _:
+            return None
+
+
+def departure(expected: Sequence[Step], found: Sequence[Step]) -> Departure | None:
+    """Where the second course first differs from the first; None when they are the same."""
+    for place in range(max(len(expected), len(found))):
+        one = expected[place] if place < len(expected) else None
+        other = found[place] if place < len(found) else None
+        if one != other:
+            return Departure(place, one, other)
+    return None
+
+
+def fold(event: Event) -> Sequence[Executable]:
+    """What an event of the stream of expectations means for the table."""
+    match event.kind:
+        case Expected.kind:
+            saved = msgspec.json.decode(event.body, type=Expected)
+            fields = {
+                "graph": saved.graph,
+                "graph_name": saved.graph_name,
+                "run": saved.run,
+                "at": saved.at,
+                "seq": event.seq,
+            }
+            statement = upsert(expectation).values(name=saved.name, **fields)
+            return (statement.on_conflict_do_update(index_elements=["name"], set_=fields),)
+        case Retired.kind:
+            gone = msgspec.json.decode(event.body, type=Retired)
+            return (expectation.delete().where(expectation.c.name == gone.name),)
+        case _:
+            return ()

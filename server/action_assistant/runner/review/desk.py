@@ -1,0 +1,274 @@
+"""Where runs are looked back on: sums up what has ended, keeps marks, compares, exports, expects."""
+
+import logging
+from collections.abc import AsyncIterator
+from typing import Any, Final, Literal, TypeAlias
+
+import anyio
+import msgspec
+from sqlalchemy import Row, select
+
+from action_assistant.errors import BadInput, Conflict, NotFound, Refused
+from action_assistant.journal.events import Draft
+from action_assistant.journal.tables import expectation, review, run, run_label
+from action_assistant.runner.control import Control
+from action_assistant.runner.driving import Clock, OpenRun
+from action_assistant.runner.events import Author
+from action_assistant.runner.history import Aside
+from action_assistant.runner.recorder import stream_of
+from action_assistant.runner.review import about, again, exports, statistics
+from action_assistant.runner.review.compare import Comparison, compare
+from action_assistant.runner.review.film import Film, film
+from action_assistant.runner.review.reel import APART, Archive, Reels
+from action_assistant.runner.runs import Run
+from action_assistant.umrf import codec
+from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics import script_from
+
+log: Final = logging.getLogger(__name__)
+
+_LAST: Final = 1_000  # runs in one statistics
+_AT_ONCE: Final = 200  # runs summed up between two looks
+_ROWS: Final = 400  # parameters of one query
+
+Format: TypeAlias = Literal["jsonl", "csv", "mcap"]
+
+
+class Marked(msgspec.Struct, frozen=True):
+    """What people noted about a run."""
+
+    pinned: bool
+    note: str
+    labels: list[str]
+
+
+class Expectation(msgspec.Struct, frozen=True, kw_only=True):
+    """A run that shall go the same for ever, with all that simulating it again takes."""
+
+    name: str
+    run: str
+    graph: str | None
+    graph_name: str
+    author: Author
+    umrf: msgspec.Raw
+    script: msgspec.Raw
+    course: list[again.Step]
+
+
+class Desk:
+    """Looks back on runs. Nothing here commands a robot."""
+
+    def __init__(self, control: Control, ledger: Archive, aside: Aside, wall: Clock) -> None:
+        self.reels = Reels(ledger, aside)
+        self._control = control
+        self._ledger = ledger
+        self._aside = aside
+        self._wall = wall
+        self._ended = anyio.Event()
+        control.watch(self._saw)
+
+    def _saw(self, opened: OpenRun) -> None:
+        if opened.run.end is not None:
+            self._ended.set()
+
+    async def run(self) -> None:
+        """Sum up runs that have ended, those of earlier processes too, until cancelled."""
+        while True:
+            ended, self._ended = self._ended, anyio.Event()
+            try:
+                left = await self._sum_up_some()
+            except Refused as refused:
+                log.warning("runs cannot be summed up now: %s", refused.detail)
+                await anyio.sleep(5)
+                continue
+            if left:
+                continue
+            if ended.is_set():  # its last events may still be on their way to the journal
+                await anyio.sleep(0.2)
+                continue
+            await self._ended.wait()
+
+    async def _sum_up_some(self) -> bool:
+        """Sum up the newest runs that are over and are not yet. Whether any was."""
+        done = select(review.c.run).where(review.c.summed)
+        query = (
+            select(run.c.id)
+            .where(run.c.ended_at.is_not(None), run.c.id.not_in(done))
+            .order_by(run.c.number.desc())
+            .limit(_AT_ONCE)
+        )
+        rows = await self._ledger.query(query)
+        for row in rows:
+            await self._sum_up(row.id)
+        return bool(rows)
+
+    async def _sum_up(self, run_id: str) -> None:
+        try:
+            found = (await self.reels.reel(run_id)).keys[-1].run
+        except msgspec.DecodeError:
+            log.exception("run %s cannot be read; it is left out of sums", run_id)
+            summed = about.SummedUp(self._wall(), {})
+        else:
+            summed = await self._aside(lambda: about.sum_of(found, self._wall()))
+        await self._ledger.append(about.stream_about(run_id), [about.draft(summed)])
+
+    async def known(self, run_id: str) -> Run:
+        """A run, open or over. Raises NotFound."""
+        opened = self._control.open.get(run_id)
+        return opened.run if opened is not None else (await self.reels.reel(run_id)).keys[-1].run
+
+    # --- one run ------------------------------------------------------------------------------
+
+    async def film(self, run_id: str, after: int) -> Film:
+        """A page of the run's film. Raises NotFound."""
+        return await film(self.reels, run_id, after=after)
+
+    async def mark(self, run_id: str, marks: about.Marks, author: Author) -> Marked:
+        """Pin, note or label a run. Raises NotFound."""
+        await self.known(run_id)
+        marked = about.Marked(self._wall(), author, marks)
+        await self._ledger.append(about.stream_about(run_id), [about.draft(marked)])
+        return await self.marks(run_id)
+
+    async def marks(self, run_id: str) -> Marked:
+        """What people noted about it."""
+        rows = await self._ledger.query(select(review).where(review.c.run == run_id))
+        labels = await self._ledger.query(
+            select(run_label.c.label).where(run_label.c.run == run_id).order_by(run_label.c.label)
+        )
+        pinned, note = (rows[0].pinned, rows[0].note) if rows else (False, "")
+        return Marked(bool(pinned), note, [row.label for row in labels])
+
+    async def compare(self, a: str, b: str) -> Comparison:
+        """Two runs side by side. Raises NotFound."""
+        one, other = await self.known(a), await self.known(b)
+        umrf_a = await self._control.history.umrf(a)
+        umrf_b = await self._control.history.umrf(b)
+        return await self._aside(lambda: compare(one, other, umrf_a, umrf_b))
+
+    async def export(self, run_id: str, form: Format) -> bytes:
+        """The run as a file. Raises NotFound."""
+        found = await self.known(run_id)
+        if form == "csv":
+            return await self._aside(lambda: exports.intervals(found))
+        events = await self._ledger.read(stream_of(run_id))
+        if form == "mcap":
+            return await self._aside(lambda: exports.mcap(events))
+        return await self._aside(lambda: b"".join(exports.lines(run_id, events)))
+
+    async def lines(self, run_id: str) -> AsyncIterator[bytes]:
+        """JSON lines, page by page: the run may be longer than memory should hold."""
+        after = 0
+        while events := await self._ledger.read(stream_of(run_id), after=after, limit=APART):
+            after = events[-1].seq
+            yield b"".join(exports.lines(run_id, events))
+
+    async def script(self, run_id: str, fault: tuple[str, again.Fault] | None) -> again.Recorded:
+        """What the run did as a script. Raises NotFound, BadInput."""
+        found = await self.known(run_id)
+        if fault is not None and fault[0] not in found.actions:
+            raise BadInput(f"The run has no action {fault[0]!r}.", where={"path": "/fault"})
+        return again.recorded(found, fault)
+
+    # --- many runs ----------------------------------------------------------------------------
+
+    async def statistics(self, graph: str, engine: str | None, last: int) -> statistics.Statistics:
+        """The newest runs of a graph together."""
+        rows = await self._ledger.query(statistics.runs_of(graph, engine, min(last, _LAST)))
+        ids = [row.id for row in rows]
+        sums: list[Row[Any]] = []
+        for i in range(0, len(ids), _ROWS):
+            sums += await self._ledger.query(statistics.sums_of(ids[i : i + _ROWS]))
+        newest = await self._graph(ids[0]) if ids else None
+        return await self._aside(lambda: statistics.statistics(rows, sums, newest))
+
+    async def _graph(self, run_id: str) -> Graph | None:
+        text = await self._control.history.umrf(run_id)
+        try:
+            return codec.read(text.encode()).graph
+        except codec.Unreadable:
+            return None
+
+    # --- expectations -------------------------------------------------------------------------
+
+    async def expect(self, run_id: str, name: str, author: Author) -> Expectation:
+        """Save the course of a run as what is expected for ever. Raises NotFound, BadInput,
+        Conflict when the simulator does not take the same course as the run."""
+        name = " ".join(name.split())
+        if not 1 <= len(name) <= 100:
+            raise BadInput("A name has 1 to 100 characters.", where={"path": "/name"})
+        found = await self.known(run_id)
+        if found.end is None:
+            raise Conflict("The run is not over yet.")
+        umrf = await self._control.history.umrf(run_id)
+        saved = await self._aside(lambda: self._expected(found, umrf, name, author))
+        draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
+        await self._ledger.append(again.STREAM, [draft])
+        return _shown(saved)
+
+    def _expected(self, found: Run, umrf: str, name: str, author: Author) -> again.Expected:
+        recorded = again.recorded(found)
+        script = {"behaviours": recorded.behaviours}
+        course = again.course(codec.read(umrf.encode()).graph, script_from(script))
+        _check_alike(found, course)
+        return again.Expected(
+            at=self._wall(),
+            name=name,
+            author=author,
+            run=found.id,
+            graph=found.graph,
+            graph_name=found.graph_name,
+            umrf=umrf,
+            script=msgspec.json.encode(script).decode(),
+            course=course,
+        )
+
+    async def expectations(self) -> list[Expectation]:
+        """All of them, by name."""
+        rows = await self._ledger.query(select(expectation).order_by(expectation.c.name))
+        return [_shown(await self._saved(row.seq)) for row in rows]
+
+    async def _saved(self, seq: int) -> again.Expected:
+        (event,) = await self._ledger.read(again.STREAM, after=seq - 1, upto=seq)
+        return msgspec.json.decode(event.body, type=again.Expected)
+
+    async def retire(self, name: str, author: Author) -> None:
+        """Expect it no more. Raises NotFound."""
+        if not await self._ledger.query(select(expectation).where(expectation.c.name == name)):
+            raise NotFound(f"Nothing is expected under the name {name!r}.")
+        retired = again.Retired(self._wall(), name, author)
+        draft = Draft(retired.kind, author.id, msgspec.json.encode(retired))
+        await self._ledger.append(again.STREAM, [draft])
+
+
+def _check_alike(found: Run, course: tuple[again.Step, ...]) -> None:
+    """A run that the simulator cannot repeat is no expectation: it would fail by itself."""
+    simulated: dict[str, list[str]] = {}
+    for step in course:
+        if step.what == "result":
+            own = step.graph == found.graph_name
+            name = step.node if own else f"{step.graph}/{step.node}"
+            simulated.setdefault(name, []).append(step.how.removeprefix("on_"))
+    for name, action in found.actions.items():
+        seen = [visit.result for visit in action.visits if visit.result not in {None, "stopped"}]
+        again_ = [each for each in simulated.get(name, []) if each != "stopped"]
+        if len(seen) == len(action.visits) and seen != again_:
+            raise Conflict(
+                f"The simulator does not repeat this run: {name} ended {', '.join(again_) or 'never'} "
+                f"there, and {', '.join(map(str, seen)) or 'never'} in the run. Its arrows may "
+                "depend on something that was not recorded.",
+                where={"path": "/run", "action": name},
+            )
+
+
+def _shown(saved: again.Expected) -> Expectation:
+    return Expectation(
+        name=saved.name,
+        run=saved.run,
+        graph=saved.graph,
+        graph_name=saved.graph_name,
+        author=saved.author,
+        umrf=msgspec.Raw(saved.umrf.encode()),
+        script=msgspec.Raw(saved.script.encode()),
+        course=list(saved.course),
+    )

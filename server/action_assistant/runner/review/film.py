@@ -1,0 +1,206 @@
+"""A run as a film: what every event changed in what was known, for replay on the page.
+
+A frame carries only what differs from the one before, so the page shows at every moment exactly
+what the live view showed then: later knowledge never leaks into the past.
+"""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any, Final
+
+import msgspec
+
+from action_assistant.journal.events import Event
+from action_assistant.runner import shapes
+from action_assistant.runner.events import (
+    AlarmRaised,
+    Answered,
+    Ended,
+    Observed,
+    PauseRequested,
+    Proof,
+    Published,
+    Requested,
+    ResumeRequested,
+    RunEvent,
+    Silent,
+    StopRequested,
+    StopSent,
+)
+from action_assistant.runner.review.reel import APART, Reels, fold
+from action_assistant.runner.runs import ActionRun, Run
+
+_HEAD: Final = (
+    "state",
+    "desired",
+    "result",
+    "proof_at",
+    "unknown_since",
+    "started_at",
+    "ended_at",
+    "detail",
+)
+
+
+class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """What became of an action. From the visit number `first` on (counted from 0, over all its
+    visits) they are now `visits`; `messages` are new."""
+
+    state: str
+    first: int
+    visits: list[shapes.VisitShown] = []
+    messages: list[shapes.MessageShown] = []
+    aid: str | None = None
+
+
+class Frame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """One event: `head` has the fields of the run that changed, `actions` those that did."""
+
+    seq: int
+    at: datetime
+    kind: str
+    by: str = ""
+    text: str = ""
+    head: dict[str, Any] = {}
+    actions: dict[str, ActionFrame] = {}
+    alarms: list[shapes.AlarmShown] = []
+
+
+class Chapter(msgspec.Struct, frozen=True):
+    """Where a page of the film begins: after `after` events, at `at`."""
+
+    after: int
+    at: datetime
+
+
+class Film(msgspec.Struct, frozen=True, kw_only=True):
+    """A page of a run's film. `base` is the run after `after` events, null at the very beginning;
+    `newest` is the last event there is."""
+
+    run: str
+    after: int
+    newest: int
+    base: shapes.RunShown | None
+    frames: list[Frame]
+    chapters: list[Chapter]
+
+
+async def film(reels: Reels, run: str, *, after: int) -> Film:
+    """The page that begins after `after` events, which is rounded down to a keyframe of the run.
+
+    Raises NotFound, Unavailable.
+    """
+    reel = await reels.reel(run)
+    start = after - after % APART
+    base = reel.before(start) if start else None
+    events = await reels.page(run, base.seq if base else 0)
+    frames = await reels.aside(lambda: _frames(base.run if base else None, events))
+    chapters = [Chapter(0, shapes.time(reel.keys[0].run.requested_at))]
+    chapters += [Chapter(key.seq, shapes.time(key.at)) for key in reel.keys[:-1]]
+    return Film(
+        run=run,
+        after=base.seq if base else 0,
+        newest=reel.keys[-1].seq,
+        base=shapes.shown(base.run) if base else None,
+        frames=frames,
+        chapters=chapters,
+    )
+
+
+def _frames(run: Run | None, events: Sequence[Event]) -> list[Frame]:
+    frames: list[Frame] = []
+    at = 0
+
+    def see(event: Event, told: RunEvent, before: Run | None, after: Run) -> None:
+        nonlocal at
+        at = max(at, getattr(told, "at", event.at))  # clocks may be set back; replay never is
+        frames.append(frame(event, told, before, after, at))
+
+    fold(run, events, see)
+    return frames
+
+
+def frame(event: Event, told: RunEvent, before: Run | None, after: Run, at: int) -> Frame:
+    """What one event changed."""
+    by, text = _words(told)
+    old = before.alarms if before is not None else ()
+    return Frame(
+        seq=event.seq,
+        at=shapes.time(at),
+        kind=event.kind,
+        by=by,
+        text=text,
+        head=_head(before, after),
+        actions=_actions(before, after),
+        alarms=[
+            shapes.AlarmShown(each.code, shapes.time(each.at), each.text)
+            for each in after.alarms
+            if each not in old
+        ],
+    )
+
+
+def _head(before: Run | None, after: Run) -> dict[str, Any]:
+    changed: dict[str, Any] = {}
+    for name in _HEAD:
+        now = getattr(after, name)
+        if before is None or getattr(before, name) != now:
+            changed[name] = shapes.time(now) if name.endswith(("_at", "_since")) and now else now
+    if after.stopped_by is not None and (before is None or before.stopped_by is None):
+        changed["stopped_by"] = after.stopped_by
+    return changed
+
+
+def _actions(before: Run | None, after: Run) -> dict[str, ActionFrame]:
+    old = before.actions if before is not None else {}
+    return {
+        name: _changed(old.get(name), action)
+        for name, action in after.actions.items()
+        if old.get(name) is not action and old.get(name) != action
+    }
+
+
+def _changed(before: ActionRun | None, after: ActionRun) -> ActionFrame:
+    """Visits change at their end only: the first that differs is looked for from there."""
+    total = after.older + len(after.visits)
+    known = before.older + len(before.visits) if before is not None else 0
+    first = total
+    while first > after.older:
+        place = first - 1
+        if (
+            before is not None
+            and before.older <= place < known
+            and before.visits[place - before.older] == after.visits[place - after.older]
+        ):
+            break
+        first = place
+    heard = before.messages if before is not None else ()
+    fresh = [each for each in after.messages if each not in heard]
+    return ActionFrame(
+        aid=after.aid,
+        state=after.state,
+        first=first,
+        visits=[shapes.visit(each) for each in after.visits[first - after.older :]],
+        messages=[shapes.MessageShown(shapes.time(each.at), each.text) for each in fresh],
+    )
+
+
+def _words(told: RunEvent) -> tuple[str, str]:
+    """Who, and what an event says beside its effect."""
+    match told:
+        case Requested():
+            return told.author.name, told.override.reason if told.override else ""
+        case PauseRequested() | ResumeRequested() | StopRequested():
+            return told.author.name, ""
+        case StopSent():
+            return "", told.failed or f"attempt {told.attempt}"
+        case Silent():
+            return "", told.why
+        case AlarmRaised():
+            return "", told.text
+        case Ended():
+            return "", told.detail
+        case Published() | Observed() | Proof() | Answered():
+            return "", ""
+        case _:
+            return "", ""

@@ -1,0 +1,110 @@
+"""Routes for looking back: films, marks, comparisons, statistics, files, expectations."""
+
+from collections.abc import Callable
+from typing import Annotated, Any, Final
+
+import msgspec
+from litestar import Request, Response, delete, get, patch, post
+from litestar.params import Parameter
+from litestar.response import Stream
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.errors import BadInput
+from action_assistant.runner.events import Author
+from action_assistant.runner.review import about, again
+from action_assistant.runner.review.compare import Comparison
+from action_assistant.runner.review.desk import Desk, Expectation, Format, Marked
+from action_assistant.runner.review.film import Film
+from action_assistant.runner.review.statistics import Statistics
+from action_assistant.web.access import person_of
+
+_Asking = Request[Any, Any, Any]
+_TYPES: Final[dict[str, str]] = {
+    "jsonl": "application/x-ndjson",
+    "csv": "text/csv; charset=utf-8",
+    "mcap": "application/octet-stream",
+}
+
+
+class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A run whose course shall be expected from now on, under a name."""
+
+    run: str
+    name: str
+
+
+def routes(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
+    """All routes. `desk` is there before the first request."""
+    return [*_of_one(desk), *_of_many(desk), *_expecting(desk)]
+
+
+def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
+    @get("/api/runs/{run:str}/film", summary="What every event of a run changed, a page at a time")
+    async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Film:
+        return await desk().film(run, after)
+
+    @get("/api/runs/{run:str}/marks", summary="What people noted about a run")
+    async def marks(run: str) -> Marked:
+        return await desk().marks(run)
+
+    @patch("/api/runs/{run:str}/marks", summary="Pin, note or label a run")
+    async def mark(run: str, data: about.Marks, request: _Asking) -> Marked:
+        return await desk().mark(run, data, _author(request))
+
+    @get("/api/runs/{run:str}/script", summary="What a run did, as a script for the simulator")
+    async def script(
+        run: str, action: str | None = None, fault: again.Fault | None = None
+    ) -> again.Recorded:
+        if (action is None) != (fault is None):
+            raise BadInput("A fault belongs to an action: give both, or none.")
+        return await desk().script(run, (action, fault) if action and fault else None)
+
+    @get("/api/runs/{run:str}/export", summary="A run as a file: jsonl, csv or mcap")
+    async def export(
+        run: str, form: Annotated[Format, Parameter(query="format")]
+    ) -> Response[bytes] | Stream:
+        head = {"content-disposition": f'attachment; filename="run.{form}"'}
+        if form == "jsonl":
+            await desk().reels.reel(run)
+            return Stream(desk().lines(run), media_type=_TYPES[form], headers=head)
+        content = await desk().export(run, form)
+        return Response(content, media_type=_TYPES[form], headers=head)
+
+    return [film, marks, mark, script, export]
+
+
+def _of_many(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
+    @get("/api/comparison", summary="Two runs side by side, and where they part")
+    async def comparison(a: str, b: str) -> Comparison:
+        return await desk().compare(a, b)
+
+    @get("/api/statistics", summary="The newest runs of a graph together")
+    async def statistics(
+        graph: str,
+        robot: str | None = None,
+        last: Annotated[int, Parameter(ge=1, le=1000)] = 200,
+    ) -> Statistics:
+        return await desk().statistics(graph, robot, last)
+
+    return [comparison, statistics]
+
+
+def _expecting(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
+    @get("/api/expectations", summary="Runs that shall go the same for ever")
+    async def listed() -> list[Expectation]:
+        return await desk().expectations()
+
+    @post("/api/expectations", summary="Save the course of a run as what is expected")
+    async def expect(data: Expect, request: _Asking) -> Expectation:
+        return await desk().expect(data.run, data.name, _author(request))
+
+    @delete("/api/expectations/{name:str}", summary="Expect it no more")
+    async def retire(name: str, request: _Asking) -> None:
+        await desk().retire(name, _author(request))
+
+    return [listed, expect, retire]
+
+
+def _author(request: _Asking) -> Author:
+    person = person_of(request)
+    return Author(person.id, person.name)
