@@ -16,7 +16,7 @@ from action_assistant.runner.review.compare import Comparison
 from action_assistant.runner.review.desk import Desk, Expectation, Format, Marked
 from action_assistant.runner.review.film import Film
 from action_assistant.runner.review.statistics import Statistics
-from action_assistant.web.access import person_of
+from action_assistant.web.access import Needs, person_of
 
 _Asking = Request[Any, Any, Any]
 _TYPES: Final[dict[str, str]] = {
@@ -47,7 +47,7 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
     async def marks(run: str) -> Marked:
         return await desk().marks(run)
 
-    @patch("/api/runs/{run:str}/marks", summary="Pin, note or label a run")
+    @patch("/api/runs/{run:str}/marks", summary="Pin, note or label a run", guards=[Needs("edit")])
     async def mark(run: str, data: about.Marks, request: _Asking) -> Marked:
         return await desk().mark(run, data, _author(request))
 
@@ -94,11 +94,15 @@ def _expecting(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
     async def listed() -> list[Expectation]:
         return await desk().expectations()
 
-    @post("/api/expectations", summary="Save the course of a run as what is expected")
+    @post(
+        "/api/expectations",
+        summary="Save the course of a run as what is expected",
+        guards=[Needs("edit")],
+    )
     async def expect(data: Expect, request: _Asking) -> Expectation:
         return await desk().expect(data.run, data.name, _author(request))
 
-    @delete("/api/expectations/{name:str}", summary="Expect it no more")
+    @delete("/api/expectations/{name:str}", summary="Expect it no more", guards=[Needs("edit")])
     async def retire(name: str, request: _Asking) -> None:
         await desk().retire(name, _author(request))
 
