@@ -4,6 +4,7 @@ import contextlib
 import json
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, get_args
 
 import httpx
@@ -14,7 +15,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from action_assistant.editor import wire
 from action_assistant.web.keys import Keys
-from action_assistant.web.roles import Deed, Role, allowed
+from action_assistant.web.roles import Deed, Role, allowed, may
 from support.product import TOKEN, Product, running
 
 KEYS = Keys(TOKEN)
@@ -77,6 +78,15 @@ def test_the_table_is_cumulative_and_says_what_was_agreed() -> None:
     for deed, least in LEAST.items():
         may = [role for role in ROLES if allowed(role, deed)]
         assert may == list(ROLES[ROLES.index(least) :])
+
+
+def test_the_page_has_the_same_table() -> None:
+    text = (Path(__file__).parents[2] / "frontend/src/api/roles.ts").read_text()
+    assert re.search(r"ROLES = \[([^\]]*)\]", text)[1] == ", ".join(f'"{role}"' for role in ROLES)  # type: ignore[index]
+    table = text[text.index("FROM = {") : text.index("} as const satisfies")]
+    assert dict(re.findall(r'(\w+): "(\w+)"', table)) == LEAST
+    words = text[text.index("ROLE_WORDS") :]
+    assert dict(re.findall(r'(\w+): "([^"]+)"', words)) == {role: may(role) for role in ROLES}
 
 
 @pytest.mark.parametrize("process", PROCESSES)

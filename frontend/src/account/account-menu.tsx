@@ -14,9 +14,9 @@ import {
 import { IconDeviceDesktop, IconMoon, IconSun } from "@tabler/icons-react";
 import { useState } from "react";
 import { sentence } from "../api/http";
-import { rememberedName } from "../api/session";
+import { usePerson } from "../api/person";
+import { ROLE_WORDS, rememberedName } from "../api/session";
 import { initials, personColor } from "../ui/robot";
-import { usePerson } from "./person";
 
 const schemes = [
   { value: "light", label: <IconSun size={15} aria-label="Light" /> },
@@ -75,6 +75,11 @@ export function AccountMenu() {
                 Save
               </Button>
             </Group>
+            {person.role !== "owner" && (
+              <Text size="sm" c="dimmed">
+                You are here as {person.role}: you may {ROLE_WORDS[person.role]}.
+              </Text>
+            )}
             <div>
               <Text size="sm" mb={4}>
                 Appearance

@@ -2,9 +2,9 @@
 import { Button, CloseButton, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { sentence } from "../api/http";
+import { usePerson } from "../api/person";
 import { rememberedName } from "../api/session";
 import style from "./ask-name.module.css";
-import { usePerson } from "./person";
 
 const SUGGESTION = "Operator";
 

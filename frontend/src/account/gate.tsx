@@ -10,8 +10,8 @@ import {
 } from "react";
 import { sessionEnd } from "../api/ended";
 import { Refusal, sentence } from "../api/http";
+import { PersonContext } from "../api/person";
 import { currentPerson, openSession, type Person, rename, takeToken } from "../api/session";
-import { PersonContext } from "./person";
 import { SignIn } from "./sign-in";
 import { SignInBar } from "./sign-in-bar";
 
@@ -40,7 +40,7 @@ const visitOf = (gate: Gate): number => (gate.at === "inside" ? gate.visit : 0);
 /** Whoever is inside stays the same object while they are the same: nothing below begins anew. */
 function inside(gate: Gate, person: Person): Gate & { at: "inside" } {
   const known = gate.at === "inside" ? gate.person : null;
-  const same = known?.id === person.id && known.name === person.name;
+  const same = known?.id === person.id && known.name === person.name && known.role === person.role;
   return { at: "inside", person: same ? known : person, visit: visitOf(gate) + 1 };
 }
 

@@ -1,9 +1,13 @@
 /** Who this browser is: trades the token of the link for a cookie. */
 import { ask } from "./http";
+import type { Role } from "./roles";
+
+export { type Deed, may, ROLE_WORDS, ROLES, type Role } from "./roles";
 
 export interface Person {
   id: string;
   name: string;
+  role: Role;
 }
 
 const NAME_KEY = "aa.name";
@@ -21,30 +25,24 @@ export function rememberedName(): string {
 }
 
 interface SessionAnswer {
-  person?: Person;
-  id?: string;
-  name?: string;
-}
-
-function personOf(answer: SessionAnswer): Person {
-  return answer.person ?? { id: answer.id ?? "", name: answer.name ?? "" };
+  person: Person;
 }
 
 /** Trades a token for a session. Throws `Refusal` when it is not the server's. */
 export async function openSession(token: string): Promise<Person> {
   const name = rememberedName();
   const body = name === "" ? { token } : { token, name };
-  return personOf(await ask<SessionAnswer>("/api/session", { method: "POST", body }));
+  return (await ask<SessionAnswer>("/api/session", { method: "POST", body })).person;
 }
 
 /** Who the cookie says we are. Throws a `Refusal` with status 401 without one. */
 export async function currentPerson(): Promise<Person> {
-  return personOf(await ask<SessionAnswer>("/api/session"));
+  return (await ask<SessionAnswer>("/api/session")).person;
 }
 
 /** The same session under another name. */
 export async function rename(name: string): Promise<Person> {
   const answer = await ask<SessionAnswer>("/api/session", { method: "POST", body: { name } });
   localStorage.setItem(NAME_KEY, name);
-  return personOf(answer);
+  return answer.person;
 }

@@ -6,8 +6,8 @@ import type { ReactNode } from "react";
 import { Route, Switch } from "wouter";
 import { AskName } from "../account/ask-name";
 import { Gate } from "../account/gate";
-import { usePerson } from "../account/person";
 import { Refusal } from "../api/http";
+import { usePerson } from "../api/person";
 import { LiveProvider } from "../api/use-live";
 import { StopNotice } from "../runs/stop-notice";
 import { actionCarrier } from "../ui/carry";
@@ -31,7 +31,11 @@ const client = new QueryClient({
 /** The runner hears of a new name by a new socket. */
 function Live({ children }: { children: ReactNode }) {
   const { person, visit } = usePerson();
-  return <LiveProvider who={`${visit} ${person.id} ${person.name}`}>{children}</LiveProvider>;
+  return (
+    <LiveProvider who={`${visit} ${person.id} ${person.role} ${person.name}`}>
+      {children}
+    </LiveProvider>
+  );
 }
 
 export function App() {

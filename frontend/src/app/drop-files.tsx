@@ -1,6 +1,7 @@
 /** Takes files that are dropped anywhere on the page. */
 import { IconFileImport } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useRef, useState } from "react";
+import { useMay } from "../api/person";
 import style from "./drop-files.module.css";
 import { useNewGraphs } from "./files";
 
@@ -10,9 +11,11 @@ function hasFiles(event: DragEvent): boolean {
 
 export function DropFiles({ children }: { children: ReactNode }) {
   const { take } = useNewGraphs();
+  const mayEdit = useMay("edit");
   const [over, setOver] = useState(false);
   const depth = useRef(0);
   useEffect(() => {
+    if (!mayEdit) return;
     const enter = (event: DragEvent) => {
       if (!hasFiles(event)) return;
       depth.current += 1;
@@ -43,7 +46,7 @@ export function DropFiles({ children }: { children: ReactNode }) {
     return () => {
       for (const [name, listener] of pairs) window.removeEventListener(name, listener);
     };
-  }, [take]);
+  }, [take, mayEdit]);
   return (
     <>
       {children}

@@ -3,8 +3,8 @@ import { Button } from "@mantine/core";
 import { IconMapOff } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import { Link } from "wouter";
-import { usePerson } from "../account/person";
 import { useVersions, versionName } from "../api/graphs";
+import { useMay, usePerson } from "../api/person";
 import { progressByAid } from "../api/progress";
 import { type Run, useLastRun } from "../api/runs";
 import { newestRun, useLive } from "../api/use-live";
@@ -48,9 +48,10 @@ function Inside({ id }: { id: string }) {
   const known = useMemo(() => actions.map((action) => action.template), [actions]);
   const { live, run, label, unsure } = useRunHere(id);
   const progress = useMemo(() => progressByAid(live, unsure), [live, unsure]);
+  const mayStart = useMay("simulate");
   const link = useLink();
   const { room } = useRoom();
-  const who = `${visit} ${person.name}`;
+  const who = `${visit} ${person.role} ${person.name}`;
   const entered = useRef(who);
   useEffect(() => {
     if (entered.current === who) return;
@@ -70,14 +71,16 @@ function Inside({ id }: { id: string }) {
       status={(shown: Shown) => (
         <DraftWord run={live} label={label} graph={shown.graph} seq={shown.seq} />
       )}
-      start={(shown: Shown) => (
-        <StartControl
-          graph={id}
-          seq={shown.seq}
-          obstacle={shown.obstacle}
-          compact={shown.compact}
-        />
-      )}
+      start={(shown: Shown) =>
+        mayStart && (
+          <StartControl
+            graph={id}
+            seq={shown.seq}
+            obstacle={shown.obstacle}
+            compact={shown.compact}
+          />
+        )
+      }
       strip={(shown: Shown) => (
         <RunStrip
           run={run}

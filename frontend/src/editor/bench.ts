@@ -46,6 +46,8 @@ export interface Bench {
   readonly graph: Graph;
   readonly canUndo: boolean;
   readonly canRedo: boolean;
+  /** Whether this person may change this graph; else everything that changes it is off. */
+  readonly mayEdit: boolean;
   /** Keys of actions and ends, ids of relations. */
   readonly selection: ReadonlySet<string>;
   readonly tool: Tool;

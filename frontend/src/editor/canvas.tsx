@@ -62,7 +62,15 @@ export function Canvas({ bench, canvas, me, map, onPanned }: Props) {
     () =>
       actionCarrier.onDrop(({ load, x, y }) => {
         const box = frame.current?.getBoundingClientRect();
-        if (!box || x < box.left || x > box.right || y < box.top || y > box.bottom) return;
+        if (
+          !bench.mayEdit ||
+          !box ||
+          x < box.left ||
+          x > box.right ||
+          y < box.top ||
+          y > box.bottom
+        )
+          return;
         const at = flow.screenToFlowPosition({ x, y });
         const position: Position = [Math.round(at.x - CARD.width / 2), Math.round(at.y - 24)];
         bench.select([placeAction(bench, load, position)]);
@@ -107,6 +115,8 @@ export function Canvas({ bench, canvas, me, map, onPanned }: Props) {
     >
       <ReactFlow<CanvasNode, Arrow>
         nodes={canvas.nodes}
+        nodesDraggable={bench.mayEdit}
+        nodesConnectable={bench.mayEdit}
         edges={canvas.edges}
         nodeTypes={nodeTypes}
         edgeTypes={edgeTypes}

@@ -108,6 +108,7 @@ export function Editor(props: Props) {
   useShortcuts(bench);
 
   const place = (template: NewAction) => {
+    if (!bench.mayEdit) return;
     const at = freePlace(bench);
     bench.select([placeAction(bench, template, at)]);
     bench.view.reveal(at);

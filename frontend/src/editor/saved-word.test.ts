@@ -4,6 +4,7 @@ import { savedWords } from "./saved-word";
 test("saved is said only when nothing waits and the room is live", () => {
   expect(savedWords({ state: "live", unsaved: 0, seq: 4 }).words).toBe("Saved");
   expect(savedWords({ state: "live", unsaved: 3, seq: 4 }).words).toBe("Saving 3");
+  expect(savedWords({ state: "live", unsaved: 0, seq: 4 }, false).words).toBe("View only");
   expect(savedWords({ state: "offline", unsaved: 2, seq: 4 }).words).toBe("Offline with 2 changes");
   expect(savedWords({ state: "connecting", unsaved: 0, seq: 0 }).words).toBe("Opening");
   expect(savedWords({ state: "refused", why: "no-such-graph", unsaved: 1, seq: 4 }).words).toBe(

@@ -1,7 +1,14 @@
 /** Whether what is on screen is safe, in words. */
-import { IconAlertTriangle, IconCheck, IconCloudOff, IconRefresh } from "@tabler/icons-react";
+import {
+  IconAlertTriangle,
+  IconCheck,
+  IconCloudOff,
+  IconEye,
+  IconRefresh,
+} from "@tabler/icons-react";
 import type { Link, Why } from "../room/connect";
 import { useLink, useRoom } from "../room/use-room";
+import { useBench } from "./bench";
 import style from "./saved-word.module.css";
 
 const whys: Record<Why, string> = {
@@ -16,7 +23,7 @@ const whys: Record<Why, string> = {
 };
 
 export interface Saved {
-  tone: "good" | "busy" | "off" | "bad";
+  tone: "good" | "busy" | "off" | "bad" | "view";
   words: string;
 }
 
@@ -24,13 +31,15 @@ function changes(n: number): string {
   return n === 1 ? "1 change" : `${n} changes`;
 }
 
-export function savedWords(link: Link): Saved {
+/** Who may not edit has nothing to save. */
+export function savedWords(link: Link, mayEdit = true): Saved {
   if (link.state === "refused") {
     const why = link.why ? whys[link.why] : "Refused";
     const kept = link.unsaved > 0 ? ` · ${changes(link.unsaved)} not saved` : "";
     return { tone: "bad", words: why + kept };
   }
   if (link.state === "live") {
+    if (!mayEdit && link.unsaved === 0) return { tone: "view", words: "View only" };
     return link.unsaved === 0
       ? { tone: "good", words: "Saved" }
       : { tone: "busy", words: `Saving ${link.unsaved}` };
@@ -40,12 +49,19 @@ export function savedWords(link: Link): Saved {
   return { tone: "off", words: `Offline with ${changes(link.unsaved)}` };
 }
 
-const signs = { good: IconCheck, busy: IconRefresh, off: IconCloudOff, bad: IconAlertTriangle };
+const signs = {
+  good: IconCheck,
+  busy: IconRefresh,
+  off: IconCloudOff,
+  bad: IconAlertTriangle,
+  view: IconEye,
+};
 
 export function SavedWord() {
   const link = useLink();
   const { room } = useRoom();
-  const { tone, words } = savedWords(link);
+  const { mayEdit } = useBench();
+  const { tone, words } = savedWords(link, mayEdit);
   const Sign = signs[tone];
   return (
     <span className={style.saved} data-tone={tone} role="status" title={`Moment ${link.seq}`}>

@@ -73,7 +73,14 @@ function Inside({ me, sight, progress, marks, compact, phone, run, corner }: Pro
           <Skeleton height={92} width={208} radius="lg" />
         </div>
       )}
-      {arrived && bench.graph.actions.length === 0 && (
+      {arrived && bench.graph.actions.length === 0 && !bench.mayEdit && (
+        <div className={style.empty}>
+          <Empty icon={<IconRouteAltLeft size={22} />} title="Nothing is drawn yet">
+            What the others draw appears here. You are here to look.
+          </Empty>
+        </div>
+      )}
+      {arrived && bench.graph.actions.length === 0 && bench.mayEdit && (
         <div className={style.empty}>
           <Empty
             icon={<IconRouteAltLeft size={22} />}

@@ -15,7 +15,7 @@ import {
   zoomIn,
   zoomOut,
 } from "./deeds/all";
-import { type Deed, keysOf } from "./deeds/deed";
+import { type Deed, isEnabled, keysOf, labelOf } from "./deeds/deed";
 import style from "./toolbar.module.css";
 
 function Shortcut({ deed }: { deed: Deed }) {
@@ -37,7 +37,7 @@ function Tool({ deed, pressed }: { deed: Deed; pressed?: boolean }) {
     <Tooltip
       label={
         <>
-          {deed.label} <Shortcut deed={deed} />
+          {labelOf(deed, bench)} <Shortcut deed={deed} />
         </>
       }
     >
@@ -48,7 +48,7 @@ function Tool({ deed, pressed }: { deed: Deed; pressed?: boolean }) {
         aria-pressed={pressed}
         data-pressed={pressed || undefined}
         className={style.tool ?? ""}
-        disabled={!deed.enabled(bench)}
+        disabled={!isEnabled(deed, bench)}
         onClick={() => deed.run(bench)}
       >
         <Sign size={17} aria-hidden />
@@ -79,10 +79,10 @@ export function DeedMenu() {
               key={deed.name}
               leftSection={<Sign size={16} aria-hidden />}
               rightSection={<Shortcut deed={deed} />}
-              disabled={!deed.enabled(bench)}
+              disabled={!isEnabled(deed, bench)}
               onClick={() => deed.run(bench)}
             >
-              {deed.label}
+              {labelOf(deed, bench)}
             </Menu.Item>
           );
         })}

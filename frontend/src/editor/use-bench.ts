@@ -1,6 +1,7 @@
 /** The state of an open editor, and the bench that deeds work on. */
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
-import { useGraph, useRoom, useUndo } from "../room/use-room";
+import { useMay } from "../api/person";
+import { useGraph, useLink, useRoom, useUndo } from "../room/use-room";
 import { CARD } from "../ui/canvas/arrange";
 import { type AddRequest, type Bench, freePlace, type Panel, type Tool, type View } from "./bench";
 
@@ -42,6 +43,9 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   const { doc, undo, presence } = useRoom();
   const graph = useGraph();
   const { canUndo, canRedo } = useUndo();
+  const role = useMay("edit");
+  const { readOnly } = useLink();
+  const mayEdit = role && readOnly === undefined;
   const [selection, setSelection] = useState(NONE);
   const [tool, setTool] = useState<Tool>("pan");
   const [panel, setPanelNow] = useState<Panel>("details");
@@ -65,6 +69,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   );
   const latest = useRef<Bench | null>(null);
   const openAdd = useCallback((request?: AddRequest) => {
+    if (latest.current?.mayEdit === false) return;
     if (request || latest.current === null) {
       setAdding(request ?? null);
       return;
@@ -82,6 +87,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
       graph,
       canUndo,
       canRedo,
+      mayEdit,
       selection,
       tool,
       select,
@@ -101,7 +107,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
       sizes: () => sight.current.sizes(),
       download: () => download(id, graph.name),
     }),
-    [doc, undo, graph, canUndo, canRedo, selection, tool, select, setPanel, openAdd, id],
+    [doc, undo, graph, canUndo, canRedo, mayEdit, selection, tool, select, setPanel, openAdd, id],
   );
   latest.current = bench;
   return { bench, panel, adding, sight, closeAdd };

@@ -127,7 +127,12 @@ test("the text of a piece is UMRF with the values as they were spelled", () => {
     name: "Check",
     instance_id: 0,
     required: false,
-    conditions: ["on_true -> run", "on_false -> ignore", "on_error -> bypass", "on_stopped -> ignore"],
+    conditions: [
+      "on_true -> run",
+      "on_false -> ignore",
+      "on_error -> bypass",
+      "on_stopped -> ignore",
+    ],
   });
   expect(umrf.actions[0].children).toEqual([
     { name: "Drive", instance_id: 0, remap: [{ from: "level", to: "speed" }] },

@@ -32,7 +32,9 @@ function written(tree: Tree, indent: string): string {
     return `[\n${tree.map((item) => inner + written(item, inner)).join(",\n")}\n${indent}]`;
   }
   if (tree.size === 0) return "{}";
-  const members = [...tree].map(([name, value]) => `${inner}${text(name)}: ${written(value, inner)}`);
+  const members = [...tree].map(
+    ([name, value]) => `${inner}${text(name)}: ${written(value, inner)}`,
+  );
   return `{\n${members.join(",\n")}\n${indent}}`;
 }
 
@@ -97,7 +99,10 @@ function actionOf(
         ...named(relation.child),
         relation.remap.length === 0
           ? null
-          : ["remap", relation.remap.map((r) => fields(["from", text(r.source)], ["to", text(r.target)]))],
+          : [
+              "remap",
+              relation.remap.map((r) => fields(["from", text(r.source)], ["to", text(r.target)])),
+            ],
         ...relation.childrenExtra,
       ),
     );

@@ -13,6 +13,7 @@ import {
   renameGraph,
 } from "../api/graphs";
 import { sentence } from "../api/http";
+import { useMay } from "../api/person";
 import style from "./home.module.css";
 
 /** "x copy", "x copy 2" …: the first that no graph is called. */
@@ -98,6 +99,7 @@ function Rename({ graph, onClose }: RenameProps) {
 
 export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readonly string[] }) {
   const client = useQueryClient();
+  const mayEdit = useMay("edit");
   const [renaming, setRenaming] = useState(false);
   const duplicate = () =>
     attempt(client, "Not duplicated", () => duplicateGraph(graph.id, copyName(graph.name, names)));
@@ -114,10 +116,19 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
           </button>
         </Menu.Target>
         <Menu.Dropdown>
-          <Menu.Item leftSection={<IconPencil size={15} />} onClick={() => setRenaming(true)}>
+          {!mayEdit && <Menu.Label>View only</Menu.Label>}
+          <Menu.Item
+            leftSection={<IconPencil size={15} />}
+            disabled={!mayEdit}
+            onClick={() => setRenaming(true)}
+          >
             Rename …
           </Menu.Item>
-          <Menu.Item leftSection={<IconCopy size={15} />} onClick={() => void duplicate()}>
+          <Menu.Item
+            leftSection={<IconCopy size={15} />}
+            disabled={!mayEdit}
+            onClick={() => void duplicate()}
+          >
             Duplicate
           </Menu.Item>
           <Menu.Item
@@ -131,6 +142,7 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
           <Menu.Item
             color="red"
             leftSection={<IconTrash size={15} />}
+            disabled={!mayEdit}
             onClick={() => void remove()}
           >
             Delete

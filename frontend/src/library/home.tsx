@@ -4,6 +4,7 @@ import { IconAlertTriangle, IconFileImport, IconPlus } from "@tabler/icons-react
 import { Link } from "wouter";
 import { type GraphSummary, useGraphs } from "../api/graphs";
 import { sentence } from "../api/http";
+import { useMay } from "../api/person";
 import { endWords, runWord } from "../api/progress";
 import { newestRun, useLive } from "../api/use-live";
 import { Empty } from "../ui/empty";
@@ -82,6 +83,7 @@ function Skeletons() {
 }
 
 export function Home({ onNew, onImport }: Props) {
+  const mayEdit = useMay("edit");
   const graphs = useGraphs();
   const list = graphs.data ?? [];
   return (
@@ -95,14 +97,16 @@ export function Home({ onNew, onImport }: Props) {
               simulator, and look at what happened. The examples below show one idea each.
             </p>
           </div>
-          <div className={style.buttons}>
-            <Button leftSection={<IconFileImport size={16} />} onClick={onImport}>
-              Import a file
-            </Button>
-            <Button variant="filled" leftSection={<IconPlus size={16} />} onClick={onNew}>
-              New graph
-            </Button>
-          </div>
+          {mayEdit && (
+            <div className={style.buttons}>
+              <Button leftSection={<IconFileImport size={16} />} onClick={onImport}>
+                Import a file
+              </Button>
+              <Button variant="filled" leftSection={<IconPlus size={16} />} onClick={onNew}>
+                New graph
+              </Button>
+            </div>
+          )}
         </div>
         {graphs.isPending && <Skeletons />}
         {graphs.isError && (
@@ -115,12 +119,16 @@ export function Home({ onNew, onImport }: Props) {
             icon={<IconPlus size={22} />}
             title="No graph yet"
             action={
-              <Button variant="filled" onClick={onNew}>
-                New graph
-              </Button>
+              mayEdit && (
+                <Button variant="filled" onClick={onNew}>
+                  New graph
+                </Button>
+              )
             }
           >
-            Begin with an empty one, or drop a UMRF file anywhere on this page.
+            {mayEdit
+              ? "Begin with an empty one, or drop a UMRF file anywhere on this page."
+              : "What the others make appears here."}
           </Empty>
         )}
         {list.length > 0 && (

@@ -3,6 +3,7 @@ import { ActionIcon, Kbd, TextInput, Tooltip } from "@mantine/core";
 import { IconFileImport, IconGripVertical, IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { useGraphs } from "../api/graphs";
+import { useMay } from "../api/person";
 import type { NewAction } from "../graph/edit";
 import { actionCarrier } from "../ui/carry";
 import { GraphRow, RowSkeletons } from "./graph-rows";
@@ -74,6 +75,7 @@ function ActionList({ search, onPlace }: { search: string; onPlace: (t: NewActio
 
 export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
   const [search, setSearch] = useState("");
+  const mayEdit = useMay("edit");
   const graphs = useGraphs();
   const shown = (graphs.data ?? []).filter((graph) => fits(search, graph.name, graph.description));
   return (
@@ -90,16 +92,20 @@ export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
       <div className={style.scroll}>
         <div className={style.heading}>
           <h2>Graphs</h2>
-          <Tooltip label="Import a file">
-            <ActionIcon size="sm" aria-label="Import a file" onClick={onImport}>
-              <IconFileImport size={15} />
-            </ActionIcon>
-          </Tooltip>
-          <Tooltip label="New graph">
-            <ActionIcon size="sm" aria-label="New graph" onClick={onNew}>
-              <IconPlus size={15} />
-            </ActionIcon>
-          </Tooltip>
+          {mayEdit && (
+            <>
+              <Tooltip label="Import a file">
+                <ActionIcon size="sm" aria-label="Import a file" onClick={onImport}>
+                  <IconFileImport size={15} />
+                </ActionIcon>
+              </Tooltip>
+              <Tooltip label="New graph">
+                <ActionIcon size="sm" aria-label="New graph" onClick={onNew}>
+                  <IconPlus size={15} />
+                </ActionIcon>
+              </Tooltip>
+            </>
+          )}
         </div>
         {graphs.isPending && <RowSkeletons count={4} />}
         <nav aria-label="Graphs">
@@ -110,7 +116,7 @@ export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
         {graphs.isSuccess && shown.length === 0 && (
           <p className={style.hint}>{search === "" ? "No graph yet." : "No graph is called so."}</p>
         )}
-        {onPlace && (
+        {onPlace && mayEdit && (
           <>
             <div className={style.heading}>
               <h2>Actions</h2>

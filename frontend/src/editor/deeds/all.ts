@@ -30,6 +30,7 @@ export const add: Deed = {
   label: "Add an action",
   shortcuts: ["a"],
   icon: IconPlus,
+  changes: true,
   enabled: always,
   run: (bench) => bench.openAdd(),
 };
@@ -39,6 +40,7 @@ export const remove: Deed = {
   label: "Delete",
   shortcuts: ["Delete", "Backspace"],
   icon: IconTrash,
+  changes: true,
   enabled: (bench) => selectedActions(bench).length + selectedRelations(bench).length > 0,
   run: (bench) => {
     const actions = selectedActions(bench).map((action) => action.key);
@@ -56,6 +58,7 @@ export const duplicate: Deed = {
   label: "Duplicate",
   shortcuts: ["Mod+d"],
   icon: IconCopyPlus,
+  changes: true,
   enabled: (bench) => selectedActions(bench).length > 0,
   run: (bench) => {
     const places = bench.places();
@@ -82,6 +85,7 @@ export const undo: Deed = {
   label: "Undo",
   shortcuts: ["Mod+z"],
   icon: IconArrowBackUp,
+  changes: true,
   enabled: (bench) => bench.canUndo,
   run: (bench) => bench.undo.undo(),
 };
@@ -91,6 +95,7 @@ export const redo: Deed = {
   label: "Redo",
   shortcuts: ["Mod+Shift+z", "Mod+y"],
   icon: IconArrowForwardUp,
+  changes: true,
   enabled: (bench) => bench.canRedo,
   run: (bench) => bench.undo.redo(),
 };
@@ -100,6 +105,7 @@ export const tidy: Deed = {
   label: "Tidy",
   shortcuts: ["Shift+t"],
   icon: IconLayoutDistributeVertical,
+  changes: true,
   enabled: anyAction,
   run: (bench) => {
     moveActions(bench.doc, arrange(bench.graph, bench.sizes()));
@@ -112,6 +118,7 @@ export const selectAll: Deed = {
   label: "Select all",
   shortcuts: ["Mod+a"],
   icon: IconSelectAll,
+  changes: false,
   enabled: anyAction,
   run: (bench) => bench.select([ENTRY, EXIT, ...bench.graph.actions.map((action) => action.key)]),
 };
@@ -121,6 +128,7 @@ export const fit: Deed = {
   label: "Fit",
   shortcuts: ["f", "Shift+!"],
   icon: IconFocusCentered,
+  changes: false,
   enabled: always,
   run: (bench) => bench.view.fit(),
 };
@@ -130,6 +138,7 @@ export const zoomIn: Deed = {
   label: "Zoom in",
   shortcuts: ["="],
   icon: IconZoomIn,
+  changes: false,
   enabled: always,
   run: (bench) => bench.view.zoomIn(),
 };
@@ -139,6 +148,7 @@ export const zoomOut: Deed = {
   label: "Zoom out",
   shortcuts: ["-"],
   icon: IconZoomOut,
+  changes: false,
   enabled: always,
   run: (bench) => bench.view.zoomOut(),
 };
@@ -148,6 +158,7 @@ export const pan: Deed = {
   label: "Pan",
   shortcuts: ["h"],
   icon: IconHandStop,
+  changes: false,
   enabled: always,
   run: (bench) => bench.setTool("pan"),
 };
@@ -157,6 +168,7 @@ export const marquee: Deed = {
   label: "Select",
   shortcuts: ["v"],
   icon: IconMarquee2,
+  changes: false,
   enabled: always,
   run: (bench) => bench.setTool("select"),
 };
@@ -166,6 +178,7 @@ export const showJson: Deed = {
   label: "Show the JSON",
   shortcuts: ["j"],
   icon: IconBraces,
+  changes: false,
   enabled: always,
   run: (bench) => bench.setPanel("json"),
 };
@@ -175,6 +188,7 @@ export const exportUmrf: Deed = {
   label: "Export as UMRF",
   shortcuts: ["Mod+s"],
   icon: IconDownload,
+  changes: false,
   enabled: always,
   run: (bench) => bench.download(),
 };

@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
+import type { Bench } from "../bench";
 import { DEEDS } from "./all";
-import { deedFor, isPressed, keysOf } from "./deed";
+import { deedFor, isEnabled, isPressed, keysOf, labelOf } from "./deed";
 
 const press = (
   key: string,
@@ -33,4 +34,21 @@ test("Mod is the command key on a Mac", () => {
   expect(isPressed("Mod+z", press("z", { metaKey: true }), true)).toBe(true);
   expect(isPressed("Mod+z", press("z", { ctrlKey: true }), true)).toBe(false);
   expect(keysOf("Mod+Shift+z", true)).toEqual(["⌘", "⇧", "Z"]);
+});
+
+test("who may only look is offered nothing that changes the graph, and told why", () => {
+  const bench = {
+    mayEdit: false,
+    canUndo: true,
+    canRedo: true,
+    graph: { actions: [{ key: "a" }], relations: [] },
+    selection: new Set(["a"]),
+  } as unknown as Bench;
+  const off = DEEDS.filter((deed) => !isEnabled(deed, bench));
+  expect(off.map((deed) => deed.name)).toEqual(
+    DEEDS.filter((deed) => deed.changes).map((deed) => deed.name),
+  );
+  expect(off.length).toBeGreaterThan(4);
+  for (const deed of off) expect(labelOf(deed, bench)).toBe(`${deed.label} (view only)`);
+  for (const deed of off) expect(isEnabled(deed, { ...bench, mayEdit: true })).toBe(true);
 });

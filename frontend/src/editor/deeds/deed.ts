@@ -8,8 +8,20 @@ export interface Deed {
   /** `Mod` is Ctrl, and ⌘ on a Mac. The first is shown; all work. */
   readonly shortcuts: readonly string[];
   readonly icon: Icon;
+  /** Whether it changes the graph, which not everybody may. */
+  readonly changes: boolean;
   enabled(bench: Bench): boolean;
   run(bench: Bench): void;
+}
+
+/** Whether it can be done now, by this person. */
+export function isEnabled(deed: Deed, bench: Bench): boolean {
+  return (!deed.changes || bench.mayEdit) && deed.enabled(bench);
+}
+
+/** What it is called, and why it is off when that is not to be seen on the canvas. */
+export function labelOf(deed: Deed, bench: Bench): string {
+  return deed.changes && !bench.mayEdit ? `${deed.label} (view only)` : deed.label;
 }
 
 const onMac = typeof navigator !== "undefined" && /Mac|iP(hone|ad)/.test(navigator.platform);

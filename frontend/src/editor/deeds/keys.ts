@@ -2,7 +2,7 @@
 import { useEffect, useRef } from "react";
 import type { Bench } from "../bench";
 import { DEEDS } from "./all";
-import { deedFor } from "./deed";
+import { deedFor, isEnabled } from "./deed";
 
 /** Whether keys belong to what has the focus. */
 function isTaken(target: EventTarget | null): boolean {
@@ -43,7 +43,7 @@ export function useShortcuts(bench: Bench): void {
       if (deed === null) return;
       // What a deed takes is also kept from the browser while the deed has nothing to do.
       event.preventDefault();
-      if (deed.enabled(now.current)) deed.run(now.current);
+      if (isEnabled(deed, now.current)) deed.run(now.current);
     };
     window.addEventListener("keydown", onKey);
     return () => window.removeEventListener("keydown", onKey);

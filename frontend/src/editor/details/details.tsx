@@ -75,8 +75,11 @@ export function Details({ id, seq, panel, problems }: Props) {
         </Tabs.Tab>
       </Tabs.List>
       <Tabs.Panel value="details" className={style.panel ?? ""}>
-        <ProblemsHere problems={problems} />
-        <Properties />
+        {/* A fieldset switches off every field and button in it, also those that come later. */}
+        <fieldset className={style.fields} disabled={!bench.mayEdit}>
+          <ProblemsHere problems={problems} />
+          <Properties />
+        </fieldset>
       </Tabs.Panel>
       <Tabs.Panel value="json" className={style.panel ?? ""} data-fill>
         <JsonView graph={id} seq={seq} />

@@ -52,7 +52,7 @@ function ProblemItem({ problem, jumps }: { problem: Problem; jumps: boolean }) {
         )}
       </div>
       <p>{problem.message}</p>
-      {fix !== null && (
+      {fix !== null && bench.mayEdit && (
         <Button
           size="compact-sm"
           mt={6}
@@ -115,7 +115,7 @@ export function ProblemList({ problems, seq }: Props) {
           <IconCircleCheck size={18} aria-hidden /> No problem found.
         </p>
       )}
-      {safe > 1 && (
+      {safe > 1 && bench.mayEdit && (
         <Button
           fullWidth
           mb="sm"

@@ -1,6 +1,6 @@
-/** Who is signed in, for every feature below. */
+/** Who is signed in, for every feature. */
 import { createContext, use } from "react";
-import type { Person } from "../api/session";
+import { type Deed, may, type Person } from "./session";
 
 export interface PersonHold {
   person: Person;
@@ -15,4 +15,9 @@ export function usePerson(): PersonHold {
   const hold = use(PersonContext);
   if (hold === null) throw new Error("usePerson needs a signed-in page around it");
   return hold;
+}
+
+/** Whether the one who is signed in may do this. */
+export function useMay(deed: Deed): boolean {
+  return may(usePerson().person.role, deed);
 }
