@@ -1,7 +1,7 @@
 /** Graphs, versions and problems as the editor answers them. */
 import { type QueryClient, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
-import { ask, askText } from "./http";
+import { ask, askMoment, askText } from "./http";
 
 export interface Config {
   mode: string;
@@ -152,6 +152,32 @@ export function recoverGraph(id: string): Promise<unknown> {
 
 export function graphText(id: string): Promise<string> {
   return askText(`/api/graphs/${encodeURIComponent(id)}/umrf`);
+}
+
+/** The text of a graph as it is, and the moment that it is of. */
+export function graphMoment(id: string): Promise<{ text: string; seq: number }> {
+  return askMoment(`/api/graphs/${encodeURIComponent(id)}/umrf`);
+}
+
+/** One key of the document; a value that is not there is `undefined`. */
+export interface KeyChange {
+  root: string;
+  key: string;
+  before?: unknown;
+  after?: unknown;
+}
+
+/** What an edited text would change, and the errors that would come with it. */
+export interface Rewriting {
+  seq: number;
+  changes: KeyChange[];
+  problems: Problem[];
+}
+
+/** What the text, edited from that of the moment `seq`, would change. Nothing is stored. */
+export function rewritingOf(id: string, seq: number, text: string): Promise<Rewriting> {
+  const route = `/api/graphs/${encodeURIComponent(id)}/rewriting?seq=${seq}`;
+  return ask(route, { method: "POST", body: text });
 }
 
 /** The version of what the page shows at `seq`, as text, because its numbers must stay as written. */

@@ -92,6 +92,13 @@ export async function askText(url: string, request: Ask = {}): Promise<string> {
   return response.text();
 }
 
+/** The text that a route answers, and which moment of the graph it is of. */
+export async function askMoment(url: string): Promise<{ text: string; seq: number }> {
+  const response = await send(url, {});
+  if (!response.ok) throw new Refusal(await problemOf(response));
+  return { text: await response.text(), seq: Number(response.headers.get("x-seq")) };
+}
+
 /** One sentence for people, whatever went wrong. */
 export function sentence(error: unknown): string {
   return error instanceof Error ? error.message : String(error);

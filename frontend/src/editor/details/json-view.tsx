@@ -1,57 +1,166 @@
-/** The graph as UMRF JSON, in step with what is selected. */
-import { ActionIcon, CopyButton, Skeleton, Tooltip } from "@mantine/core";
-import { IconCheck, IconCopy } from "@tabler/icons-react";
-import { useQuery } from "@tanstack/react-query";
-import { useEffect, useMemo, useRef } from "react";
-import { graphText } from "../../api/graphs";
+/** The graph as UMRF JSON: in step with what is selected, and a way to edit it. */
+import { ActionIcon, Button, CopyButton, Kbd, Skeleton, Tooltip } from "@mantine/core";
+import { IconAlertTriangle, IconCheck, IconCopy } from "@tabler/icons-react";
+import { lazy, type ReactNode, Suspense, useMemo, useState } from "react";
+import type { KeyChange } from "../../api/graphs";
 import { sentence } from "../../api/http";
 import { selectedActions, useBench } from "../bench";
-import { type Piece, pieces, rangeOf } from "./json-pieces";
+import { keysOf } from "../deeds/deed";
+import type { Fault } from "./json-editor";
+import { actionAt, rangeOf } from "./json-places";
 import style from "./json-view.module.css";
+import { collisions, places, rewrite } from "./rewrite";
+import { useJson, type Verdict } from "./use-json";
 
-const MOST_LINES = 4000;
+const JsonEditor = lazy(() => import("./json-editor"));
+const NO_FAULTS: readonly Fault[] = [];
 
-function Line({ line, marked }: { line: readonly Piece[]; marked: boolean }) {
+function faultsOf(verdict: Verdict): readonly Fault[] {
+  return verdict.kind === "wrong" ? [verdict.fault] : NO_FAULTS;
+}
+
+const counted = (n: number, word: string) => (n === 1 ? `1 ${word}` : `${n} ${word}s`);
+
+function VerdictWords({ verdict, onShow }: { verdict: Verdict; onShow: readonly string[] }) {
+  switch (verdict.kind) {
+    case "checking":
+      return <p className={style.quiet}>Checking …</p>;
+    case "unknown":
+      return (
+        <p data-tone="warning">
+          It cannot be checked now: {verdict.why} Your text is kept in this page.
+        </p>
+      );
+    case "wrong":
+      return (
+        <p data-tone="error">
+          <IconAlertTriangle size={14} aria-hidden /> Line {verdict.fault.line + 1}:{" "}
+          {verdict.fault.message} Nothing is changed until this is right.
+        </p>
+      );
+    case "fits": {
+      const { changes, problems } = verdict.rewriting;
+      if (changes.length === 0) return <p className={style.quiet}>This says the same as before.</p>;
+      const some = onShow.slice(0, 3).join(", ");
+      const more = onShow.length > 3 ? ` and ${onShow.length - 3} more` : "";
+      return (
+        <>
+          <p>
+            Changes {some}
+            {more}.
+          </p>
+          {problems.map((problem) => (
+            <p key={`${problem.code} ${problem.message}`} data-tone="warning">
+              <b>{problem.code}</b> {problem.message}
+            </p>
+          ))}
+        </>
+      );
+    }
+  }
+}
+
+interface MeanwhileProps {
+  names: readonly string[];
+  onRest: (() => void) | null;
+  onAll: () => void;
+  onBack: () => void;
+}
+
+/** Others changed the same meanwhile: never written over silently. */
+function Meanwhile({ names, onRest, onAll, onBack }: MeanwhileProps) {
   return (
-    <div className={style.line} data-marked={marked || undefined}>
-      {line.map((piece, i) => (
-        // biome-ignore lint/suspicious/noArrayIndexKey: pieces of a line have no other name
-        <span key={i} data-kind={piece.kind}>
-          {piece.text}
-        </span>
-      ))}
-      {"\n"}
+    <div className={style.foot} role="alertdialog" aria-label="Changed meanwhile">
+      <p data-tone="warning">
+        <IconAlertTriangle size={14} aria-hidden /> Somebody changed {names.join(", ")} since you
+        began. What shall stay?
+      </p>
+      <div className={style.buttons}>
+        <Button size="compact-sm" onClick={onAll}>
+          Mine
+        </Button>
+        <Button size="compact-sm" disabled={onRest === null} onClick={onRest ?? undefined}>
+          Theirs, and the rest of mine
+        </Button>
+        <Button size="compact-sm" variant="subtle" onClick={onBack}>
+          Look again
+        </Button>
+      </div>
     </div>
   );
 }
 
 export function JsonView({ graph, seq }: { graph: string; seq: number }) {
   const bench = useBench();
-  const frame = useRef<HTMLPreElement>(null);
-  const text = useQuery({
-    queryKey: ["graphs", graph, "json", seq],
-    queryFn: () => graphText(graph),
-    placeholderData: (before) => before,
-    staleTime: Number.POSITIVE_INFINITY,
-    gcTime: 30_000,
-  });
+  const json = useJson(graph, seq);
+  const { text, draft, verdict } = json;
+  const [asking, setAsking] = useState<readonly KeyChange[] | null>(null);
+  const lines = useMemo(() => (text ?? "").split("\n"), [text]);
   const [selected] = selectedActions(bench);
-  const lines = useMemo(() => pieces(text.data ?? ""), [text.data]);
+  const name = selected?.name;
+  const instanceId = selected?.instanceId;
   const marked = useMemo(
-    () => (selected ? rangeOf(text.data ?? "", selected.name, selected.instanceId) : null),
-    [text.data, selected],
+    () =>
+      name === undefined || instanceId === undefined ? null : rangeOf(lines, { name, instanceId }),
+    [lines, name, instanceId],
   );
-  const first = marked?.[0];
-  useEffect(() => {
-    if (first === undefined) return;
-    frame.current?.children[first]?.scrollIntoView({ block: "start" });
-  }, [first]);
-  if (text.isError) return <p>{sentence(text.error)}</p>;
-  if (!text.data) return <Skeleton height={200} />;
+  const faults = useMemo(() => (draft ? faultsOf(verdict) : NO_FAULTS), [draft, verdict]);
+  const changes = verdict.kind === "fits" && draft ? verdict.rewriting.changes : [];
+  const write = (some: readonly KeyChange[]) => {
+    rewrite(bench.doc, some);
+    setAsking(null);
+    json.done();
+  };
+  const apply = () => {
+    if (changes.length === 0) return;
+    const taken = collisions(bench.doc, changes);
+    if (taken.length === 0) write(changes);
+    else setAsking(taken);
+  };
+  const follow = (line: number) => {
+    const action = actionAt(bench.graph, lines, line);
+    if (action && !bench.selection.has(action.key)) bench.select([action.key]);
+  };
+  if (json.error && text === undefined) return <p>{sentence(json.error)}</p>;
+  if (text === undefined) return <Skeleton height={200} />;
+  let foot: ReactNode = null;
+  if (asking !== null) {
+    const rest = changes.filter((change) => !asking.includes(change));
+    foot = (
+      <Meanwhile
+        names={places(bench.graph, asking)}
+        onRest={rest.length > 0 ? () => write(rest) : null}
+        onAll={() => write(changes)}
+        onBack={() => setAsking(null)}
+      />
+    );
+  } else if (draft) {
+    foot = (
+      <section className={style.foot} aria-label="Your edit of the JSON">
+        <div className={style.words} role="status">
+          <VerdictWords verdict={verdict} onShow={places(bench.graph, changes)} />
+        </div>
+        <div className={style.buttons}>
+          <Button
+            size="compact-sm"
+            variant="filled"
+            disabled={changes.length === 0}
+            onClick={apply}
+            rightSection={<Kbd>{keysOf("Mod+Enter").join(" ")}</Kbd>}
+          >
+            {changes.length === 0 ? "Apply" : `Apply ${counted(changes.length, "change")}`}
+          </Button>
+          <Button size="compact-sm" variant="subtle" onClick={json.discard}>
+            Discard
+          </Button>
+        </div>
+      </section>
+    );
+  }
   return (
     <div className={style.json}>
       <div className={style.copy}>
-        <CopyButton value={text.data}>
+        <CopyButton value={text}>
           {({ copied, copy }) => (
             <Tooltip label={copied ? "Copied" : "Copy all"}>
               <ActionIcon onClick={copy} aria-label="Copy the JSON">
@@ -61,18 +170,18 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
           )}
         </CopyButton>
       </div>
-      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: so that it scrolls by keyboard */}
-      <pre ref={frame} className={style.text} tabIndex={0}>
-        {lines.slice(0, MOST_LINES).map((line, i) => (
-          <Line
-            // biome-ignore lint/suspicious/noArrayIndexKey: a line is its number
-            key={i}
-            line={line}
-            marked={marked !== null && i >= marked[0] && i <= marked[1]}
-          />
-        ))}
-        {lines.length > MOST_LINES && <div>… {lines.length - MOST_LINES} more lines: export</div>}
-      </pre>
+      <Suspense fallback={<Skeleton height="100%" />}>
+        <JsonEditor
+          text={text}
+          readOnly={false}
+          faults={faults}
+          marked={marked}
+          onChange={json.edit}
+          onLine={follow}
+          onApply={apply}
+        />
+      </Suspense>
+      {foot}
     </div>
   );
 }

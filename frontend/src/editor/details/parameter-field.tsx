@@ -1,20 +1,25 @@
 /** One parameter as a form field that fits its type. */
 import { ActionIcon, SegmentedControl, Select, Tooltip } from "@mantine/core";
-import { IconBackspace, IconLock, IconTrash } from "@tabler/icons-react";
-import type { ReactNode } from "react";
-import { removeParameter, setParameter } from "../../graph/edit";
+import { IconAdjustments, IconBackspace, IconLock } from "@tabler/icons-react";
+import { type ReactNode, useState } from "react";
+import { setParameter } from "../../graph/edit";
 import type { Side } from "../../graph/layout";
 import type { Key, Parameter } from "../../graph/model";
 import { pathWords } from "../../ui/canvas/value-text";
 import { useBench } from "../bench";
 import { DraftInput } from "../draft-input";
 import style from "./details.module.css";
+import { ParameterSettings } from "./parameter-settings";
 import { complaint, type Field, fieldOf, shown, typed, withValue } from "./pvf";
 
 interface Props {
   owner: Key;
   side: Side;
   parameter: Parameter;
+  /** What it is called within its group. */
+  name: string;
+  /** The others of its side. */
+  others: readonly Parameter[];
 }
 
 const hints: Partial<Record<string, string>> = {
@@ -23,19 +28,20 @@ const hints: Partial<Record<string, string>> = {
   bools: "true or false on each line",
 };
 
-function Label({
-  parameter,
-  field,
-  onRemove,
-}: {
-  parameter: Parameter;
+interface LabelProps {
+  name: string;
+  /** With its groups. */
+  fullName: string;
   field: Field;
-  onRemove: () => void;
-}) {
+  open: boolean;
+  onOpen: () => void;
+}
+
+function Label({ name, fullName, field, open, onOpen }: LabelProps) {
   return (
     <span className={style.label}>
-      <span className={style.path} title={pathWords(parameter.path)}>
-        {pathWords(parameter.path)}
+      <span className={style.path} title={fullName}>
+        {name}
       </span>
       <span className={style.type}>
         {field.type ?? "no type"}
@@ -46,32 +52,69 @@ function Label({
           <IconLock size={12} aria-label="locked" />
         </Tooltip>
       )}
-      <Tooltip label="Remove this parameter">
+      <Tooltip label="Name, type, allowed values …">
         <ActionIcon
-          size={18}
+          size={24}
           className={style.remove ?? ""}
-          aria-label={`Remove the parameter ${pathWords(parameter.path)}`}
-          onClick={onRemove}
+          aria-label={`What the parameter ${fullName} is`}
+          aria-expanded={open}
+          onClick={(event) => {
+            event.preventDefault();
+            onOpen();
+          }}
         >
-          <IconTrash size={12} />
+          <IconAdjustments size={14} />
         </ActionIcon>
       </Tooltip>
     </span>
   );
 }
 
-export function ParameterField({ owner, side, parameter }: Props) {
+export function ParameterField({ owner, side, parameter, name, others }: Props) {
   const { doc } = useBench();
+  const [open, setOpen] = useState(false);
   const field = fieldOf(parameter.text);
-  const write = (text: string) => setParameter(doc, owner, side, parameter.path, text);
   const label: ReactNode = (
     <Label
-      parameter={parameter}
+      name={name}
+      fullName={pathWords(parameter.path)}
       field={field}
-      onRemove={() => removeParameter(doc, owner, side, parameter.path)}
+      open={open}
+      onOpen={() => setOpen(!open)}
     />
   );
-  const name = pathWords(parameter.path);
+  return (
+    <div className={style.parameter}>
+      <Value
+        label={label}
+        name={pathWords(parameter.path)}
+        field={field}
+        parameter={parameter}
+        write={(text) => setParameter(doc, owner, side, parameter.path, text)}
+      />
+      {open && (
+        <ParameterSettings
+          owner={owner}
+          side={side}
+          parameter={parameter}
+          others={others}
+          onClose={() => setOpen(false)}
+        />
+      )}
+    </div>
+  );
+}
+
+interface ValueProps {
+  label: ReactNode;
+  name: string;
+  field: Field;
+  parameter: Parameter;
+  write: (text: string) => void;
+}
+
+/** The value, as the form field that fits its type. */
+function Value({ label, name, field, parameter, write }: ValueProps) {
   if (field.native === null) {
     return (
       <DraftInput

@@ -2,44 +2,37 @@
 import { Button, Group, Select, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
-import { addParameter } from "../../graph/edit";
+import { addParameter, together } from "../../graph/edit";
 import type { Side } from "../../graph/layout";
 import type { Action } from "../../graph/model";
+import { pathWords } from "../../ui/canvas/value-text";
 import { useBench } from "../bench";
 import style from "./details.module.css";
 import { ParameterField } from "./parameter-field";
-import { fresh, TYPES } from "./pvf";
+import { type Family, families, pathFrom, taken } from "./parameter-path";
+import { fresh, GROUPS, TYPES } from "./pvf";
 
-/** `pose.position.x` as a path. */
-export function pathFrom(words: string): string {
-  return words
-    .trim()
-    .split(".")
-    .filter((part) => part !== "")
-    .map((part) => part.replaceAll("~", "~0").replaceAll("/", "~1"))
-    .join("/");
-}
-
-function AddParameter({
-  action,
-  side,
-  onDone,
-}: {
+interface AddProps {
   action: Action;
   side: Side;
   onDone: () => void;
-}) {
+}
+
+function AddParameter({ action, side, onDone }: AddProps) {
   const { doc } = useBench();
   const [name, setName] = useState("");
   const [type, setType] = useState<string>("string");
   const path = pathFrom(name);
-  const taken = (side === "in" ? action.inputs : action.outputs).some(
-    (other) =>
-      other.path === path || other.path.startsWith(`${path}/`) || path.startsWith(`${other.path}/`),
-  );
+  const list = side === "in" ? action.inputs : action.outputs;
+  const wrong = path === "" ? null : taken(list, path);
   const submit = () => {
-    if (path === "" || taken) return;
-    addParameter(doc, action.key, side, path, fresh(type));
+    if (path === "" || wrong !== null) return;
+    together(doc, () => {
+      for (const member of GROUPS[type] ?? [null]) {
+        const full = member === null ? path : `${path}/${member}`;
+        addParameter(doc, action.key, side, full, fresh(member === null ? type : "number"));
+      }
+    });
     onDone();
   };
   return (
@@ -56,20 +49,23 @@ function AddParameter({
           aria-label="Name of the parameter"
           placeholder="name, or group.name"
           value={name}
-          error={taken ? "There is one of this name." : undefined}
+          error={wrong ?? undefined}
           onChange={(event) => setName(event.currentTarget.value)}
           flex={1}
         />
         <Select
           aria-label="Type of the parameter"
-          data={[...TYPES]}
+          data={[
+            { group: "One value", items: [...TYPES] },
+            { group: "A group of numbers", items: Object.keys(GROUPS) },
+          ]}
           value={type}
           onChange={(next) => setType(next ?? "string")}
           w={104}
         />
       </Group>
       <Group gap="xs" mt="xs">
-        <Button type="submit" size="compact-sm" disabled={path === "" || taken}>
+        <Button type="submit" size="compact-sm" disabled={path === "" || wrong !== null}>
           Add
         </Button>
         <Button size="compact-sm" variant="subtle" onClick={onDone}>
@@ -83,6 +79,17 @@ function AddParameter({
 export function Parameters({ action, side }: { action: Action; side: Side }) {
   const [adding, setAdding] = useState(false);
   const list = side === "in" ? action.inputs : action.outputs;
+  const fields = ({ prefix, members }: Family) =>
+    members.map((parameter) => (
+      <ParameterField
+        key={parameter.path}
+        owner={action.key}
+        side={side}
+        parameter={parameter}
+        name={pathWords(parameter.path.slice(prefix.length))}
+        others={list.filter((other) => other !== parameter)}
+      />
+    ));
   return (
     <section className={style.section}>
       <div className={style.heading}>
@@ -96,9 +103,16 @@ export function Parameters({ action, side }: { action: Action; side: Side }) {
           Add
         </Button>
       </div>
-      {list.map((parameter) => (
-        <ParameterField key={parameter.path} owner={action.key} side={side} parameter={parameter} />
-      ))}
+      {families(list).map((family) =>
+        family.prefix === "" ? (
+          fields(family)
+        ) : (
+          <fieldset key={`${family.prefix} ${family.members[0]?.path}`} className={style.group}>
+            <legend>{pathWords(family.prefix.slice(0, -1))}</legend>
+            {fields(family)}
+          </fieldset>
+        ),
+      )}
       {list.length === 0 && !adding && (
         <p className={style.hint}>{side === "in" ? "Takes none." : "Gives none."}</p>
       )}

@@ -1,6 +1,17 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { complaint, fieldOf, shown, typed, withValue } from "./pvf";
+import {
+  allowedLines,
+  complaint,
+  fieldOf,
+  shown,
+  typed,
+  withAllowed,
+  withLock,
+  withRequired,
+  withType,
+  withValue,
+} from "./pvf";
 
 test("a number keeps the spelling in which it was typed", () => {
   const text = withValue('{"pvf_type": "number"}', "5.0");
@@ -45,4 +56,30 @@ test("any text that is typed comes back as it was", () => {
       expect(shown(fieldOf(withValue('{"pvf_type": "string"}', result.ok)))).toBe(draft);
     }),
   );
+});
+
+test("another type keeps a value that fits it and takes away one that does not", () => {
+  const text = '{"pvf_type": "number", "pvf_value": 5.0, "unit": "m"}';
+  expect(withType(text, "string")).toBe('{"pvf_type": "string", "unit": "m"}');
+  expect(withType('{"pvf_type": "geo::Pose", "pvf_value": 5.0}', "number")).toBe(
+    '{"pvf_type": "number", "pvf_value": 5.0}',
+  );
+});
+
+test("allowed values are of the type, one a line, and none allows all", () => {
+  const text = '{"pvf_type": "number"}';
+  const some = withAllowed(text, "1\n 2.50\n");
+  expect(some).toEqual({ ok: '{"pvf_type": "number", "pvf_allowed_values": [1, 2.50]}' });
+  expect(withAllowed(text, "red")).toEqual({ wrong: "“red” is no number." });
+  if (!("ok" in some)) throw new Error("they fit");
+  expect(allowedLines(fieldOf(some.ok ?? ""))).toBe("1\n2.50");
+  expect(withAllowed(some.ok ?? "", "")).toEqual({ ok: text });
+});
+
+test("what the engine assumes anyway is not written down", () => {
+  const text = '{"pvf_type": "bool"}';
+  expect(fieldOf(withRequired(text, false)).required).toBe(false);
+  expect(withRequired(withRequired(text, false), true)).toBe(text);
+  expect(fieldOf(withLock(text, true)).locked).toBe(true);
+  expect(withLock(withLock(text, true), false)).toBe(text);
 });

@@ -24,17 +24,26 @@ function json(text: string | null): unknown {
   }
 }
 
+/** The items of a list as they are spelled; none when it is no list. */
+function itemsOf(text: string | null): string[] {
+  const list = json(text);
+  if (text === null || !Array.isArray(list)) return [];
+  const spelled = text.trim().slice(1, -1).split(",");
+  const plain = list.every((item) => typeof item === "number") && spelled.length === list.length;
+  return plain ? spelled.map((item) => item.trim()) : list.map((item) => JSON.stringify(item));
+}
+
 export function fieldOf(text: string): Field {
   const none = { native: null, allowed: [], required: true, locked: false } as const;
   if (!text.trimStart().startsWith("{")) return { ...none, type: null, value: text };
   const type = json(memberText(text, "pvf_type"));
   const native = TYPES.find((known) => known === type) ?? null;
-  const allowed = json(memberText(text, "pvf_allowed_values"));
+  const allowed = itemsOf(memberText(text, "pvf_allowed_values"));
   return {
     type: typeof type === "string" ? type : null,
     native,
     value: memberText(text, "pvf_value"),
-    allowed: Array.isArray(allowed) ? allowed.map((item) => JSON.stringify(item)) : [],
+    allowed,
     required: json(memberText(text, "pvf_required")) !== false,
     locked: json(memberText(text, "pvf_updatable")) === false,
   };
@@ -44,6 +53,62 @@ export function fieldOf(text: string): Field {
 export function withValue(text: string, value: string | null): string {
   return withMember(text, "pvf_value", value);
 }
+
+/** The parameter under another type; a value that does not fit it is taken away. */
+export function withType(text: string, type: string): string {
+  const next = withMember(text, "pvf_type", JSON.stringify(type));
+  const field = fieldOf(next);
+  if (field.native === null || field.value === null) return next;
+  const draft = shown(field);
+  return complaint(field, draft) === null && fitsType(field.native, json(field.value))
+    ? next
+    : withMember(next, "pvf_value", null);
+}
+
+function fitsType(type: PvfType, value: unknown): boolean {
+  switch (type) {
+    case "string":
+    case "number":
+      return typeof value === type;
+    case "bool":
+      return typeof value === "boolean";
+    case "strings":
+    case "numbers":
+    case "bools":
+      return Array.isArray(value);
+  }
+}
+
+/** The parameter with other allowed values, one on each line; with none, everything is allowed. */
+export function withAllowed(text: string, draft: string): Typed {
+  const field = fieldOf(text);
+  const item = field.native?.replace(/s$/, "");
+  const items: string[] = [];
+  for (const line of lines(draft)) {
+    if (item === "number" || item === "bool") {
+      const typed = single(item, line);
+      if ("wrong" in typed) return typed;
+      items.push(typed.ok ?? "null");
+    } else items.push(JSON.stringify(line));
+  }
+  const list = items.length === 0 ? null : `[${items.join(", ")}]`;
+  return { ok: withMember(text, "pvf_allowed_values", list) };
+}
+
+/** Allowed values as lines. */
+export function allowedLines(field: Field): string {
+  return field.allowed
+    .map((item) => (typeof json(item) === "string" ? String(json(item)) : item))
+    .join("\n");
+}
+
+/** Whether a value has to be there when the action runs. True is what the engine assumes. */
+export const withRequired = (text: string, required: boolean): string =>
+  withMember(text, "pvf_required", required ? null : "false");
+
+/** Whether outputs of other actions may never replace the value. */
+export const withLock = (text: string, locked: boolean): string =>
+  withMember(text, "pvf_updatable", locked ? "false" : null);
 
 /** What is shown in a field for a value: lists have a line for each item. */
 export function shown(field: Field): string {
@@ -129,6 +194,15 @@ export function complaint(field: Field, draft: string): string | null {
   const fits = field.allowed.some((item) => json(item) === json(result.ok));
   return fits ? null : `Allowed: ${field.allowed.join(", ")}.`;
 }
+
+/** What a new parameter can be: a type, or a group of several. */
+export const GROUPS: Readonly<Record<string, readonly string[]>> = {
+  point: ["x", "y", "z"],
+  pose: [
+    ...["x", "y", "z"].map((axis) => `position/${axis}`),
+    ...["x", "y", "z", "w"].map((axis) => `orientation/${axis}`),
+  ],
+};
 
 /** The text of a new parameter of a type. */
 export function fresh(type: string): string {

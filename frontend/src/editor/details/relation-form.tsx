@@ -1,14 +1,14 @@
 /** What an arrow says: a response to each of the four outcomes, and what it carries over. */
-import { ActionIcon, Button, Select, Switch, TextInput } from "@mantine/core";
-import { IconArrowDown, IconTrash, IconX } from "@tabler/icons-react";
-import { useState } from "react";
-import { removeRelation, setRemap, setRequired, setResponse } from "../../graph/edit";
+import { Button, Select, Switch } from "@mantine/core";
+import { IconArrowDown, IconTrash } from "@tabler/icons-react";
+import { removeRelation, setRequired, setResponse } from "../../graph/edit";
 import { relationId } from "../../graph/layout";
 import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../../graph/model";
 import { relationWords } from "../../graph/words";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
 import { endName, useBench } from "../bench";
 import style from "./details.module.css";
+import { Remaps } from "./remaps";
 
 const meaning: Record<Response, string> = {
   run: "run it",
@@ -16,83 +16,10 @@ const meaning: Record<Response, string> = {
   bypass: "pass it over",
   stop: "stop it",
   pause: "pause it",
-  restart: "start it again",
+  restart: "nothing: not done by the engine",
 };
 
 const responses = RESPONSES.map((value) => ({ value, label: `${value} · ${meaning[value]}` }));
-
-function Remaps({ relation }: { relation: Relation }) {
-  const { doc, graph } = useBench();
-  const [source, setSource] = useState("");
-  const [target, setTarget] = useState("");
-  const id = relationId(relation);
-  const parent = graph.actions.find((action) => action.key === relation.parent);
-  const child = graph.actions.find((action) => action.key === relation.child);
-  const flat = (path: string) => path.replaceAll("/", "::").replaceAll("~1", "/");
-  const outputs = (parent?.outputs ?? []).map((parameter) => flat(parameter.path));
-  const inputs = (child?.inputs ?? []).map((parameter) => flat(parameter.path));
-  return (
-    <section className={style.section}>
-      <div className={style.heading}>
-        <h3>Outputs under another name</h3>
-      </div>
-      {relation.remap.map((remap) => (
-        <div className={style.arrow} key={remap.source}>
-          <span className={style.mono}>
-            {remap.source} → {remap.target}
-          </span>
-          <ActionIcon
-            size="sm"
-            aria-label={`Remove ${remap.source} to ${remap.target}`}
-            onClick={() => setRemap(doc, id, remap.source, null)}
-          >
-            <IconX size={13} />
-          </ActionIcon>
-        </div>
-      ))}
-      <form
-        className={style.connect}
-        onSubmit={(event) => {
-          event.preventDefault();
-          if (source.trim() === "" || target.trim() === "") return;
-          setRemap(doc, id, source.trim(), target.trim());
-          setSource("");
-          setTarget("");
-        }}
-      >
-        <TextInput
-          aria-label="Output"
-          placeholder="output"
-          list={`${id}-outputs`}
-          value={source}
-          onChange={(event) => setSource(event.currentTarget.value)}
-          flex={1}
-        />
-        <TextInput
-          aria-label="Reaches it as"
-          placeholder="reaches it as"
-          list={`${id}-inputs`}
-          value={target}
-          onChange={(event) => setTarget(event.currentTarget.value)}
-          flex={1}
-        />
-        <Button type="submit" disabled={source.trim() === "" || target.trim() === ""}>
-          Add
-        </Button>
-        <datalist id={`${id}-outputs`}>
-          {outputs.map((name) => (
-            <option key={name} value={name} />
-          ))}
-        </datalist>
-        <datalist id={`${id}-inputs`}>
-          {inputs.map((name) => (
-            <option key={name} value={name} />
-          ))}
-        </datalist>
-      </form>
-    </section>
-  );
-}
 
 export function RelationForm({ relation }: { relation: Relation }) {
   const bench = useBench();
@@ -149,7 +76,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
             checked={relation.required}
             onChange={(event) => setRequired(doc, id, event.currentTarget.checked)}
           />
-          <Remaps relation={relation} />
+          {relation.child !== EXIT && <Remaps relation={relation} />}
         </>
       )}
       <Button

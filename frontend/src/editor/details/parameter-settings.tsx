@@ -1,0 +1,96 @@
+/** What a parameter is, apart from its value: name, type, allowed values, required, locked. */
+import { Autocomplete, Button, Group, Switch } from "@mantine/core";
+import { IconTrash } from "@tabler/icons-react";
+import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
+import type { Side } from "../../graph/layout";
+import type { Key, Parameter } from "../../graph/model";
+import { pathWords } from "../../ui/canvas/value-text";
+import { useBench } from "../bench";
+import { DraftInput } from "../draft-input";
+import style from "./details.module.css";
+import { pathFrom, taken } from "./parameter-path";
+import { allowedLines, fieldOf, TYPES, withAllowed, withLock, withRequired, withType } from "./pvf";
+
+interface Props {
+  owner: Key;
+  side: Side;
+  parameter: Parameter;
+  others: readonly Parameter[];
+  onClose: () => void;
+}
+
+export function ParameterSettings({ owner, side, parameter, others, onClose }: Props) {
+  const { doc } = useBench();
+  const field = fieldOf(parameter.text);
+  const name = pathWords(parameter.path);
+  const write = (text: string) => setParameter(doc, owner, side, parameter.path, text);
+  const retype = (type: string) => {
+    if (type.trim() !== "" && type !== field.type) write(withType(parameter.text, type.trim()));
+  };
+  return (
+    <section className={style.adding} aria-label={`What the parameter ${name} is`}>
+      <DraftInput
+        label="Name"
+        value={name}
+        check={(draft) => taken(others, pathFrom(draft))}
+        onCommit={(draft) => renameParameter(doc, owner, side, parameter.path, pathFrom(draft))}
+      />
+      <Autocomplete
+        key={field.type}
+        label="Type"
+        size="sm"
+        data={[...TYPES]}
+        defaultValue={field.type ?? ""}
+        onBlur={(event) => retype(event.currentTarget.value)}
+        onOptionSubmit={retype}
+      />
+      {field.native !== null && (
+        <DraftInput
+          label="Allowed values, one on each line"
+          lines
+          value={allowedLines(field)}
+          placeholder="anything"
+          check={(draft) => {
+            const result = withAllowed(parameter.text, draft);
+            return "wrong" in result ? result.wrong : null;
+          }}
+          onCommit={(draft) => {
+            const result = withAllowed(parameter.text, draft);
+            if ("ok" in result && result.ok !== null) write(result.ok);
+          }}
+        />
+      )}
+      <Switch
+        mt="xs"
+        label="Required"
+        description="The action does not run without a value"
+        checked={field.required}
+        onChange={(event) => write(withRequired(parameter.text, event.currentTarget.checked))}
+      />
+      {side === "in" && (
+        <Switch
+          mt="xs"
+          label="Locked"
+          description="Outputs of other actions never replace the value"
+          checked={field.locked}
+          onChange={(event) => write(withLock(parameter.text, event.currentTarget.checked))}
+        />
+      )}
+      <Group gap="xs" mt="sm">
+        <Button size="compact-sm" onClick={onClose}>
+          Close
+        </Button>
+        <Button
+          size="compact-sm"
+          variant="subtle"
+          color="red"
+          leftSection={<IconTrash size={13} aria-hidden />}
+          aria-label={`Remove the parameter ${name}`}
+          onClick={() => removeParameter(doc, owner, side, parameter.path)}
+        >
+          Remove
+        </Button>
+      </Group>
+    </section>
+  );
+}
