@@ -184,6 +184,8 @@ class Story:
         assert len(runs) == len(set(runs))
         last = {run.id: run for _, run in self.world.shown}
         for stream in self.world.ledger.streams:
+            if not stream.startswith("run/"):
+                continue
             told = self.world.ledger.history(stream.removeprefix("run/"))
             assert told.state in ENDED or told.id in self.defiant
             assert told == last[told.id]

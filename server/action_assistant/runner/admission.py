@@ -2,13 +2,12 @@
 
 import re
 from collections.abc import Sequence
-from typing import Annotated, Final
+from typing import Annotated, Final, TypeVar
 
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotUmrf
 from action_assistant.runner.events import Override
-from action_assistant.runner.robots import SIMULATOR
 from action_assistant.umrf import codec
 from action_assistant.umrf.check import STRUCTURAL, blocking, check
 from action_assistant.umrf.digest import digest
@@ -16,6 +15,10 @@ from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph, Problem
 from action_assistant.umrf.semantics import Script, script_from
 
+T = TypeVar("T")
+
+#: The engine that is always there.
+SIMULATOR: Final = "simulator"
 #: What robots may read: the engine puts names into format strings and file names.
 _WIRE_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 #: What the simulator may read: anything that can be printed, but no format directives.
@@ -29,6 +32,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     """A start: the version by value, and where it shall run.
 
     `digest` is what the person saw; `request_id` is made by the asker, once per intended start.
+    `like`: the robot whose engine the simulator plays, with its hazards.
     """
 
     version: str
@@ -39,22 +43,30 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     graph: str | None = None
     script: msgspec.Raw = msgspec.Raw()
     override: Override | None = None
+    like: str | None = None
 
 
 class Admitted(msgspec.Struct, frozen=True, kw_only=True):
-    """A start that nothing about its graph stands in the way of."""
+    """A start that nothing about its graph stands in the way of. `problems`: warnings, and what
+    was overridden."""
 
     graph: Graph
     graph_id: str | None
     script: Script
     script_text: str
     digest: str
+    problems: tuple[Problem, ...] = ()
 
 
 def read_request(body: bytes) -> StartRequest:
     """The body of a start. Raises BadInput with the place."""
+    return decoded(body, StartRequest)
+
+
+def decoded(body: bytes, kind: type[T]) -> T:
+    """A body that is read by hand. Raises BadInput with the place."""
     try:
-        return msgspec.json.decode(body, type=StartRequest)
+        return msgspec.json.decode(body, type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         message, where = _placed(str(error))
         raise BadInput(message, where=where) from error
@@ -76,7 +88,8 @@ def admit(asked: StartRequest, facts: EngineFacts) -> Admitted:
             where={"path": "/digest"},
         )
     _check_names(reading.graph, simulated=asked.engine == SIMULATOR)
-    _check_problems([*reading.problems, *check(reading.graph, None, facts)], asked.override)
+    problems = [*reading.problems, *check(reading.graph, None, facts)]
+    _check_problems(problems, asked.override)
     script, script_text = _script(asked)
     return Admitted(
         graph=reading.graph,
@@ -84,6 +97,7 @@ def admit(asked: StartRequest, facts: EngineFacts) -> Admitted:
         script=script,
         script_text=script_text,
         digest=found,
+        problems=tuple(problems),
     )
 
 

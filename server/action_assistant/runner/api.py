@@ -13,18 +13,16 @@ from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 from sqlalchemy import Row
 
-from action_assistant.errors import BadInput, NotFound
+from action_assistant.errors import BadInput
 from action_assistant.journal.journal import Journal
-from action_assistant.runner import archive, shapes
-from action_assistant.runner.admission import read_request
+from action_assistant.runner import archive, robots_api, shapes
+from action_assistant.runner.admission import SIMULATOR, read_request
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import StartOperation, StopOperation
 from action_assistant.runner.events import Author
-from action_assistant.runner.links.port import Registration
 from action_assistant.runner.live import Hub, Stopping, attend
 from action_assistant.runner.review import routes as review
 from action_assistant.runner.review.desk import Desk
-from action_assistant.runner.robots import SIMULATOR, Robot
 from action_assistant.runner.runs import State
 from action_assistant.web.access import Needs, person_of, require
 
@@ -64,7 +62,7 @@ def routes(house: House) -> list[ControllerRouterHandler]:
         *_starts(house),
         *_moves(house),
         *_reads(house),
-        *_robots(house),
+        *robots_api.routes(house),
         *review.routes(lambda: house.desk),
         _live(house),
     ]
@@ -208,26 +206,6 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
         )
 
     return [listed, every_label, one, events]
-
-
-def _robots(house: House) -> list[ControllerRouterHandler]:
-    @get("/api/robots", summary="Engines that runs can go to")
-    async def robots() -> list[Robot]:
-        return list(house.control.robots.all())
-
-    @post("/api/robots", summary="Register a robot", guards=[Needs("register")])
-    async def register(data: Registration, request: _Asking) -> Response[Robot]:
-        robot = await house.control.register(data, _author(request))
-        return Response(robot, status_code=201, headers={"location": f"/api/robots/{robot.name}"})
-
-    @get("/api/robots/{name:str}", summary="One engine")
-    async def robot(name: str) -> Robot:
-        for each in house.control.robots.all():
-            if each.name == name:
-                return each
-        raise NotFound(f"No robot is called {name!r}.")
-
-    return [robots, register, robot]
 
 
 def _live(house: House) -> ControllerRouterHandler:

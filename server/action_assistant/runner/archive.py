@@ -36,19 +36,22 @@ from action_assistant.runner.events import (
     decode,
 )
 from action_assistant.runner.review import about, again
-from action_assistant.runner.robots import REGISTERED, Registered
+from action_assistant.runner.robots import Registered, Removed
 
 _OPEN: Final = "open"
 
 
 def fold(event: Event) -> Sequence[Executable]:
     """What an event means for the tables."""
-    if event.kind == REGISTERED:
+    if event.kind == Registered.kind:
         return (_robot(msgspec.json.decode(event.body, type=Registered)),)
     if about.is_about(event.stream):
         return about.fold(event)
     if event.stream == again.STREAM:
         return again.fold(event)
+    if event.kind == Removed.kind:
+        gone = msgspec.json.decode(event.body, type=Removed)
+        return (update(robot).where(robot.c.name == gone.name).values(retired_at=gone.at),)
     if not event.stream.startswith("run/"):
         return ()
     change = update(run).where(run.c.id == event.stream.removeprefix("run/"))
@@ -110,7 +113,7 @@ def _run(asked: Requested) -> Executable:
         simulated=asked.simulated,
         request_id=asked.request_id,
         requested_at=asked.at,
-        summary={"alarms": []},
+        summary={"alarms": []} if asked.group is None else {"alarms": [], "group": asked.group},
     )
 
 

@@ -5,8 +5,8 @@ All of it lives on one event loop. Runs that are not over are in memory; the jou
 
 import logging
 import secrets
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Final
 from weakref import WeakValueDictionary
 
@@ -14,33 +14,24 @@ import anyio
 import msgspec
 from anyio.abc import TaskGroup
 
-from action_assistant.errors import Conflict, Refused, Unavailable
-from action_assistant.journal.events import Draft
+from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
 from action_assistant.runner import archive
-from action_assistant.runner.admission import Admitted, StartRequest, admit
+from action_assistant.runner.admission import SIMULATOR, StartRequest
+from action_assistant.runner.booking import Book, booked
 from action_assistant.runner.driving import Clock, OpenRun
-from action_assistant.runner.events import Author, Ended, Requested, encode
+from action_assistant.runner.engines import KnownEngine
+from action_assistant.runner.events import Author, Ended
+from action_assistant.runner.flight import Commanded
 from action_assistant.runner.history import Aside, History, Ledger
 from action_assistant.runner.links.absent import AbsentLink
-from action_assistant.runner.links.port import Link, NoAnswer, NotSent, Order, Registration
-from action_assistant.runner.links.simulator import SimulatorLink
-from action_assistant.runner.recorder import stream_of
-from action_assistant.runner.robots import (
-    SIMULATOR,
-    STREAM,
-    Registered,
-    Robot,
-    Robots,
-    check_registration,
-)
-from action_assistant.runner.runs import ENDED, Run, begin
-from action_assistant.umrf import codec
-from action_assistant.umrf.facts import PINNED, SIMULATED
-from action_assistant.umrf.semantics import Engine
+from action_assistant.runner.links.port import ForeignCommand, Link, NotSent, Order, Registration
+from action_assistant.runner.preflight import Preflight
+from action_assistant.runner.robots import Ground, Robot, Robots
+from action_assistant.runner.runs import ENDED, Run
+from action_assistant.runner.starting import Cleared, GroupRequest, Starting
 
 log: Final = logging.getLogger(__name__)
 
-_PREFLIGHT_S: Final = 2.0
 _LOST: Final = (
     "The runner ended while this simulation went on, and the simulated engine with it. Nothing "
     "shows how it would have ended."
@@ -51,6 +42,15 @@ class Started(msgspec.Struct, frozen=True):
     """The answer to a start. `fresh` is false when the request had been carried out before."""
 
     run: Run
+    fresh: bool
+
+
+class Grouped(msgspec.Struct, frozen=True):
+    """The answer to the start of a group. `failed`: the engines that nothing was sent to, and why."""
+
+    group: str
+    runs: list[Run]
+    failed: dict[str, str]
     fresh: bool
 
 
@@ -71,6 +71,15 @@ class Control:
         self._news = anyio.Event()
         self._asking: WeakValueDictionary[str, anyio.Lock] = WeakValueDictionary()
         self._places: dict[str, anyio.Lock] = {}
+        self._book = Book(ledger, tasks, wall)
+        self._starting = Starting(
+            robots,
+            wall=wall,
+            aside=aside,
+            taken=self._taken,
+            going=lambda: frozenset(self.open),
+        )
+        self._robot_watchers: list[Callable[[], None]] = []
         self._number = 0
         self._stops = 0  # how often everything was stopped
         self._last_stop: tuple[Author, str] | None = None
@@ -98,146 +107,126 @@ class Control:
         """Be told, at once, of every run that has changed."""
         self._watchers.append(watcher)
 
+    def watch_robots(self, watcher: Callable[[], None]) -> None:
+        """Be told, at once, when a robot is not as it was."""
+        self._robot_watchers.append(watcher)
+
+    def _robots_changed(self) -> None:
+        for watcher in self._robot_watchers:
+            watcher()
+
     # --- start --------------------------------------------------------------------------------
 
     async def start(self, asked: StartRequest, author: Author) -> Started:
         """Carry out a start, at most once per request. Raises Refused of many kinds; then nothing
         was sent. Returns after the one message has left."""
         stops = self._stops
-        lock = self._asking.get(asked.request_id)
-        if lock is None:
-            lock = self._asking[asked.request_id] = anyio.Lock()
-        async with lock:
+        async with self._asked(asked.request_id):
             known = await self._known(asked)
             if known is not None:
                 return Started(known, fresh=False)
-            if asked.engine == SIMULATOR:
-                admitted = await self._aside(lambda: admit(asked, SIMULATED))
-                engine = Engine(facts=SIMULATED, script=admitted.script)
-                link = SimulatorLink(engine, wall=self._wall)
-                run = await self._begin(asked, admitted, author, link, stops, own=True)
-                return Started(run, fresh=True)
-            robot = self.robots.reachable(asked.engine)
-            async with self._places.setdefault(asked.engine, anyio.Lock()):
-                admitted = await self._aside(lambda: admit(asked, PINNED))
-                self._check_free(asked.engine)
-                run = await self._begin(asked, admitted, author, robot, stops, own=False)
-                return Started(run, fresh=True)
+            async with AsyncExitStack() as places:
+                if asked.engine != SIMULATOR:
+                    await places.enter_async_context(self._place(asked.engine))
+                cleared = await self._starting.cleared(asked)
+                run = await self._begin(asked, cleared, author, stops)
+            return Started(run, fresh=True)
+
+    async def start_group(self, asked: GroupRequest, author: Author) -> Grouped:
+        """Start one version on several robots: all are looked at before the first message leaves.
+        Raises Refused; then nothing was sent to any of them."""
+        stops = self._stops
+        starts = [asked.of(engine) for engine in sorted(asked.engines)]
+        if not asked.request_id or SIMULATOR in asked.engines:
+            where = "/engines" if asked.request_id else "/request_id"
+            raise BadInput("A group has a request_id, and robots only.", where={"path": where})
+        async with self._asked(asked.request_id):
+            found = [await self._known(each) for each in starts]
+            if known := [run for run in found if run is not None]:
+                missing = [each.engine for each, run in zip(starts, found, strict=True) if not run]
+                failed = dict.fromkeys(missing, "It was not started with the others.")
+                return Grouped(known[0].group or "", known, failed, fresh=False)
+            async with AsyncExitStack() as places:
+                for each in starts:  # in the order of their names, so that no two groups wait
+                    await places.enter_async_context(self._place(each.engine))
+                cleared = await self._starting.all_cleared(starts)
+                return await self._begin_group(starts, cleared, author, stops)
+
+    async def _begin_group(
+        self,
+        starts: Sequence[StartRequest],
+        cleared: Sequence[Cleared],
+        author: Author,
+        stops: int,
+    ) -> Grouped:
+        group = secrets.token_urlsafe(9)
+        runs: list[Run] = []
+        failed: dict[str, str] = {}
+        for each, clear in zip(starts, cleared, strict=True):
+            try:
+                runs.append(await self._begin(each, clear, author, stops, group))
+            except Refused as why:
+                failed[each.engine] = why.detail
+        return Grouped(group, runs, failed, fresh=True)
+
+    async def look(self, asked: GroupRequest) -> list[Preflight]:
+        """What stands between a graph and its start on each engine. Sends nothing but a get."""
+        found: dict[str, Preflight] = {}
+
+        async def look(engine: str) -> None:
+            found[engine] = await self._starting.look(asked.of(engine))
+
+        async with anyio.create_task_group() as tasks:
+            for engine in asked.engines:
+                tasks.start_soon(look, engine)
+        return [found[engine] for engine in asked.engines]
+
+    @asynccontextmanager
+    async def _asked(self, request: str) -> AsyncIterator[None]:
+        """One at a time for each request."""
+        lock = self._asking.get(request)
+        if lock is None:
+            lock = self._asking[request] = anyio.Lock()
+        async with lock:
+            yield
+
+    def _place(self, engine: str) -> anyio.Lock:
+        """One start at a time for each robot."""
+        return self._places.setdefault(engine, anyio.Lock())
 
     async def _known(self, asked: StartRequest) -> Run | None:
-        rows = await self._ledger.query(archive.by_request(asked.request_id))
-        if not rows:
-            return None
-        row = rows[0]
-        if (row.digest, row.engine) != (asked.digest, asked.engine):
-            raise Conflict(
-                "This request_id belongs to another start.", where={"path": "/request_id"}
-            )
-        return await self.find(row.id)
+        run = await self._book.run_of(asked)
+        return None if run is None else await self.find(run)
 
-    def _check_free(self, engine: str) -> None:
+    def _taken(self, engine: str) -> Run | None:
+        """The run that an engine has from here."""
         for other in self.open.values():
             if other.run.engine == engine and other.run.end is None:
-                run = other.run
-                raise Conflict(
-                    f"{engine} is taken by run {run.number} of {run.graph_name}, started by "
-                    f"{run.author.name}; it is {run.state}.",
-                    where={"path": "/engine", "run": run.id},
-                )
+                return other.run
+        return None
 
     async def _begin(
         self,
         asked: StartRequest,
-        admitted: Admitted,
+        cleared: Cleared,
         author: Author,
-        link: Link,
         stops: int,
-        *,
-        own: bool,
+        group: str | None = None,
     ) -> Run:
-        incarnation = await self._answering(link, asked.engine)
         self._number += 1
         number = self._number
+        at = self._wall()
         requested, order = await self._aside(
-            lambda: self._order(asked, admitted, author, number, simulated=own)
+            lambda: booked(asked, cleared, author, at=at, number=number, group=group)
         )
         with anyio.CancelScope(shield=True):
-            run = await self._store(requested)
-            opened = self._opened(run, link, own=own, seq=1)
+            run = await self._book.store(requested)
+            opened = self._opened(run, cleared.link, own=cleared.own, seq=1)
             if self._stops != stops and self._last_stop is not None:
                 opened.stop(*self._last_stop)  # everything was stopped since this was asked for
-            self._tasks.start_soon(self._drive, opened, order, incarnation)
+            self._tasks.start_soon(self._drive, opened, order, cleared.incarnation)
         await opened.published.wait()
         return opened.run
-
-    async def _answering(self, link: Link, engine: str) -> str:
-        """A get sent for this start, on the path that would confirm its stop."""
-        try:
-            with anyio.fail_after(_PREFLIGHT_S):
-                return (await link.get()).incarnation
-        except (NoAnswer, TimeoutError) as nothing:
-            raise Unavailable(
-                f"{engine} does not answer, so a stop could not be confirmed either. "
-                f"Nothing was sent. {nothing}".rstrip(),
-                where={"path": "/engine"},
-            ) from nothing
-
-    def _order(
-        self,
-        asked: StartRequest,
-        admitted: Admitted,
-        author: Author,
-        number: int,
-        *,
-        simulated: bool,
-    ) -> tuple[Requested, Order]:
-        run, graph = secrets.token_urlsafe(9), admitted.graph
-        umrf = codec.write(graph, codec.Stamp(admitted.graph_id, asked.version, run))
-        requested = Requested(
-            at=self._wall(),
-            run=run,
-            number=number,
-            request_id=asked.request_id,
-            author=author,
-            graph=admitted.graph_id,
-            graph_name=graph.name,
-            version=asked.version,
-            digest=admitted.digest,
-            engine=asked.engine,
-            simulated=simulated,
-            actions={each.full_name: each.key for each in graph.actions if not each.missing},
-            umrf=umrf,
-            script=admitted.script_text,
-            override=asked.override,
-        )
-        targets = () if simulated else (asked.engine,)
-        return requested, Order(run=run, graph=graph, umrf=umrf, targets=targets)
-
-    async def _store(self, requested: Requested) -> Run:
-        """What cannot be recorded is not started."""
-        stream = stream_of(requested.run)
-        draft = Draft(requested.kind, requested.author.id, encode(requested))
-        try:
-            await self._ledger.append(stream, [draft], expected=0)
-        except Refused as refused:
-            self._tasks.start_soon(self._disown, requested.run)
-            raise Unavailable(
-                f"The run could not be recorded, so nothing was started. {refused.detail}"
-            ) from refused
-        return begin(requested)
-
-    async def _disown(self, run: str) -> None:
-        """A commit whose answer got lost may still have happened: then say that nothing was sent."""
-        stream = stream_of(run)
-        end = Ended(self._wall(), "refused", None, "It could not be recorded in time.")
-        while True:
-            try:
-                seq = await self._ledger.newest(stream)
-                if seq:
-                    await self._ledger.append(stream, [Draft(end.kind, "", encode(end))])
-                return
-            except Refused:
-                await anyio.sleep(1)
 
     def _opened(self, run: Run, link: Link, *, own: bool, seq: int) -> OpenRun:
         opened = OpenRun(
@@ -247,6 +236,7 @@ class Control:
             store=self._ledger,
             seq=seq,
             wall=self._wall,
+            aside=self._aside,
             changed=self._changed,
         )
         self.open[run.id] = opened
@@ -341,19 +331,48 @@ class Control:
         return await self.history.run(run)
 
     async def register(self, asked: Registration, author: Author) -> Robot:
-        """Take a robot into the registry. Raises BadInput, Conflict, Unavailable."""
-        check_registration(asked)
-        body = Registered(at=self._wall(), **msgspec.structs.asdict(asked))
-        draft = Draft(Registered.kind, author.id, msgspec.json.encode(body))
-        await self._ledger.append(STREAM, [draft])
-        self.robots.add(asked)
-        return next(each for each in self.robots.all() if each.name == asked.name)
+        """Take a robot into the registry, or change it. Raises BadInput, Conflict, Unavailable."""
+        self._check_unused(asked.name)
+        return await self.robots.register(asked, author)
+
+    async def remove(self, robot: str, author: Author) -> None:
+        """Take a robot out of the registry. Raises NotFound, Conflict, Unavailable."""
+        self._check_unused(robot)
+        await self.robots.remove(robot, author)
+
+    def _check_unused(self, robot: str) -> None:
+        run = self._taken(robot)
+        if run is not None:
+            raise Conflict(
+                f"Run {run.number} goes on {robot}; stop it first. Its Stop would get lost.",
+                where={"path": "/name", "run": run.id},
+            )
+
+    def _foreign(self, engine: KnownEngine, command: ForeignCommand) -> Commanded:
+        """Somebody else has told a robot something: which run of ours that concerns."""
+        run = self._taken(engine.registration.name)
+        if run is not None:
+            self.open[run.id].hear_of(command)
+        return Commanded(
+            at=command.at,
+            command=command.command,
+            graph=command.graph,
+            umrf=command.umrf,
+            targets=command.targets,
+            sender=command.sender,
+            run=None if run is None else run.id,
+            number=None if run is None else run.number,
+        )
 
     # --- after a restart ----------------------------------------------------------------------
 
     async def _take_up(self) -> None:
         """Adopt what an earlier process left: pending stops first of all; nothing is started."""
         self._number = (await self._ledger.query(archive.last_number()))[0][0]
+        ground = Ground(
+            self._ledger, self._tasks, self._wall, self._aside, self._robots_changed, self._foreign
+        )
+        self.robots.open(ground)
         for row in await self._ledger.query(archive.all_robots()):
             self.robots.add(
                 Registration(

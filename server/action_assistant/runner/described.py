@@ -36,12 +36,30 @@ def _start() -> RequestBody:
         "graph": _TEXT,
         "script": _ANY,
         "override": override,
+        "like": Schema(type=OpenAPIType.STRING, description="The robot that the simulator plays"),
     }
     needed = ["version", "digest", "umrf", "engine", "request_id"]
     whole = Schema(
         type=OpenAPIType.OBJECT,
         properties=fields,
         required=needed,
+        additional_properties=False,
+    )
+    return _body(whole, required=True)
+
+
+def _group(*, look: bool) -> RequestBody:
+    one = _start().content["application/json"].schema
+    assert isinstance(one, Schema)
+    names = Schema(type=OpenAPIType.ARRAY, items=_TEXT, min_items=1, max_items=20)
+    fields = {k: v for k, v in (one.properties or {}).items() if k not in {"engine", "script"}}
+    needed = [each for each in one.required or () if each != "engine"]
+    if look:
+        needed.remove("request_id")
+    whole = Schema(
+        type=OpenAPIType.OBJECT,
+        properties={**fields, "engines": names},
+        required=[*needed, "engines"],
         additional_properties=False,
     )
     return _body(whole, required=True)
@@ -70,3 +88,23 @@ class StopOperation(Operation):
 
     def __post_init__(self) -> None:
         self.request_body = _stop()
+
+
+@dataclass
+class GroupOperation(Operation):
+    """A start on several robots."""
+
+    request_body: RequestBody | Reference | None = field(default_factory=lambda: _group(look=False))
+
+    def __post_init__(self) -> None:
+        self.request_body = _group(look=False)
+
+
+@dataclass
+class LookOperation(Operation):
+    """A look before a start."""
+
+    request_body: RequestBody | Reference | None = field(default_factory=lambda: _group(look=True))
+
+    def __post_init__(self) -> None:
+        self.request_body = _group(look=True)

@@ -19,6 +19,7 @@ from action_assistant.runner.events import (
     Author,
     End,
     Ended,
+    EngineSaid,
     Observed,
     PauseRequested,
     Proof,
@@ -29,11 +30,16 @@ from action_assistant.runner.events import (
     StopRequested,
     StopSent,
 )
+from action_assistant.runner.flight import alarm_of
+from action_assistant.runner.history import Aside
+from action_assistant.runner.lateness import fresh
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
+    EngineLog,
     EngineRefused,
     Feedback,
+    ForeignCommand,
     Link,
     NoAnswer,
     NotSent,
@@ -43,7 +49,9 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.recorder import Recorder, Store
 from action_assistant.runner.runs import Run, follow, is_news
+from action_assistant.runner.sameness import difference
 from action_assistant.runner.seen import TERMINAL, Hazard, Seen, Snapshot
+from action_assistant.umrf.model import Graph
 
 log: Final = logging.getLogger(__name__)
 
@@ -58,6 +66,12 @@ _SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobod
 _REST_S: Final = 1.0  # a graph that never began is believed only after it was seen so for this long
 _TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
 _ONE_PRESS_S: Final = 1.0
+
+_SEVERAL: Final = (
+    "{servers} engines are seen on the path of its answers, so that none proves anything"
+)
+_LINES: Final = 2_000  # of the engine's log, kept with one run
+_LONGEST_LINE: Final = 2_000  # characters
 
 _RESULTS: Final = {"HALTED": "on_halted", "STOPPED": "on_stopped", "ERROR": "on_error"}
 
@@ -76,6 +90,7 @@ class OpenRun:
         store: Store,
         seq: int,
         wall: Clock,
+        aside: Aside,
         changed: "Callable[[OpenRun], None]",
     ) -> None:
         self.run = run
@@ -85,6 +100,11 @@ class OpenRun:
         self._link = link
         self._owns_link = owns_link
         self._wall = wall
+        self._aside = aside
+        self._sent: Graph | None = None  # until it was compared with what the engine shows
+        self._lines = 0
+        self._answered = False  # by a get, since the last feedback
+        self.seen_at: int | None = None  # when the engine last showed this run
         self._changed = changed
         self._over = anyio.Event()
         self._stop_wanted = anyio.Event()
@@ -131,6 +151,13 @@ class OpenRun:
     def pauses(self) -> bool:
         """Whether pausing is safe on this engine."""
         return self._link.pauses
+
+    def hear_of(self, command: ForeignCommand) -> None:
+        """Somebody else has told this robot something while the run goes on there."""
+        alarm = alarm_of(command, self.run.engine, self.run.graph_name)
+        if alarm is not None:
+            self._alarm(*alarm)
+            self._look.set()
 
     # --- what happens -------------------------------------------------------------------------
 
@@ -193,7 +220,7 @@ class OpenRun:
 
     async def _publish(self, order: Order, incarnation: str) -> None:
         """Send the one start message. Whatever happens, it is never sent again."""
-        at = self._wall()
+        at, self._sent = self._wall(), order.graph
         if self.run.desired == "stopped":
             self._end("stopped", "Stopped before anything was sent.")
             return
@@ -225,9 +252,11 @@ class OpenRun:
             case Transitions(run=run, changes=changes) if run == self.run.id:
                 self._observe(changes)
             case Feedback(snapshots=snapshots):
-                ours = tuple(each for each in snapshots if each.run == self.run.id)
-                if ours:
-                    self._observe(ours)
+                self._feed(tuple(each for each in snapshots if each.run == self.run.id))
+            case EngineLog(at=at, text=text, graph=graph) if self._is_ours(graph):
+                if self._lines < _LINES:
+                    self._lines += 1
+                    self.tell(EngineSaid(at, text[:_LONGEST_LINE]))
             case EngineChanged(state="gone", why=why) if self._owns_link:
                 self._alarm("engine_gone", why)  # a simulated engine does not come back
                 self._end("lost", why)
@@ -236,6 +265,19 @@ class OpenRun:
             case _:
                 return
         self._look.set()
+
+    def _feed(self, ours: tuple[Snapshot, ...]) -> None:
+        """Feedback of this run, oldest first."""
+        overtaken, self._answered = self._answered, False
+        if not ours:
+            return
+        self.seen_at = self._wall()
+        if news := fresh(self.run, ours) if overtaken else ours:
+            self._observe(news)
+
+    def _is_ours(self, graph: str | None) -> bool:
+        name = self.run.graph_name
+        return graph is None or graph == name or graph.startswith(f"{name}__")
 
     def _observe(self, seen: tuple[Seen, ...]) -> None:
         self.tell(Observed(self._wall(), seen))
@@ -257,8 +299,8 @@ class OpenRun:
             except (NoAnswer, TimeoutError) as nothing:
                 self._hear_nothing(str(nothing))
             else:
-                self._heard_at = anyio.current_time()
                 self._take(answer, order)
+                await self._compare(answer)
             cost = anyio.current_time() - began
             pace = _STOP_POLL_S if self._stop_wanted.is_set() else _POLL_S
             wait = max(pace, 5 * cost)
@@ -273,14 +315,20 @@ class OpenRun:
     def _take(self, answer: Answer, order: int) -> None:
         """Draw the conclusions that one answer allows, and no others."""
         name = self.run.graph_name
-        if self.run.incarnation not in {None, answer.incarnation}:
+        if len({self.run.incarnation, answer.incarnation} - {None, ""}) > 1:
             self._alarm("engine_restarted", "The engine was restarted: look at the robot.")
             self._end("lost", "The engine was restarted while the run went on.")
             return
         own = next((each for each in answer.graphs if each.graph == name), None)
+        servers = self._link.standing.servers
         if own is None or own.run != self.run.id:
+            if servers > 1:
+                self._hear_nothing(_SEVERAL.format(servers=servers))
+                return
+            self._heard_at = anyio.current_time()
             self._missing(own, answer)
             return
+        self._heard_at, self.seen_at, self._answered = anyio.current_time(), answer.at, True
         if self.run.incarnation is None:  # the runner died between sending and noting it
             self.tell(Published(answer.at, answer.incarnation))
         if self.run.unknown_since is not None:
@@ -288,7 +336,19 @@ class OpenRun:
         parts = [each for each in answer.graphs if each.graph.startswith(f"{name}__")]
         shown = [own, *(part for part in parts if part.run in {None, self.run.id})]
         self._note(shown)
-        self._conclude(shown, answer, order)
+        if servers == 1:
+            self._conclude(shown, answer, order)
+        else:
+            self._stop_trouble = _SEVERAL.format(servers=servers or "no")
+
+    async def _compare(self, answer: Answer) -> None:
+        """Once: whether the engine has what was sent. It is never stopped for that by itself."""
+        sent, text = self._sent, answer.texts.get(self.run.graph_name)
+        if sent is None or text is None or self.run.graph_state is None:
+            return
+        self._sent = None
+        if why := await self._aside(lambda: difference(sent, text)):
+            self._alarm("echo_differs", f"What {self.run.engine} shows is not what was sent: {why}")
 
     def _note(self, shown: list[Snapshot]) -> None:
         """Keep what an answer says beyond what is known already."""
@@ -360,15 +420,13 @@ class OpenRun:
     async def _stop_until_proven(self) -> None:
         await self._stop_wanted.wait()
         began, gap = anyio.current_time(), _STOP_POLL_S
-        alarmed = False
         for attempt in itertools.count(self.run.stops_sent + 1):
             failed = await self._send_stop()
             if not failed and self._stop_sent is None:
                 self._stop_sent = next(self._order)
             self.tell(StopSent(self._wall(), attempt, failed))
             self._look.set()
-            if anyio.current_time() - began >= _UNCONFIRMED_S and not alarmed:
-                alarmed = True
+            if anyio.current_time() - began >= _UNCONFIRMED_S:
                 why = failed or self._stop_trouble or "no proof has come"
                 self._alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}.")
             if self._owns_link and anyio.current_time() - began >= _SWITCH_OFF_S:

@@ -49,6 +49,8 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     umrf: str  # as sent
     script: str = ""  # JSON text
     override: Override | None = None
+    group: str | None = None  # shared by runs that one request has started together
+    like: str | None = None  # the robot whose engine the simulator played
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -145,6 +147,15 @@ class AlarmRaised(msgspec.Struct, frozen=True):
     text: str
 
 
+class EngineSaid(msgspec.Struct, frozen=True):
+    """A line of the engine's own log, from about this run. Evidence for a person, proof of nothing."""
+
+    kind: ClassVar[str] = "run.engine_said.v1"
+
+    at: int
+    text: str
+
+
 class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
     """The run is over, and in which state; for `refused` and `lost` `detail` says why."""
 
@@ -174,6 +185,7 @@ RunEvent: TypeAlias = (
     | Silent
     | Answered
     | AlarmRaised
+    | EngineSaid
     | Ended
     | Unknown
 )
@@ -192,6 +204,7 @@ _KINDS: Final[Mapping[str, type[RunEvent]]] = {
         Silent,
         Answered,
         AlarmRaised,
+        EngineSaid,
         Ended,
     )
 }

@@ -1,7 +1,7 @@
-"""The pen of one run: writes its events in order, and never makes anybody wait.
+"""The pen of one stream: writes its events in order, and never makes anybody wait.
 
-What happens to a robot is shown first and stored at once. When the journal fails the run says so
-(`recorded` is false) and the pen goes on trying with the same events, in the same order.
+What happens to a robot is shown first and stored at once. When the journal fails the pen says so
+(`recorded` is false) and goes on trying with the same events, in the same order.
 """
 
 import logging
@@ -46,25 +46,25 @@ def stream_of(run: str) -> str:
     return f"run/{run}"
 
 
-class Recorder:
-    """The pen of the run whose stream ends at `seq`. `changed` is called when `seq` or `recorded`
-    have changed."""
+class Pen:
+    """The pen of a stream that ends at `seq`. `changed` is called when `seq` or `recorded` have
+    changed."""
 
     def __init__(
-        self, store: Store, run: str, seq: int, changed: Callable[[], None] = lambda: None
+        self, store: Store, stream: str, seq: int, changed: Callable[[], None] = lambda: None
     ) -> None:
         self.seq = seq
         self.recorded = True
         self._store = store
-        self._stream = stream_of(run)
+        self._stream = stream
         self._changed = changed
         self._waiting: deque[Draft] = deque()
         self._more = anyio.Event()
         self._done = anyio.Event()
 
-    def put(self, event: RunEvent, author: str) -> None:
+    def add(self, draft: Draft) -> None:
         """Store soon."""
-        self._waiting.append(Draft(event.kind, author, encode(event)))
+        self._waiting.append(draft)
         self._more.set()
 
     @property
@@ -76,6 +76,19 @@ class Recorder:
         """Wait until everything that was put so far is stored."""
         while self._waiting:
             await self._done.wait()
+
+    async def find_end(self) -> None:
+        """Learn where the stream ends, however long that takes."""
+        failures = 0
+        while True:
+            try:
+                self.seq = await self._store.newest(self._stream)
+            except Refused as refused:
+                self._failed(refused.detail)
+                await anyio.sleep(_PAUSES[min(failures, len(_PAUSES) - 1)])
+                failures += 1
+            else:
+                return
 
     async def run(self) -> None:
         """Write until cancelled."""
@@ -120,3 +133,16 @@ class Recorder:
             log.error("%s is not being recorded: %s", self._stream, why)
         self.recorded = False
         self._changed()
+
+
+class Recorder(Pen):
+    """The pen of one run."""
+
+    def __init__(
+        self, store: Store, run: str, seq: int, changed: Callable[[], None] = lambda: None
+    ) -> None:
+        super().__init__(store, stream_of(run), seq, changed)
+
+    def put(self, event: RunEvent, author: str) -> None:
+        """Store soon."""
+        self.add(Draft(event.kind, author, encode(event)))

@@ -16,6 +16,7 @@ from action_assistant.runner.events import (
     Author,
     End,
     Ended,
+    EngineSaid,
     Observed,
     Override,
     PauseRequested,
@@ -136,6 +137,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     simulated: bool
     requested_at: int
     override: Override | None = None
+    group: str | None = None
+    like: str | None = None
     desired: Desired = "running"
     incarnation: str | None = None  # None: nothing has been sent, as far as is known
     graph_state: str | None = None
@@ -152,6 +155,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     stopped_by: Author | None = None
     stops_sent: int = 0
     alarms: tuple[Alarm, ...] = ()
+    log: tuple[Message, ...] = ()  # the newest lines of the engine
 
     @property
     def state(self) -> State:
@@ -213,6 +217,8 @@ def begin(event: Requested) -> Run:
         simulated=event.simulated,
         requested_at=event.at,
         override=event.override,
+        group=event.group,
+        like=event.like,
         actions={name: ActionRun(aid=aid) for name, aid in event.actions.items()},
     )
 
@@ -247,6 +253,8 @@ def follow(run: Run, event: RunEvent) -> Run:
         case AlarmRaised():
             alarm = Alarm(event.code, event.at, event.text)
             return replace(run, alarms=(*run.alarms, alarm)[-KEPT:])
+        case EngineSaid():
+            return replace(run, log=(*run.log, Message(event.at, event.text))[-KEPT:])
         case Ended():
             return _end(run, event)
         case Requested() | Unknown():
@@ -261,7 +269,7 @@ def is_news(run: Run, shown: Snapshot) -> bool:
     if shown.state != (run.graph_state if own else run.parts.get(shown.graph)):
         return True
     for node, state in shown.nodes.items():
-        action = run.actions.get(_key(run, shown.graph, node))
+        action = run.actions.get(key_of(run, shown.graph, node))
         if action is None or action.state != state:
             return True
         if len(shown.messages.get(node, ())) != action.heard:
@@ -288,10 +296,10 @@ def _observe(run: Run, seen: Iterable[Seen]) -> Run:
     for item in seen:
         match item:
             case NodeState():
-                name = _key(run, item.graph, item.node)
+                name = key_of(run, item.graph, item.node)
                 actions[name] = _changed(actions.get(name, ActionRun()), item.state, item.at)
             case NodeResult():
-                name = _key(run, item.graph, item.node)
+                name = key_of(run, item.graph, item.node)
                 actions[name] = _resulted(actions.get(name, ActionRun()), item)
             case GraphState():
                 if item.graph == run.graph_name:
@@ -302,7 +310,7 @@ def _observe(run: Run, seen: Iterable[Seen]) -> Run:
                 result = item.result if item.graph == run.graph_name else result
             case Snapshot():
                 for node, state in item.nodes.items():
-                    name = _key(run, item.graph, node)
+                    name = key_of(run, item.graph, node)
                     action = _shown(actions.get(name, ActionRun()), state, item, run)
                     actions[name] = _heard(action, item.messages.get(node, ()), item.at)
                 if item.graph == run.graph_name:
@@ -316,7 +324,8 @@ def _observe(run: Run, seen: Iterable[Seen]) -> Run:
     return replace(run, actions=actions, parts=parts, graph_state=graph_state, result=result)
 
 
-def _key(run: Run, graph: str, node: str) -> str:
+def key_of(run: Run, graph: str, node: str) -> str:
+    """The name of an action in a run: nodes of sub-graphs stand behind the name of theirs."""
     return node if graph == run.graph_name else f"{graph}/{node}"
 
 

@@ -68,6 +68,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     result: str | None
     proof_at: datetime | None
     unknown_since: datetime | None
+    group: str | None
     requested_at: datetime
     started_at: datetime | None
     ended_at: datetime | None
@@ -140,6 +141,7 @@ def summary_of_row(row: Row[Any]) -> Summary:
         result=row.result,
         proof_at=_time(more.get("proof_at")),
         unknown_since=_time(more.get("unknown_since")) if row.state == "lost" else None,
+        group=more.get("group"),
         requested_at=time(row.requested_at),
         started_at=_time(row.started_at),
         ended_at=_time(row.ended_at),
@@ -174,6 +176,7 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "result": run.result,
         "proof_at": _time(run.proof_at),
         "unknown_since": _time(run.unknown_since),
+        "group": run.group,
         "requested_at": time(run.requested_at),
         "started_at": _time(run.started_at),
         "ended_at": _time(run.ended_at),

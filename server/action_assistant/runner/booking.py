@@ -1,0 +1,103 @@
+"""A start becomes a run: stored before anything is sent, once for each request."""
+
+import secrets
+
+import anyio
+from anyio.abc import TaskGroup
+
+from action_assistant.errors import Conflict, Refused, Unavailable
+from action_assistant.journal.events import Draft
+from action_assistant.runner import archive
+from action_assistant.runner.admission import StartRequest
+from action_assistant.runner.driving import Clock
+from action_assistant.runner.events import Author, Ended, Requested, encode
+from action_assistant.runner.history import Ledger
+from action_assistant.runner.links.port import Order
+from action_assistant.runner.recorder import stream_of
+from action_assistant.runner.runs import Run, begin
+from action_assistant.runner.starting import Cleared
+from action_assistant.umrf import codec
+
+
+def booked(
+    asked: StartRequest,
+    cleared: Cleared,
+    author: Author,
+    *,
+    at: int,
+    number: int,
+    group: str | None,
+) -> tuple[Requested, Order]:
+    """What will be stored of a start, and what will be sent."""
+    admitted = cleared.admitted
+    run, graph = secrets.token_urlsafe(9), admitted.graph
+    umrf = codec.write(graph, codec.Stamp(admitted.graph_id, asked.version, run))
+    requested = Requested(
+        at=at,
+        run=run,
+        number=number,
+        request_id=asked.request_id,
+        author=author,
+        graph=admitted.graph_id,
+        graph_name=graph.name,
+        version=asked.version,
+        digest=admitted.digest,
+        engine=asked.engine,
+        simulated=cleared.own,
+        actions={each.full_name: each.key for each in graph.actions if not each.missing},
+        umrf=umrf,
+        script=admitted.script_text,
+        override=asked.override,
+        group=group,
+        like=asked.like,
+    )
+    targets = () if cleared.own else (asked.engine,)
+    return requested, Order(run=run, graph=graph, umrf=umrf, targets=targets)
+
+
+class Book:
+    """Where starts are written down."""
+
+    def __init__(self, ledger: Ledger, tasks: TaskGroup, wall: Clock) -> None:
+        self._ledger = ledger
+        self._tasks = tasks
+        self._wall = wall
+
+    async def run_of(self, asked: StartRequest) -> str | None:
+        """The run that a request has become. Raises Conflict when it was another start."""
+        rows = await self._ledger.query(archive.by_request(asked.request_id))
+        if not rows:
+            return None
+        row = rows[0]
+        if (row.digest, row.engine) != (asked.digest, asked.engine):
+            raise Conflict(
+                "This request_id belongs to another start.", where={"path": "/request_id"}
+            )
+        found: str = row.id
+        return found
+
+    async def store(self, requested: Requested) -> Run:
+        """What cannot be recorded is not started."""
+        stream = stream_of(requested.run)
+        draft = Draft(requested.kind, requested.author.id, encode(requested))
+        try:
+            await self._ledger.append(stream, [draft], expected=0)
+        except Refused as refused:
+            self._tasks.start_soon(self._disown, requested.run)
+            raise Unavailable(
+                f"The run could not be recorded, so nothing was started. {refused.detail}"
+            ) from refused
+        return begin(requested)
+
+    async def _disown(self, run: str) -> None:
+        """A commit whose answer got lost may still have happened: then say that nothing was sent."""
+        stream = stream_of(run)
+        end = Ended(self._wall(), "refused", None, "It could not be recorded in time.")
+        while True:
+            try:
+                seq = await self._ledger.newest(stream)
+                if seq:
+                    await self._ledger.append(stream, [Draft(end.kind, "", encode(end))])
+                return
+            except Refused:
+                await anyio.sleep(1)

@@ -1,0 +1,48 @@
+"""Feedback may be older than an answer that overtook it: which of it is news. Pure.
+
+The engine sends what happened in the last half second, and an answer to a get may have told the end
+of that already. Applied after it, the older states would look like further visits that never were.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+from action_assistant.runner.runs import Run, is_news, key_of
+from action_assistant.runner.seen import Snapshot
+
+_FAR: Final = {
+    "UNINITIALIZED": 0,
+    "INITIALIZED": 0,
+    "RUNNING": 1,
+    "PAUSE_REQUESTED": 1,
+    "PAUSED": 1,
+    "STOPPING": 2,
+    "FINISHED": 3,
+    "ERROR": 3,
+}
+
+
+def fresh(run: Run, snapshots: Sequence[Snapshot]) -> tuple[Snapshot, ...]:
+    """What of feedback, oldest first, comes after the state that a get has shown. In a loop a state
+    that looks older may be a new lap; it is left for the next get to tell."""
+    known: dict[str, int] = {}
+    for i, shown in enumerate(snapshots):
+        if not is_news(run, shown):
+            known[shown.graph] = i
+    return tuple(
+        shown
+        for i, shown in enumerate(snapshots)
+        if i > known.get(shown.graph, -1) and not _behind(run, shown)
+    )
+
+
+def _behind(run: Run, shown: Snapshot) -> bool:
+    """Whether nothing in it is further than what is known, and something is less far."""
+    less = False
+    for node, state in shown.nodes.items():
+        action = run.actions.get(key_of(run, shown.graph, node))
+        there, here = _FAR.get(action.state if action else "", 0), _FAR.get(state, 0)
+        if here > there:
+            return False
+        less = less or here < there
+    return less

@@ -1,0 +1,256 @@
+"""What is looked at before a start, item by item. Pure: what was asked and answered comes in.
+
+The page shows the items, a start refuses by the same ones: nobody is told something else than what
+then happens.
+"""
+
+from collections.abc import Collection, Sequence
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.errors import Conflict, Refused
+from action_assistant.runner.admission import Admitted
+from action_assistant.runner.engines import Index
+from action_assistant.runner.links.port import Answer, Standing
+from action_assistant.runner.runs import Run
+from action_assistant.umrf.check import STRUCTURAL, check
+from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.model import Graph, Problem
+
+Verdict: TypeAlias = Literal["passed", "warned", "blocked"]
+
+#: Problems that the index of an engine shows.
+_OF_INDEX: Final = frozenset({"unknown-action", "signature", "parameter-type"})
+_SHOWN: Final = 20
+
+
+class Item(msgspec.Struct, frozen=True, kw_only=True):
+    """One thing that was looked at. A person may override a blocked one where `overridable`, with
+    the codes in `codes` and a reason."""
+
+    code: str
+    verdict: Verdict
+    text: str
+    codes: tuple[str, ...] = ()
+    overridable: bool = False
+    problems: tuple[Problem, ...] = ()
+
+
+class Preflight(msgspec.Struct, frozen=True, kw_only=True):
+    """What stands between a graph and its start on one engine. `override`: the codes that a person
+    would have to answer for; `never`: something cannot be overridden."""
+
+    engine: str
+    items: tuple[Item, ...]
+    override: tuple[str, ...]
+    never: bool
+
+
+class Sight(msgspec.Struct, frozen=True, kw_only=True):
+    """An engine at the moment of a pre-flight. `took_ms`: until it answered a get sent for it."""
+
+    name: str
+    facts: EngineFacts
+    standing: Standing
+    answer: Answer
+    index: Index
+    took_ms: float
+    open_runs: frozenset[str] = frozenset()
+
+
+def summed(engine: str, items: Sequence[Item]) -> Preflight:
+    """The items of one engine with what follows from them."""
+    blocked = [item for item in items if item.verdict == "blocked"]
+    codes = sorted({code for item in blocked if item.overridable for code in item.codes})
+    never = any(not item.overridable for item in blocked)
+    return Preflight(engine=engine, items=tuple(items), override=tuple(codes), never=never)
+
+
+def of_refusal(code: str, refused: Refused) -> Item:
+    """A refusal as an item. Problems that a person may answer for stay so."""
+    where = refused.where or {}
+    found = where.get("problems")
+    problems = msgspec.convert(found, tuple[Problem, ...]) if isinstance(found, list) else ()
+    codes = tuple(sorted({problem.code for problem in problems}))
+    return Item(
+        code=code,
+        verdict="blocked",
+        text=refused.detail,
+        codes=codes,
+        overridable=bool(codes) and not STRUCTURAL & set(codes),
+        problems=problems,
+    )
+
+
+def of_graph(admitted: Admitted) -> Item:
+    """The graph has been admitted; what warns does not stand in the way."""
+    warned = tuple(each for each in admitted.problems if each.severity == "warning")[:_SHOWN]
+    over = tuple(each for each in admitted.problems if each.severity == "error")[:_SHOWN]
+    if over:
+        text = f"{len(over)} certain problems are overridden."
+        return Item(code="graph", verdict="warned", text=text, problems=(*over, *warned))
+    if warned:
+        text = f"No certain hazard; {_count(len(warned), 'possible one')}."
+        return Item(code="graph", verdict="warned", text=text, problems=warned)
+    return Item(code="graph", verdict="passed", text="No hazard is known.")
+
+
+def of_taken(engine: str, other: Run | None) -> Item:
+    """One run per robot."""
+    if other is None:
+        return Item(code="free", verdict="passed", text=f"{engine} has no other run from here.")
+    text = (
+        f"{engine} is taken by run {other.number} of {other.graph_name}, started by "
+        f"{other.author.name}; it is {other.state}."
+    )
+    return Item(code="free", verdict="blocked", text=text)
+
+
+def of_answer(sight: Sight) -> Item:
+    """It has answered a get sent now."""
+    return Item(
+        code="answers",
+        verdict="passed",
+        text=f"{sight.name} answered after {max(1, round(sight.took_ms))} ms.",
+    )
+
+
+def of_silence(engine: str, why: str) -> Item:
+    """It has not."""
+    text = f"{engine} does not answer, so a stop could not be confirmed either. Nothing was sent. {why}"
+    return Item(code="answers", verdict="blocked", text=text.rstrip())
+
+
+def of_robot(sight: Sight, graph: Graph) -> tuple[Item, ...]:
+    """All that an answering robot is looked at for."""
+    return (
+        of_answer(sight),
+        _proof(sight),
+        _actions(sight, graph),
+        _quiet(sight, graph),
+        _others(sight),
+        _actors(sight, graph),
+    )
+
+
+def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
+    """Refuse a start that an item stands in the way of. Raises Conflict."""
+    for item in items:
+        if item.verdict != "blocked":
+            continue
+        if item.overridable and set(item.codes) <= set(overridden):
+            continue
+        rule = " A person may override this with a reason." if item.overridable else ""
+        raise Conflict(
+            f"{item.text}{rule}",
+            where={"path": "/engine", "item": item.code, "items": msgspec.to_builtins(list(items))},
+        )
+
+
+def _proof(sight: Sight) -> Item:
+    """A stop can be proven, and the messages are those that we speak."""
+    standing, name = sight.standing, sight.name
+    if standing.generation == "older":
+        text = (
+            f"{name} speaks an older generation of temoto_msgs: it would not understand a Stop. "
+            "Update its engine."
+        )
+        return Item(code="proof", verdict="blocked", text=text)
+    deaf = [each for each in ("start", "stop") if standing.listeners.get(each) == 0]
+    if deaf:
+        text = f"Nobody listens to {' and '.join(deaf)} messages for {name}: nothing would arrive."
+        return Item(code="proof", verdict="blocked", text=text)
+    if standing.servers != 1:
+        text = (
+            f"{standing.servers} engines answer on the path of {name}"
+            if standing.servers
+            else f"Discovery shows nobody who serves the path of {name}"
+        )
+        text += ", so no answer would prove a stop. Give each engine a path of its own."
+        return Item(code="proof", verdict="blocked", text=text, codes=("proof",), overridable=True)
+    if standing.generation == "unknown":
+        text = (
+            f"One engine answers for {name}; which generation of messages it speaks is not known."
+        )
+        return Item(code="proof", verdict="warned", text=text)
+    return Item(code="proof", verdict="passed", text="A stop can be proven: one engine answers.")
+
+
+def _actions(sight: Sight, graph: Graph) -> Item:
+    """It has the actions, with the same parameters."""
+    index = sight.index
+    if graph.name in index.graphs:
+        text = (
+            f"{sight.name} has a graph called {graph.name} in its own index and so refuses another "
+            "one of that name. Rename this one."
+        )
+        return Item(code="actions", verdict="blocked", text=text)
+    if not index.actions and not index.graphs:
+        text = f"{sight.name} names no actions, so whether it knows these cannot be said."
+        return Item(code="actions", verdict="warned", text=text)
+    own = {action.key for action in graph.actions if action.actor in {"", sight.name}}
+    problems = tuple(
+        each
+        for each in check(graph, index.actions, sight.facts, index.graphs)
+        if each.code in _OF_INDEX and (each.where.aid is None or each.where.aid in own)
+    )
+    if not problems:
+        text = f"{sight.name} knows all {_count(len(own), 'action')}, with the same parameters."
+        return Item(code="actions", verdict="passed", text=text)
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return Item(
+        code="actions",
+        verdict="blocked",
+        text=f"{sight.name} would refuse the graph: {problems[0].message}{more}",
+        codes=tuple(sorted({each.code for each in problems})),
+        overridable=True,
+        problems=problems[:_SHOWN],
+    )
+
+
+def _quiet(sight: Sight, graph: Graph) -> Item:
+    """Nothing of somebody else runs there."""
+    moving = [
+        each
+        for each in sight.answer.graphs
+        if each.active and (each.run is None or each.run not in sight.open_runs)
+    ]
+    if any(each.graph == graph.name for each in moving):
+        text = (
+            f"A graph called {graph.name} runs on {sight.name} already, started by somebody else: "
+            "the engine would refuse this one and stop that one. Stop it first."
+        )
+        return Item(code="quiet", verdict="blocked", text=text)
+    if moving:
+        names = ", ".join(sorted({each.graph for each in moving})[:3])
+        text = f"{sight.name} runs {names}, which nobody started from here."
+        return Item(code="quiet", verdict="blocked", text=text, codes=("quiet",), overridable=True)
+    return Item(code="quiet", verdict="passed", text=f"Nothing else runs on {sight.name}.")
+
+
+def _others(sight: Sight) -> Item:
+    """Nobody else publishes starts."""
+    others = sight.standing.others
+    if others == 0:
+        return Item(code="others", verdict="passed", text="Nobody else can start something there.")
+    who = _count(others, "other program")
+    text = f"{who} can publish starts to {sight.name}: what runs there may change at any moment."
+    return Item(code="others", verdict="blocked", text=text, codes=("others",), overridable=True)
+
+
+def _actors(sight: Sight, graph: Graph) -> Item:
+    """The actions are this robot's, or the engines synchronise."""
+    named = {action.actor for action in graph.actions if not action.missing} - {""}
+    foreign = sorted(named - {sight.name, sight.standing.actor})
+    if not foreign or sight.facts.synchronises:
+        return Item(code="actors", verdict="passed", text=f"The actions are {sight.name}'s to do.")
+    text = (
+        f"Actions belong to {', '.join(foreign)}, not to {sight.name}, and its engine cannot "
+        "synchronise with others: it refuses the graph."
+    )
+    return Item(code="actors", verdict="blocked", text=text, codes=("actors",), overridable=True)
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,224 @@
+"""The routes of robots: the registry, what they do, what others told them, and looks before starts."""
+
+from datetime import datetime
+from typing import Any, Final, Protocol
+
+import msgspec
+from litestar import Request, Response, delete, get, patch, post
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.errors import BadInput, NotFound
+from action_assistant.runner import shapes
+from action_assistant.runner.admission import SIMULATOR
+from action_assistant.runner.control import Control
+from action_assistant.runner.described import GroupOperation, LookOperation
+from action_assistant.runner.events import Author
+from action_assistant.runner.flight import Commanded, EngineBecame
+from action_assistant.runner.links.port import Candidate, Registration
+from action_assistant.runner.preflight import Preflight
+from action_assistant.runner.robots import Robot
+from action_assistant.runner.starting import read_group
+from action_assistant.umrf import codec
+from action_assistant.umrf.model import Signature
+from action_assistant.web.access import Needs, person_of
+
+_EVENTS: Final = 200
+_Asking = Request[Any, Any, Any]
+
+
+class Has(Protocol):
+    """What these routes work on."""
+
+    control: Control
+
+
+class Robots(msgspec.Struct, frozen=True):
+    """All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can."""
+
+    engines: list[Robot]
+    no_reach: str
+
+
+class Change(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What shall be different about a robot."""
+
+    domain: int | None = None
+    rmw: str | None = None
+    get_service: str | None = None
+    profile: dict[str, object] | None = None
+
+
+class KnownAction(msgspec.Struct, frozen=True):
+    """An action that a robot has indexed."""
+
+    name: str
+    inputs: dict[str, str]
+    outputs: dict[str, str]
+
+
+class Known(msgspec.Struct, frozen=True):
+    """What a robot can do. `unread`: files of its index that cannot be read."""
+
+    actions: list[KnownAction]
+    graphs: list[str]
+    unread: int
+
+
+class Told(msgspec.Struct, frozen=True, kw_only=True):
+    """A line of a robot's flight record. `has_graph`: its graph can be fetched."""
+
+    seq: int
+    at: datetime
+    kind: str
+    command: str = ""
+    graph: str = ""
+    sender: str = ""
+    state: str = ""
+    why: str = ""
+    run: str | None = None
+    number: int | None = None
+    has_graph: bool = False
+
+
+class GroupShown(msgspec.Struct, frozen=True, kw_only=True):
+    """Runs that were started together. `failed`: robots that nothing was sent to, and why."""
+
+    id: str
+    runs: list[shapes.RunShown]
+    failed: dict[str, str]
+
+
+def routes(house: Has) -> list[ControllerRouterHandler]:
+    """All of them."""
+    return [*_registry(house), *_one_robot(house), *_starts(house)]
+
+
+def _registry(house: Has) -> list[ControllerRouterHandler]:
+    @get("/api/robots", summary="Engines that runs can go to")
+    async def robots() -> list[Robot]:
+        return list(house.control.robots.all())
+
+    @get("/api/reach", summary="Whether robots can be reached over ROS 2 from here")
+    async def reach() -> Robots:
+        return Robots(list(house.control.robots.all()), house.control.robots.no_reach)
+
+    @get("/api/candidates", summary="Engines in sight that nobody registered yet")
+    async def candidates() -> list[Candidate]:
+        return list(await house.control.robots.candidates())
+
+    @post("/api/robots", summary="Register a robot", guards=[Needs("register")])
+    async def register(data: Registration, request: _Asking) -> Response[Robot]:
+        robot = await house.control.register(data, author_of(request))
+        return Response(robot, status_code=201, headers={"location": f"/api/robots/{robot.name}"})
+
+    @patch("/api/robots/{name:str}", summary="Change a robot", guards=[Needs("register")])
+    async def change(name: str, data: Change, request: _Asking) -> Robot:
+        known = house.control.robots.registration(name)
+        fields = {k: v for k, v in msgspec.structs.asdict(data).items() if v is not None}
+        changed = msgspec.structs.asdict(known) | fields
+        try:
+            asked = msgspec.convert(changed, Registration)
+        except msgspec.ValidationError as wrong:
+            raise BadInput(str(wrong)) from wrong
+        return await house.control.register(asked, author_of(request))
+
+    @delete("/api/robots/{name:str}", summary="Forget a robot", guards=[Needs("register")])
+    async def remove(name: str, request: _Asking) -> None:
+        await house.control.remove(name, author_of(request))
+
+    return [robots, reach, candidates, register, change, remove]
+
+
+def _one_robot(house: Has) -> list[ControllerRouterHandler]:
+    @get("/api/robots/{name:str}", summary="One engine")
+    async def robot(name: str) -> Robot:
+        if name == SIMULATOR:
+            return next(house.control.robots.all())
+        return house.control.robots.robot(name)
+
+    @get("/api/robots/{name:str}/known", summary="Actions and graphs that a robot has indexed")
+    async def known(name: str) -> Known:
+        index = await house.control.robots.index(name)
+        actions = [_action(action, index.actions[action]) for action in sorted(index.actions)]
+        return Known(actions, sorted(index.graphs), index.unread)
+
+    @get("/api/robots/{name:str}/events", summary="What others told a robot, newest first")
+    async def events(name: str) -> list[Told]:
+        found = await house.control.robots.flight(name, _EVENTS)
+        return [_told(seq, event) for seq, event in reversed(found)]
+
+    @get("/api/robots/{name:str}/events/{seq:int}/umrf", summary="The graph of a command, as UMRF")
+    async def commanded(name: str, seq: int) -> Response[bytes]:
+        text = await house.control.robots.commanded(name, seq)
+        return _umrf(text)
+
+    @get("/api/robots/{name:str}/umrf", summary="A graph that a robot holds, as UMRF")
+    async def held(name: str, graph: str) -> Response[bytes]:
+        """Without its run state: a graph that carries one must not be sent again."""
+        return _umrf(house.control.robots.held(name, graph))
+
+    return [robot, known, events, commanded, held]
+
+
+def _starts(house: Has) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/preflight",
+        status_code=200,
+        summary="What stands between a graph and its start, engine by engine",
+        operation_class=LookOperation,
+    )
+    async def look(request: _Asking) -> list[Preflight]:
+        return await house.control.look(read_group(await request.body()))
+
+    @post(
+        "/api/groups",
+        summary="Start a version on several robots",
+        operation_class=GroupOperation,
+        guards=[Needs("operate")],
+    )
+    async def start(request: _Asking) -> Response[GroupShown]:
+        asked = read_group(await request.body())
+        grouped = await house.control.start_group(asked, author_of(request))
+        runs = [shapes.shown(run) for run in grouped.runs]
+        shown = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
+        return Response(shown, status_code=201 if grouped.fresh else 200)
+
+    return [look, start]
+
+
+def author_of(request: _Asking) -> Author:
+    """Who asks, for the record."""
+    person = person_of(request)
+    return Author(person.id, person.name)
+
+
+def _action(name: str, signature: Signature) -> KnownAction:
+    return KnownAction(name, signature.inputs, signature.outputs)
+
+
+def _told(seq: int, event: Commanded | EngineBecame) -> Told:
+    at = shapes.time(event.at)
+    match event:
+        case Commanded():
+            return Told(
+                seq=seq,
+                at=at,
+                kind="commanded",
+                command=event.command,
+                graph=event.graph,
+                sender=event.sender,
+                run=event.run,
+                number=event.number,
+                has_graph=event.umrf != "",
+            )
+        case EngineBecame():
+            return Told(seq=seq, at=at, kind="became", state=event.state, why=event.why)
+
+
+def _umrf(text: str) -> Response[bytes]:
+    """A graph as it can be imported. Raises NotFound when it cannot be read at all."""
+    try:
+        graph = codec.read(text).graph
+    except codec.Unreadable as wrong:
+        raise NotFound(f"What was sent is no UMRF graph: {wrong.message}") from wrong
+    return Response(codec.write(graph).encode(), media_type="application/json")

@@ -1,0 +1,201 @@
+"""What must be true before a start is stored and sent, found out for each engine it shall go to."""
+
+from collections.abc import Callable, Sequence
+from typing import Annotated, Final
+
+import anyio
+import msgspec
+
+from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
+from action_assistant.runner import preflight
+from action_assistant.runner.admission import SIMULATOR, Admitted, StartRequest, admit, decoded
+from action_assistant.runner.driving import Clock
+from action_assistant.runner.engines import KnownEngine
+from action_assistant.runner.events import Override
+from action_assistant.runner.history import Aside
+from action_assistant.runner.links.port import Answer, Link, NoAnswer
+from action_assistant.runner.links.simulator import SimulatorLink
+from action_assistant.runner.preflight import Item, Preflight, Sight
+from action_assistant.runner.robots import Robots
+from action_assistant.runner.runs import Run
+from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
+from action_assistant.umrf.semantics import Engine
+
+_PREFLIGHT_S: Final = 2.0
+_MOST: Final = 20  # engines of one group
+
+_Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
+
+
+class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One version for several robots at once. Without a `request_id` it can only be looked at."""
+
+    version: str
+    digest: str
+    umrf: msgspec.Raw
+    engines: Annotated[tuple[_Name, ...], msgspec.Meta(min_length=1, max_length=_MOST)]
+    request_id: Annotated[str, msgspec.Meta(max_length=200)] = ""
+    graph: str | None = None
+    override: Override | None = None
+    like: str | None = None
+
+    def of(self, engine: str) -> StartRequest:
+        """The start on one of them."""
+        return StartRequest(
+            version=self.version,
+            digest=self.digest,
+            umrf=self.umrf,
+            engine=engine,
+            request_id=f"{self.request_id}/{engine}",
+            graph=self.graph,
+            override=self.override,
+            like=self.like if engine == SIMULATOR else None,
+        )
+
+
+def read_group(body: bytes) -> GroupRequest:
+    """The body of a start on several robots, or of a look. Raises BadInput with the place."""
+    asked = decoded(body, GroupRequest)
+    if len(set(asked.engines)) < len(asked.engines):
+        raise BadInput("A robot is named twice.", where={"path": "/engines"})
+    return asked
+
+
+class Cleared(msgspec.Struct, frozen=True, kw_only=True):
+    """Nothing stands in the way: what will be sent, where, and to which life of the engine."""
+
+    admitted: Admitted
+    link: Link
+    own: bool
+    incarnation: str
+
+
+class Starting:
+    """Looks before starts. `taken(engine)` is the run that an engine has from here, if any;
+    `going()` the ids of all open ones."""
+
+    def __init__(
+        self,
+        robots: Robots,
+        *,
+        wall: Clock,
+        aside: Aside,
+        taken: Callable[[str], Run | None],
+        going: Callable[[], frozenset[str]],
+    ) -> None:
+        self._robots = robots
+        self._wall = wall
+        self._aside = aside
+        self._taken = taken
+        self._going = going
+
+    async def cleared(self, asked: StartRequest) -> Cleared:
+        """Look, and refuse what stands in the way. Raises Refused of many kinds."""
+        if asked.engine == SIMULATOR:
+            facts = self._simulated(asked)
+            admitted = await self._aside(lambda: admit(asked, facts))
+            engine = Engine(facts=facts, script=admitted.script)
+            link = SimulatorLink(engine, wall=self._wall)
+            incarnation = (await link.get()).incarnation
+            return Cleared(admitted=admitted, link=link, own=True, incarnation=incarnation)
+        robot = self._robots.reachable(asked.engine)
+        if asked.like is not None:
+            raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
+        admitted = await self._aside(lambda: admit(asked, robot.facts))
+        free = preflight.of_taken(asked.engine, self._taken(asked.engine))
+        preflight.check_items([free], ())
+        try:
+            sight = await self._sight(robot)
+        except NoAnswer as nothing:
+            silence = preflight.of_silence(asked.engine, str(nothing))
+            raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
+                nothing
+            )
+        items = await self._aside(lambda: preflight.of_robot(sight, admitted.graph))
+        preflight.check_items(items, asked.override.codes if asked.override else ())
+        return Cleared(
+            admitted=admitted, link=robot, own=False, incarnation=sight.answer.incarnation
+        )
+
+    async def all_cleared(self, starts: Sequence[StartRequest]) -> list[Cleared]:
+        """Look at several engines at once, and refuse all if one has to be. Raises Conflict."""
+        cleared: dict[str, Cleared] = {}
+        refused: dict[str, Refused] = {}
+
+        async def look(each: StartRequest) -> None:
+            try:
+                cleared[each.engine] = await self.cleared(each)
+            except Refused as why:
+                refused[each.engine] = why
+
+        async with anyio.create_task_group() as tasks:
+            for each in starts:
+                tasks.start_soon(look, each)
+        if refused:
+            told = " ".join(f"{name}: {why.detail}" for name, why in sorted(refused.items()))
+            engines = {name: why.where or {} for name, why in refused.items()}
+            raise Conflict(
+                f"Nothing was started. {told}", where={"path": "/engines", "engines": engines}
+            )
+        return [cleared[each.engine] for each in starts]
+
+    async def look(self, asked: StartRequest) -> Preflight:
+        """Look, and tell all of it. Never raises Refused; nothing is stored or sent but a get."""
+        items: list[Item] = []
+        robot: KnownEngine | None = None
+        admitted: Admitted | None = None
+        try:
+            if asked.engine == SIMULATOR:
+                facts = self._simulated(asked)
+            else:
+                robot = self._robots.reachable(asked.engine)
+                facts = robot.facts
+        except Refused as refused:
+            return preflight.summed(asked.engine, [preflight.of_refusal("link", refused)])
+        try:
+            admitted = await self._aside(lambda: admit(asked, facts))
+            items.append(preflight.of_graph(admitted))
+        except Refused as refused:
+            items.append(preflight.of_refusal("graph", refused))
+        if robot is not None:
+            items.append(preflight.of_taken(asked.engine, self._taken(asked.engine)))
+            items += await self._look_at(robot, admitted)
+        return preflight.summed(asked.engine, items)
+
+    async def _look_at(self, robot: KnownEngine, admitted: Admitted | None) -> list[Item]:
+        try:
+            sight = await self._sight(robot)
+        except NoAnswer as nothing:
+            return [preflight.of_silence(robot.registration.name, str(nothing))]
+        if admitted is None:
+            return [preflight.of_answer(sight)]
+        graph = admitted.graph
+        return list(await self._aside(lambda: preflight.of_robot(sight, graph)))
+
+    async def _sight(self, robot: KnownEngine) -> Sight:
+        """The engine as it answers a get sent now, on the path that would confirm a stop. Raises
+        NoAnswer."""
+        began = anyio.current_time()
+        answer: Answer
+        try:
+            with anyio.fail_after(_PREFLIGHT_S):
+                answer = await robot.get()
+        except TimeoutError as late:
+            raise NoAnswer(f"Asked for {_PREFLIGHT_S:.0f} s. {robot.standing.why}") from late
+        took = 1000 * (anyio.current_time() - began)
+        return Sight(
+            name=robot.registration.name,
+            facts=robot.facts,
+            standing=robot.standing,
+            answer=answer,
+            index=await robot.index(self._aside),
+            took_ms=took,
+            open_runs=self._going(),
+        )
+
+    def _simulated(self, asked: StartRequest) -> EngineFacts:
+        """What is true of the simulator, as itself or playing a robot. Raises NotFound."""
+        if asked.like is None:
+            return SIMULATED
+        facts = facts_of(self._robots.registration(asked.like).profile)
+        return msgspec.structs.replace(facts, simulated=True)
