@@ -98,7 +98,7 @@ class Clock:
     def _notice_stuck(self, graph: Running) -> None:
         if graph.state != "RUNNING" or graph.stuck or graph.active > graph.held:
             return
-        if graph.pausing or self.locked:
+        if graph.pausing or graph.loading or self.locked:
             return
         graph.stuck = True
         if graph.held:

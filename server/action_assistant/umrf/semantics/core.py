@@ -47,6 +47,9 @@ class Core(Clock):
         self.script = script
         self.library = library
         self.actor = actor
+        #: How long an action takes from its trigger to RUNNING the first time (dlopen, onInit).
+        #: Meanwhile nothing counts it as active: a stop passes it by (recording engine_frozen.2).
+        self.loading_ms = 0.0
 
     # Results
 
@@ -173,7 +176,16 @@ class Core(Clock):
             node.calls += 1
             self._state(graph, node, "RUNNING")
             self._soon(partial(self._start_sub, graph, node, node.subgraph))
+        elif self.loading_ms and not node.loaded:
+            graph.loading += 1
+            self._at(self.now + self.loading_ms, partial(self._loaded, graph, node))
         elif self._load(graph, node):
+            self._begin(graph, node)
+
+    def _loaded(self, graph: Running, node: Node) -> None:
+        """The action is there now, and runs, whatever has become of its graph."""
+        graph.loading -= 1
+        if self.graphs.get(graph.name) is graph and not node.loaded and self._load(graph, node):
             self._begin(graph, node)
 
     def _run_unloaded(self, graph: Running, node: Node) -> None:

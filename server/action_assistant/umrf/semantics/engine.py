@@ -51,7 +51,8 @@ class Engine(Core):
     `library`: graphs that can be sub-graphs, by name. `actor`: the engine's name; without one it
     plays the only actor that a graph names. `signatures`: the actions that it has; without them it
     has every action with any parameters. `serial`: commands wait for each other as they do over
-    ROS; otherwise a second stop during a stop reaches the engine and kills it.
+    ROS; otherwise a second stop during a stop reaches the engine and kills it. `loading_ms`: see
+    `Core`.
     """
 
     def __init__(
@@ -63,8 +64,10 @@ class Engine(Core):
         actor: str = "",
         signatures: Mapping[str, Signature] | None = None,
         serial: bool = True,
+        loading_ms: float = 0.0,
     ) -> None:
         super().__init__(facts, script or Script(), library or {}, actor)
+        self.loading_ms = loading_ms
         self.signatures = signatures
         self.serial = serial
         self._busy = False
@@ -78,6 +81,11 @@ class Engine(Core):
         if self._out or self._tasks:
             return self.now
         return self._heap[0][0] if self._heap else None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a command is still being carried out, so that the next one waits."""
+        return self._busy
 
     def advance(self, to_ms: float) -> list[Trace]:
         """Everything due up to and including `to_ms`, in order."""

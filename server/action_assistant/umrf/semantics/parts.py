@@ -122,7 +122,8 @@ class Node:
 class Running:
     """A graph in an engine. `name` is the one it runs under, `own` the one it calls itself.
 
-    `running`: nodes in state RUNNING; `active`: nodes that hold a thread; `held`: paused ones.
+    `running`: nodes in state RUNNING; `active`: nodes that hold a thread; `held`: paused ones;
+    `loading`: nodes that are about to run.
     """
 
     def __init__(self, name: str, graph: Graph, above: "Node | None", home: "Running | None"):
@@ -139,6 +140,7 @@ class Running:
         self.running = 0
         self.active = 0
         self.held = 0
+        self.loading = 0
         self.stuck = False
         self.pausing = False
         self.bypasses = 0
@@ -244,6 +246,8 @@ def restructure(running: Running, new: Running) -> None:
             node.subgraph = None
             continue
         node.inputs = fresh.inputs
+        for slot in node.inputs.values():
+            slot.received = slot.has_value()  # gone after the run, like what a parent gave
         node.children = fresh.children or node.children
         node.links = fresh.links or node.links
         for link in node.links.values():
