@@ -13,6 +13,8 @@ from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive
 from action_assistant.runner.api import House, routes
 from action_assistant.runner.control import Control
+from action_assistant.runner.links import ros2_reach
+from action_assistant.runner.links.port import Reach
 from action_assistant.runner.live import Hub
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.robots import Robots
@@ -33,7 +35,9 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
     house = house or House()
     journal = await Journal.open(_database(settings), branch="runner", fold=archive.fold)
     try:
-        async with Control.opened(journal, Robots(), wall=wall_clock) as control:
+        reach = ros2_reach(wall_clock)
+        robots = Robots(reach=reach)
+        async with _kept(reach), Control.opened(journal, robots, wall=wall_clock) as control:
             house.control, house.hub = control, Hub(control, wall_clock)
             house.journal = journal
             house.desk = Desk(control, journal, anyio.to_thread.run_sync, wall_clock)
@@ -43,6 +47,16 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
                 tasks.cancel_scope.cancel()
     finally:
         await journal.close()
+
+
+@asynccontextmanager
+async def _kept(reach: Reach | str) -> AsyncIterator[None]:
+    """What reaches robots is let go of last."""
+    try:
+        yield
+    finally:
+        if not isinstance(reach, str):
+            await reach.aclose()
 
 
 def _database(settings: RunnerSettings) -> str:

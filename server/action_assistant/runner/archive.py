@@ -35,8 +35,8 @@ from action_assistant.runner.events import (
     StopRequested,
     decode,
 )
+from action_assistant.runner.registered import Registered, Removed
 from action_assistant.runner.review import about, again
-from action_assistant.runner.robots import Registered, Removed
 
 _OPEN: Final = "open"
 

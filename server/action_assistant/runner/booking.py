@@ -1,6 +1,9 @@
 """A start becomes a run: stored before anything is sent, once for each request."""
 
 import secrets
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from weakref import WeakValueDictionary
 
 import anyio
 from anyio.abc import TaskGroup
@@ -62,6 +65,16 @@ class Book:
         self._ledger = ledger
         self._tasks = tasks
         self._wall = wall
+        self._asking: WeakValueDictionary[str, anyio.Lock] = WeakValueDictionary()
+
+    @asynccontextmanager
+    async def once(self, request: str) -> AsyncIterator[None]:
+        """One at a time for each request."""
+        lock = self._asking.get(request)
+        if lock is None:
+            lock = self._asking[request] = anyio.Lock()
+        async with lock:
+            yield
 
     async def run_of(self, asked: StartRequest) -> str | None:
         """The run that a request has become. Raises Conflict when it was another start."""

@@ -8,7 +8,6 @@ import secrets
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Final
-from weakref import WeakValueDictionary
 
 import anyio
 import msgspec
@@ -26,7 +25,8 @@ from action_assistant.runner.history import Aside, History, Ledger
 from action_assistant.runner.links.absent import AbsentLink
 from action_assistant.runner.links.port import ForeignCommand, Link, NotSent, Order, Registration
 from action_assistant.runner.preflight import Preflight
-from action_assistant.runner.robots import Ground, Robot, Robots
+from action_assistant.runner.registered import Robot
+from action_assistant.runner.robots import Ground, Robots
 from action_assistant.runner.runs import ENDED, Run
 from action_assistant.runner.starting import Cleared, GroupRequest, Starting
 
@@ -69,7 +69,6 @@ class Control:
         self._aside = aside
         self._watchers: list[Callable[[OpenRun], None]] = []
         self._news = anyio.Event()
-        self._asking: WeakValueDictionary[str, anyio.Lock] = WeakValueDictionary()
         self._places: dict[str, anyio.Lock] = {}
         self._book = Book(ledger, tasks, wall)
         self._starting = Starting(
@@ -121,7 +120,7 @@ class Control:
         """Carry out a start, at most once per request. Raises Refused of many kinds; then nothing
         was sent. Returns after the one message has left."""
         stops = self._stops
-        async with self._asked(asked.request_id):
+        async with self._book.once(asked.request_id):
             known = await self._known(asked)
             if known is not None:
                 return Started(known, fresh=False)
@@ -140,7 +139,7 @@ class Control:
         if not asked.request_id or SIMULATOR in asked.engines:
             where = "/engines" if asked.request_id else "/request_id"
             raise BadInput("A group has a request_id, and robots only.", where={"path": where})
-        async with self._asked(asked.request_id):
+        async with self._book.once(asked.request_id):
             found = [await self._known(each) for each in starts]
             if known := [run for run in found if run is not None]:
                 missing = [each.engine for each, run in zip(starts, found, strict=True) if not run]
@@ -180,15 +179,6 @@ class Control:
             for engine in asked.engines:
                 tasks.start_soon(look, engine)
         return [found[engine] for engine in asked.engines]
-
-    @asynccontextmanager
-    async def _asked(self, request: str) -> AsyncIterator[None]:
-        """One at a time for each request."""
-        lock = self._asking.get(request)
-        if lock is None:
-            lock = self._asking[request] = anyio.Lock()
-        async with lock:
-            yield
 
     def _place(self, engine: str) -> anyio.Lock:
         """One start at a time for each robot."""
@@ -266,13 +256,24 @@ class Control:
         """Want everything stopped; the runs that this concerns. Never waits."""
         self._stops += 1
         self._last_stop = (author, stop_id)
-        return [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
+        runs = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
+        self.robots.silence(author, frozenset(self.open))
+        return runs
+
+    def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
+        """Want whatever a robot runs stopped: runs of ours, graphs of others. Raises NotFound."""
+        graphs = self.robots.silence(author, frozenset(self.open), name)
+        own = [run for run, opened in tuple(self.open.items()) if opened.run.engine == name]
+        return [run for run in own if self._stop(run, author, "")], graphs
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
-        """Want one run stopped; nothing when it is over. Waits for nothing unless the run is not
-        known. Raises NotFound."""
+        """Want one run stopped, or all of a group; nothing when it is over. Waits for nothing unless
+        the run is not known. Raises NotFound."""
         if run in self.open:
             return [run] if self._stop(run, author, stop_id) else []
+        group = [each for each, opened in tuple(self.open.items()) if opened.run.group == run]
+        if group:
+            return [each for each in group if self._stop(each, author, stop_id)]
         await self.find(run)
         return []
 

@@ -4,7 +4,6 @@ One task listens, one asks, one stops, one writes. None of them waits for anothe
 while a get hangs, and everything goes on while the journal is down.
 """
 
-import hashlib
 import itertools
 import logging
 from collections.abc import Awaitable, Callable
@@ -47,6 +46,7 @@ from action_assistant.runner.links.port import (
     Report,
     Transitions,
 )
+from action_assistant.runner.proof import Rest, hash_of, send_stop
 from action_assistant.runner.recorder import Recorder, Store
 from action_assistant.runner.runs import Run, follow, is_news
 from action_assistant.runner.sameness import difference
@@ -63,7 +63,6 @@ _APPEAR_S: Final = 3.0  # until a started graph must show in answers
 _GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun
 _UNCONFIRMED_S: Final = 2.0
 _SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobody
-_REST_S: Final = 1.0  # a graph that never began is believed only after it was seen so for this long
 _TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
 _ONE_PRESS_S: Final = 1.0
 
@@ -116,7 +115,7 @@ class OpenRun:
         self._stop_trouble = ""
         self._hung = ""
         self._early: list[Report] = []
-        self._resting_since: float | None = None
+        self._rest = Rest()
         self._heard_at = anyio.current_time()
         self._began_at = anyio.current_time()
         self._seen_wall: int | None = None
@@ -361,7 +360,7 @@ class OpenRun:
 
     def _missing(self, other: Snapshot | None, answer: Answer) -> None:
         """The answer does not show this run."""
-        self._resting_since = None
+        self._rest.forget()
         if self.run.graph_state is not None:
             self._end(
                 "lost",
@@ -383,7 +382,7 @@ class OpenRun:
 
     def _conclude(self, shown: list[Snapshot], answer: Answer, order: int) -> None:
         own, moving = shown[0], any(each.active for each in shown)
-        at_rest = not moving and self._at_rest(own)
+        at_rest = not moving and self._rest.seen(own)
         if self.run.desired != "stopped":
             end = self.run.apparent_end
             if end is not None and own.state in TERMINAL and not moving:
@@ -392,8 +391,7 @@ class OpenRun:
         if self._stop_sent is None or order <= self._stop_sent:
             return
         if at_rest:
-            digest = hashlib.sha256(msgspec.json.encode(shown)).hexdigest()
-            self.tell(Proof(answer.at, answer.asked_at, digest))
+            self.tell(Proof(answer.at, answer.asked_at, hash_of(shown)))
             self._end(self.run.apparent_end or "stopped", "")
         elif own.state == "FINISHED":
             self._stop_trouble = (
@@ -403,25 +401,13 @@ class OpenRun:
         else:
             self._stop_trouble = f"{', '.join(self.run.active) or own.graph} has not stopped yet"
 
-    def _at_rest(self, own: Snapshot) -> bool:
-        """Whether this graph will not move by itself. RUNNING without a running node may be about
-        to start one; one that never began has been seen between two steps of its start."""
-        if own.state in TERMINAL:
-            return True
-        if own.state not in {"UNINITIALIZED", "INITIALIZED"}:
-            self._resting_since = None
-            return False
-        now = anyio.current_time()
-        self._resting_since = self._resting_since if self._resting_since is not None else now
-        return now - self._resting_since >= _REST_S
-
     # --- stopping -----------------------------------------------------------------------------
 
     async def _stop_until_proven(self) -> None:
         await self._stop_wanted.wait()
         began, gap = anyio.current_time(), _STOP_POLL_S
         for attempt in itertools.count(self.run.stops_sent + 1):
-            failed = await self._send_stop()
+            failed = await send_stop(self._link, self.run.graph_name)
             if not failed and self._stop_sent is None:
                 self._stop_sent = next(self._order)
             self.tell(StopSent(self._wall(), attempt, failed))
@@ -435,17 +421,6 @@ class OpenRun:
                 return
             await anyio.sleep(gap)
             gap = min(gap * 1.5, 1.0)
-
-    async def _send_stop(self) -> str:
-        """One message; what went wrong, if anything."""
-        try:
-            with anyio.fail_after(1):
-                await self._link.stop(self.run.graph_name)
-        except NotSent as why:
-            return str(why) or "not sent"
-        except TimeoutError:
-            return "the message could not be handed over within a second"
-        return ""
 
     def _end(self, state: End, detail: str) -> None:
         result = self.run.result or _RESULTS.get(self.run.graph_state or "")

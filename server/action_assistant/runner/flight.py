@@ -8,9 +8,14 @@ from collections.abc import Mapping
 from typing import ClassVar, Final, TypeAlias
 
 import msgspec
+from anyio.abc import TaskGroup
 
+from action_assistant.errors import NotFound
 from action_assistant.journal.events import Draft, Event
+from action_assistant.runner.events import Author
+from action_assistant.runner.history import Ledger
 from action_assistant.runner.links.port import Command, EngineState, ForeignCommand
+from action_assistant.runner.recorder import Pen
 
 
 def stream_of_robot(name: str) -> str:
@@ -47,10 +52,40 @@ class EngineBecame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
     incarnation: str = ""
 
 
-RobotEvent: TypeAlias = Commanded | EngineBecame
+class StopAsked(msgspec.Struct, frozen=True, kw_only=True):
+    """Somebody here wants a graph stopped that was not started from here."""
+
+    kind: ClassVar[str] = "robot.stop_asked.v1"
+
+    at: int
+    graph: str
+    author: Author
+
+
+class StopWasProven(msgspec.Struct, frozen=True, kw_only=True):
+    """A get asked after that stop showed nothing of the graph moving."""
+
+    kind: ClassVar[str] = "robot.stop_proven.v1"
+
+    at: int
+    graph: str
+    asked_at: int
+
+
+class StopUnproven(msgspec.Struct, frozen=True, kw_only=True):
+    """That stop was given up without a proof."""
+
+    kind: ClassVar[str] = "robot.stop_unproven.v1"
+
+    at: int
+    graph: str
+    why: str
+
+
+RobotEvent: TypeAlias = Commanded | EngineBecame | StopAsked | StopWasProven | StopUnproven
 
 _KINDS: Final[Mapping[str, type[RobotEvent]]] = {
-    each.kind: each for each in (Commanded, EngineBecame)
+    each.kind: each for each in (Commanded, EngineBecame, StopAsked, StopWasProven, StopUnproven)
 }
 
 
@@ -86,3 +121,40 @@ def event_of(stored: Event) -> RobotEvent | None:
     """What a stored event says; None for kinds that this version does not know."""
     known = _KINDS.get(stored.kind)
     return None if known is None else msgspec.json.decode(stored.body, type=known)
+
+
+class FlightRecorder:
+    """Writes and reads the streams of robots."""
+
+    def __init__(self, ledger: Ledger, tasks: TaskGroup) -> None:
+        self._ledger = ledger
+        self._tasks = tasks
+        self._pens: dict[str, Pen] = {}
+
+    def note(self, robot: str, event: RobotEvent, author: str) -> None:
+        """Record soon. Never waits."""
+        pen = self._pens.get(robot)
+        if pen is None:
+            pen = self._pens[robot] = Pen(self._ledger, stream_of_robot(robot), -1)
+            self._tasks.start_soon(self._write, pen)
+        pen.add(draft_of(event, author))
+
+    async def _write(self, pen: Pen) -> None:
+        await pen.find_end()
+        await pen.run()
+
+    async def newest(self, robot: str, most: int) -> list[tuple[int, RobotEvent]]:
+        """The newest events of a robot, oldest first, with their seqs. Raises Unavailable."""
+        stream = stream_of_robot(robot)
+        end = await self._ledger.newest(stream)
+        stored = await self._ledger.read(stream, after=max(0, end - most))
+        read = [(each.seq, event_of(each)) for each in stored]
+        return [(seq, event) for seq, event in read if event is not None]
+
+    async def graph(self, robot: str, seq: int) -> str:
+        """The graph of a recorded command. Raises NotFound, Unavailable."""
+        stored = await self._ledger.read(stream_of_robot(robot), after=seq - 1, limit=1)
+        event = event_of(stored[0]) if stored and stored[0].seq == seq else None
+        if not isinstance(event, Commanded) or not event.umrf:
+            raise NotFound("No graph was recorded with this.")
+        return event.umrf

@@ -5,6 +5,7 @@ Stop goes before it.
 """
 
 import logging
+import math
 from collections import deque
 from collections.abc import Awaitable, Callable
 from datetime import datetime
@@ -21,7 +22,7 @@ from action_assistant.runner import shapes
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.events import Author
-from action_assistant.runner.robots import Robot
+from action_assistant.runner.registered import Robot
 from action_assistant.web.access import person_of, session_of
 
 log: Final = logging.getLogger(__name__)
@@ -30,6 +31,7 @@ _GAP_S: Final = 0.05  # between two states of one run
 _SHARE: Final = 20  # at most one part in so many of the time goes into encoding one run
 _BEAT_S: Final = 1.0
 _SEND_S: Final = 15.0
+_ENGINES_GAP_S: Final = 0.25  # between two lists of engines
 _LETTERS: Final = 64
 _TOO_SLOW: Final = 1013
 _LONGEST: Final = 10_000  # characters of a message from the page
@@ -69,10 +71,17 @@ class RunMessage(msgspec.Struct, frozen=True, tag="run", tag_field="type"):
     run: shapes.RunShown
 
 
+class EnginesMessage(msgspec.Struct, frozen=True, tag="engines", tag_field="type"):
+    """All engines, since one is not as it was."""
+
+    engines: list[Robot]
+
+
 class Beat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
-    """Once a second: the link is alive."""
+    """Once a second: the link is alive. `seen`: when each open run was last shown by its engine."""
 
     at: datetime
+    seen: dict[str, datetime]
 
 
 class Frame(msgspec.Struct, frozen=True):
@@ -91,7 +100,30 @@ class Hub:
         self.wall = wall
         self.boxes: set[Outbox] = set()
         self._frames: WeakKeyDictionary[OpenRun, Frame] = WeakKeyDictionary()
+        self._engines: str | None = None
         control.watch(self._changed)
+        control.watch_robots(self._robots_changed)
+
+    def _robots_changed(self) -> None:
+        self._engines = None
+        for box in self.boxes:
+            box.mark_engines()
+
+    def engines(self) -> str:
+        """All engines as text; encoded once for everybody."""
+        if self._engines is None:
+            message = EnginesMessage(list(self.control.robots.all()))
+            self._engines = msgspec.json.encode(message).decode()
+        return self._engines
+
+    def beat(self) -> str:
+        """A sign of life."""
+        seen = {
+            run: shapes.time(opened.seen_at)
+            for run, opened in self.control.open.items()
+            if opened.seen_at is not None
+        }
+        return _text(Beat(shapes.time(self.wall()), seen))
 
     def _changed(self, opened: OpenRun) -> None:
         for box in self.boxes:
@@ -143,12 +175,20 @@ class Outbox:
         self._letters: deque[str] = deque()
         self._changed: dict[str, OpenRun] = {}
         self._next: dict[str, float] = {}  # run -> when it may be sent again
+        self._engines_at = math.inf  # when the engines are to be sent
+        self._engines_next = 0.0  # not before
         self._news = anyio.Event()
 
     def mark(self, opened: OpenRun) -> None:
         """A run has changed."""
         if opened.run.id not in self._changed:
             self._changed[opened.run.id] = opened
+            self._news.set()
+
+    def mark_engines(self) -> None:
+        """A robot has changed."""
+        if self._engines_at == math.inf:
+            self._engines_at = self._engines_next
             self._news.set()
 
     def post(self, text: str) -> bool:
@@ -167,7 +207,9 @@ class Outbox:
                     await send(text)
                 if text.startswith('{"type":"beat"'):
                     beat = anyio.current_time() + _BEAT_S
-            due = min([beat, *(self._next.get(run, 0.0) for run in self._changed)])
+            due = min(
+                [beat, self._engines_at, *(self._next.get(run, 0.0) for run in self._changed)]
+            )
             with anyio.move_on_after(max(0.0, due - anyio.current_time())):
                 await self._news.wait()
 
@@ -177,10 +219,15 @@ class Outbox:
         if self._letters:
             return self._letters.popleft()
         if now >= beat:
-            return _text(Beat(shapes.time(self._hub.wall())))
+            return self._hub.beat()
         if not self._is_allowed():
             self._changed.clear()
+            self._engines_at = math.inf
             return None
+        if now >= self._engines_at:
+            self._engines_at = math.inf
+            self._engines_next = now + _ENGINES_GAP_S
+            return self._hub.engines()
         for run, opened in self._changed.items():
             if self._next.get(run, 0.0) <= now:
                 del self._changed[run]

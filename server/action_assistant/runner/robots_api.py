@@ -1,7 +1,7 @@
 """The routes of robots: the registry, what they do, what others told them, and looks before starts."""
 
 from datetime import datetime
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, assert_never
 
 import msgspec
 from litestar import Request, Response, delete, get, patch, post
@@ -13,10 +13,17 @@ from action_assistant.runner.admission import SIMULATOR
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import GroupOperation, LookOperation
 from action_assistant.runner.events import Author
-from action_assistant.runner.flight import Commanded, EngineBecame
+from action_assistant.runner.flight import (
+    Commanded,
+    EngineBecame,
+    RobotEvent,
+    StopAsked,
+    StopUnproven,
+    StopWasProven,
+)
 from action_assistant.runner.links.port import Candidate, Registration
 from action_assistant.runner.preflight import Preflight
-from action_assistant.runner.robots import Robot
+from action_assistant.runner.registered import Robot
 from action_assistant.runner.starting import read_group
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Signature
@@ -32,7 +39,7 @@ class Has(Protocol):
     control: Control
 
 
-class Robots(msgspec.Struct, frozen=True):
+class Reached(msgspec.Struct, frozen=True):
     """All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can."""
 
     engines: list[Robot]
@@ -80,6 +87,13 @@ class Told(msgspec.Struct, frozen=True, kw_only=True):
     has_graph: bool = False
 
 
+class Stopped(msgspec.Struct, frozen=True):
+    """What a Stop of a robot concerns: runs of ours, and graphs that others started."""
+
+    runs: list[str]
+    graphs: list[str]
+
+
 class GroupShown(msgspec.Struct, frozen=True, kw_only=True):
     """Runs that were started together. `failed`: robots that nothing was sent to, and why."""
 
@@ -99,8 +113,8 @@ def _registry(house: Has) -> list[ControllerRouterHandler]:
         return list(house.control.robots.all())
 
     @get("/api/reach", summary="Whether robots can be reached over ROS 2 from here")
-    async def reach() -> Robots:
-        return Robots(list(house.control.robots.all()), house.control.robots.no_reach)
+    async def reach() -> Reached:
+        return Reached(list(house.control.robots.all()), house.control.robots.no_reach)
 
     @get("/api/candidates", summary="Engines in sight that nobody registered yet")
     async def candidates() -> list[Candidate]:
@@ -144,20 +158,30 @@ def _one_robot(house: Has) -> list[ControllerRouterHandler]:
 
     @get("/api/robots/{name:str}/events", summary="What others told a robot, newest first")
     async def events(name: str) -> list[Told]:
-        found = await house.control.robots.flight(name, _EVENTS)
+        house.control.robots.registration(name)
+        found = await house.control.robots.flight.newest(name, _EVENTS)
         return [_told(seq, event) for seq, event in reversed(found)]
 
     @get("/api/robots/{name:str}/events/{seq:int}/umrf", summary="The graph of a command, as UMRF")
     async def commanded(name: str, seq: int) -> Response[bytes]:
-        text = await house.control.robots.commanded(name, seq)
-        return _umrf(text)
+        house.control.robots.registration(name)
+        return _umrf(await house.control.robots.flight.graph(name, seq))
 
     @get("/api/robots/{name:str}/umrf", summary="A graph that a robot holds, as UMRF")
     async def held(name: str, graph: str) -> Response[bytes]:
         """Without its run state: a graph that carries one must not be sent again."""
         return _umrf(house.control.robots.held(name, graph))
 
-    return [robot, known, events, commanded, held]
+    @post(
+        "/api/robots/{name:str}/stop",
+        status_code=202,
+        summary="Stop whatever a robot runs",
+        guards=[Needs("stop")],
+    )
+    async def stop(name: str, request: _Asking) -> Stopped:
+        return Stopped(*house.control.stop_robot(name, author_of(request)))
+
+    return [robot, known, events, commanded, held, stop]
 
 
 def _starts(house: Has) -> list[ControllerRouterHandler]:
@@ -166,6 +190,7 @@ def _starts(house: Has) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="What stands between a graph and its start, engine by engine",
         operation_class=LookOperation,
+        guards=[Needs("simulate")],
     )
     async def look(request: _Asking) -> list[Preflight]:
         return await house.control.look(read_group(await request.body()))
@@ -196,7 +221,7 @@ def _action(name: str, signature: Signature) -> KnownAction:
     return KnownAction(name, signature.inputs, signature.outputs)
 
 
-def _told(seq: int, event: Commanded | EngineBecame) -> Told:
+def _told(seq: int, event: RobotEvent) -> Told:
     at = shapes.time(event.at)
     match event:
         case Commanded():
@@ -213,6 +238,15 @@ def _told(seq: int, event: Commanded | EngineBecame) -> Told:
             )
         case EngineBecame():
             return Told(seq=seq, at=at, kind="became", state=event.state, why=event.why)
+        case StopAsked():
+            by = event.author.name
+            return Told(seq=seq, at=at, kind="stop_asked", graph=event.graph, sender=by)
+        case StopWasProven():
+            return Told(seq=seq, at=at, kind="stop_proven", graph=event.graph)
+        case StopUnproven():
+            return Told(seq=seq, at=at, kind="stop_unproven", graph=event.graph, why=event.why)
+        case _:
+            assert_never(event)
 
 
 def _umrf(text: str) -> Response[bytes]:

@@ -104,6 +104,11 @@ class Starting:
         admitted = await self._aside(lambda: admit(asked, robot.facts))
         free = preflight.of_taken(asked.engine, self._taken(asked.engine))
         preflight.check_items([free], ())
+        if self._robots.silencing.going(asked.engine):
+            raise Conflict(
+                f"Something is being stopped on {asked.engine}; a start would be stopped with it.",
+                where={"path": "/engine", "item": "quiet"},
+            )
         try:
             sight = await self._sight(robot)
         except NoAnswer as nothing:

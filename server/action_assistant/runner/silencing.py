@@ -1,0 +1,130 @@
+"""Stops what somebody else runs on a robot: a level, like every stop, until a get proves it.
+
+It ends by itself with the life of the engine, when a minute has brought no proof, and before a start
+from here: a late stop would hit a run that only has the same name.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+import anyio
+from anyio.abc import TaskGroup
+
+from action_assistant.runner.driving import Clock
+from action_assistant.runner.engines import KnownEngine
+from action_assistant.runner.events import Author
+from action_assistant.runner.flight import RobotEvent, StopAsked, StopUnproven, StopWasProven
+from action_assistant.runner.links.port import Answer, NoAnswer
+from action_assistant.runner.proof import send_stop
+from action_assistant.runner.seen import TERMINAL
+
+_GAP_S: Final = 0.1
+_SLOWEST_S: Final = 1.0
+_GET_S: Final = 1.0
+_PATIENCE_S: Final = 60.0
+_LOUD_S: Final = 2.0
+
+
+class Silencing:
+    """All such stops that go on. `note` records; `changed` is told when people see something else."""
+
+    def __init__(
+        self,
+        tasks: TaskGroup,
+        wall: Clock,
+        note: Callable[[str, RobotEvent, str], None],
+        changed: Callable[[], None],
+    ) -> None:
+        self._tasks = tasks
+        self._wall = wall
+        self._note = note
+        self._changed = changed
+        self._going: dict[tuple[str, str], str] = {}
+
+    def trouble(self, robot: str, graph: str) -> str | None:
+        """None when the graph is not being stopped; else why that is not proven yet, "" at first."""
+        return self._going.get((robot, graph))
+
+    def going(self, robot: str) -> bool:
+        """Whether something is being stopped there."""
+        return any(name == robot for name, _ in self._going)
+
+    def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
+        """Want a graph stopped. Never waits."""
+        robot = engine.registration.name
+        if (robot, graph) in self._going:
+            return
+        self._going[robot, graph] = ""
+        asked = StopAsked(at=self._wall(), graph=graph, author=author)
+        self._note(robot, asked, author.id)
+        self._tasks.start_soon(self._stop, engine, graph, robot)
+        self._changed()
+
+    async def _stop(self, engine: KnownEngine, graph: str, robot: str) -> None:
+        try:
+            with anyio.move_on_after(_PATIENCE_S):
+                told = await self._until_proven(engine, graph, robot)
+                self._note(robot, told, "")
+                return
+            why = self._going[robot, graph] or "no proof has come"
+            self._note(robot, StopUnproven(at=self._wall(), graph=graph, why=why), "")
+        finally:
+            self._going.pop((robot, graph), None)
+            self._changed()
+
+    async def _until_proven(self, engine: KnownEngine, graph: str, robot: str) -> RobotEvent:
+        began, gap = anyio.current_time(), _GAP_S
+        life = engine.answer.incarnation if engine.answer is not None else ""
+        while True:
+            why = await send_stop(engine, graph)
+            answer = await _ask(engine)
+            if answer is None:
+                why = why or engine.why or "the engine does not answer"
+            elif len({life, answer.incarnation} - {""}) > 1:
+                why = "the engine was restarted: look at the robot"
+                return StopUnproven(at=self._wall(), graph=graph, why=why)
+            elif engine.standing.servers != 1:
+                why = f"{engine.standing.servers} engines are seen on the path of its answers"
+            elif not why and _at_rest(answer, graph):
+                return StopWasProven(at=answer.at, graph=graph, asked_at=answer.asked_at)
+            else:
+                why = why or f"{graph} has not stopped yet"
+            if anyio.current_time() - began >= _LOUD_S and self._going[robot, graph] != why:
+                self._going[robot, graph] = why
+                self._changed()
+            await anyio.sleep(gap)
+            gap = min(1.5 * gap, _SLOWEST_S)
+
+
+async def _ask(engine: KnownEngine) -> Answer | None:
+    try:
+        with anyio.fail_after(_GET_S):
+            return await engine.get()
+    except (NoAnswer, TimeoutError):
+        return None
+
+
+def _at_rest(answer: Answer, graph: str) -> bool:
+    """Whether neither the graph nor a sub-graph of it moves, or may move by itself."""
+    shown = [
+        each for each in answer.graphs if each.graph == graph or each.graph.startswith(f"{graph}__")
+    ]
+    own = [each for each in shown if each.graph == graph]
+    return not any(each.active for each in shown) and all(e.state in TERMINAL for e in own)
+
+
+def wanted(engine: KnownEngine, open_runs: frozenset[str]) -> list[str]:
+    """The graphs that an engine runs and that are no open runs of ours."""
+    answer = engine.answer
+    if answer is None:
+        return []
+    tops = {
+        each.graph
+        for each in answer.graphs
+        if each.active and (each.run is None or each.run not in open_runs)
+    }
+    return sorted(name for name in tops if not any(_is_part(name, top) for top in tops))
+
+
+def _is_part(name: str, top: str) -> bool:
+    return name != top and name.startswith(f"{top}__")
