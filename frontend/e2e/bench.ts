@@ -1,6 +1,7 @@
 /** What a person does on the canvas and beside it, as a hand on the mouse does it. */
 
 import { expect, type Locator, type Page } from "@playwright/test";
+import type { Product } from "./product";
 
 export type Outcome = "true" | "false" | "error" | "stopped";
 
@@ -144,4 +145,39 @@ export async function watch(page: Page): Promise<void> {
 /** The actions that the page has shown as running since `watch`. */
 export function seenRunning(page: Page): Promise<string[]> {
   return page.evaluate(() => [...(Reflect.get(window, "seenRunning") as Set<string>)].sort());
+}
+
+interface Reference {
+  readonly name: string;
+  readonly instance_id: number;
+  readonly conditions?: readonly string[];
+}
+
+/** What of an exported file tests look at. */
+export interface Umrf {
+  readonly graph_name: string;
+  readonly graph_entry: readonly Reference[];
+  readonly graph_exit: readonly Reference[];
+  readonly actions: readonly (Reference & {
+    readonly parents?: readonly Reference[];
+    readonly gui_attributes?: { readonly position?: { readonly x: number; readonly y: number } };
+  })[];
+}
+
+/** A graph as the server exports it. */
+export function umrfOf(product: Product, id: string): Promise<Umrf> {
+  return product.ask<Umrf>(`/api/graphs/${id}/umrf`);
+}
+
+/** The arrows of a graph as the server has it: `Check_0 > Drive_1`, sorted. */
+export async function arrows(product: Product, id: string): Promise<string[]> {
+  const { graph_entry, graph_exit, actions } = await umrfOf(product, id);
+  const named = ({ name, instance_id }: Reference) => `${name}_${instance_id}`;
+  return [
+    ...graph_entry.map((first) => `entry > ${named(first)}`),
+    ...actions.flatMap((action) =>
+      (action.parents ?? []).map((parent) => `${named(parent)} > ${named(action)}`),
+    ),
+    ...graph_exit.map((last) => `${named(last)} > exit`),
+  ].sort();
 }

@@ -65,7 +65,7 @@ test("keys and marquee: Tab searches, all are selected, Delete deletes, a frame 
   await expect(card(page, "Two")).toBeVisible();
 
   const selected = page.locator(".react-flow__node-action.selected");
-  await page.mouse.click(box.x + 40, box.y + 300);
+  await page.mouse.click(box.x + box.width - 60, box.y + 300);
   await expect(selected).toHaveCount(0);
   await page.keyboard.press("ControlOrMeta+a");
   await expect(selected).toHaveCount(2);

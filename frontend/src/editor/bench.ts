@@ -13,7 +13,10 @@ import {
   type Precondition,
   type Relation,
 } from "../graph/model";
+import { notesOf, placeNotes, withContents } from "../graph/notes";
 import { CARD, unplaced } from "../ui/canvas/arrange";
+
+import type { DryRun } from "./dry-run/use-dry-run";
 
 /** Where the search for an action opens, and what it is tied to once chosen. */
 export interface AddRequest {
@@ -22,25 +25,49 @@ export interface AddRequest {
   /** On the canvas. */
   readonly at: Position;
   readonly from: { readonly key: Key; readonly outcome: Precondition } | null;
+  /** The arrow that takes the action in. */
+  readonly into?: string;
 }
 
 export type Panel = "details" | "json" | "problems";
 export type Tool = "pan" | "select";
+
+/** What opens over the editor, one at a time. */
+export type Surface =
+  | { readonly kind: "arrow"; readonly from: Key | null; readonly to: Key | null }
+  | { readonly kind: "retarget"; readonly relation: string }
+  /** The text of a note or frame is being written. */
+  | { readonly kind: "note"; readonly key: string }
+  | { readonly kind: "menu"; readonly screen: Position }
+  | { readonly kind: "palette" }
+  | { readonly kind: "keys" };
+
+/** What a graph can be taken away as. */
+export type Format = "umrf" | "svg" | "png";
+
+export const GRID = 20; // px
 
 /** What the canvas can do with its view. */
 export interface View {
   fit(): void;
   zoomIn(): void;
   zoomOut(): void;
-  show(keys: readonly Key[]): void;
+  /** `whole`: as large as it fits; else only so near that it can be read. */
+  show(keys: readonly Key[], goal?: "middle" | "whole"): void;
   /** Moves the view only if this is not in it. */
   reveal(at: Position): void;
   /** The middle of what is seen, on the canvas. */
   middle(): Position;
   screenOf(at: Position): Position;
+  /** Where the pointer rests over the canvas; null when it does not. */
+  pointer(): { readonly screen: Position; readonly at: Position } | null;
+  /** Gives the keyboard to what is drawn under this key. */
+  focus(key: Key): void;
 }
 
 export interface Bench {
+  /** The graph's own id. */
+  readonly id: string;
   readonly doc: Y.Doc;
   readonly undo: Y.UndoManager;
   readonly graph: Graph;
@@ -51,15 +78,22 @@ export interface Bench {
   /** Keys of actions and ends, ids of relations. */
   readonly selection: ReadonlySet<string>;
   readonly tool: Tool;
+  /** Whether what is moved by hand snaps to the grid. */
+  readonly snap: boolean;
   readonly view: View;
+  /** The graph is played on the canvas; null while it is not. */
+  readonly dryRun: DryRun | null;
+  beginDryRun(): void;
   select(ids: Iterable<string>): void;
   setTool(tool: Tool): void;
+  setSnap(snap: boolean): void;
   setPanel(panel: Panel): void;
   openAdd(request?: AddRequest): void;
+  open(surface: Surface | null): void;
   /** Where everything stands, also what has no place of its own. */
   places(): ReadonlyMap<Key, Position>;
   sizes(): ReadonlyMap<Key, { readonly width: number; readonly height: number }>;
-  download(): void;
+  download(format?: Format): void;
 }
 
 export const BenchContext = createContext<Bench | null>(null);
@@ -72,6 +106,22 @@ export function useBench(): Bench {
 
 export function selectedActions(bench: Bench): Action[] {
   return bench.graph.actions.filter((action) => bench.selection.has(action.key));
+}
+
+/** Keys of the notes and frames that are chosen. */
+export function selectedNotes(bench: Bench): string[] {
+  return notesOf(bench.graph).flatMap(({ key }) => (bench.selection.has(key) ? [key] : []));
+}
+
+/** Writes places by hand as one edit: frames take along what lies in them, the rest stays. */
+export function putPlaces(bench: Bench, moved: ReadonlyMap<string, Position>): void {
+  const { doc, graph } = bench;
+  const places = bench.places();
+  const all = withContents(graph, moved, places, bench.sizes());
+  together(doc, () => {
+    moveActions(doc, new Map([...unplaced(graph, places), ...all]));
+    placeNotes(doc, graph, all);
+  });
 }
 
 export function selectedRelations(bench: Bench): Relation[] {

@@ -1,28 +1,36 @@
 /** The canvas on which a graph is drawn. */
+import { Button } from "@mantine/core";
 import {
   Background,
   BackgroundVariant,
   ConnectionLineType,
   MiniMap,
-  type OnConnectEnd,
   PanOnScrollMode,
   ReactFlow,
   SelectionMode,
+  useStoreApi,
 } from "@xyflow/react";
-import { type MouseEvent, useEffect, useRef } from "react";
-import { connect } from "../graph/edit";
-import type { Position, Precondition } from "../graph/model";
+import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
+import { insertInto, removeNotes, together } from "../graph/edit";
+import type { Position } from "../graph/model";
+import { changeNote } from "../graph/notes";
 import { useRoom } from "../room/use-room";
 import { CARD } from "../ui/canvas/arrange";
 import type { Arrow, CanvasNode } from "../ui/canvas/elements";
+import { type NoteDesk, NoteDeskContext } from "../ui/canvas/note-card";
+import { noteColor } from "../ui/canvas/note-colors";
 import { ArrowTips } from "../ui/canvas/outcome-arrow";
 import { edgeTypes, nodeTypes } from "../ui/canvas/view";
 import { actionCarrier } from "../ui/carry";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../ui/outcome";
 import { robotColor } from "../ui/robot";
-import { type Bench, placeAction } from "./bench";
+import { type Bench, endName, GRID, placeAction } from "./bench";
 import style from "./canvas.module.css";
+import { arrowAt } from "./hit";
 import { Cursors } from "./people";
 import type { useCanvas } from "./use-canvas";
+import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
+import { usePress } from "./use-press";
 
 interface Props {
   bench: Bench;
@@ -32,69 +40,109 @@ interface Props {
   map: boolean;
   /** The person has moved the view. */
   onPanned: () => void;
+  /** Where the pointer rests, for those who want to know. */
+  pointer: RefObject<Position | null>;
+  /** The note whose text is being written. */
+  writing: string | null;
 }
 
-function outcomeOf(handle: string | null | undefined): Precondition {
-  return handle === "on_false" || handle === "on_error" || handle === "on_stopped"
-    ? handle
-    : "on_true";
+/** What to do next after an outcome was tapped. */
+function PendingHint({
+  bench,
+  pending,
+  onCancel,
+}: {
+  bench: Bench;
+  pending: Pending;
+  onCancel: () => void;
+}) {
+  return (
+    <div className={style.hint} role="status">
+      <span>
+        When {endName(bench.graph, pending.key)} is{" "}
+        <b style={{ color: outcomeColor[pending.outcome] }}>
+          <OutcomeSign outcome={pending.outcome} /> {outcomeWord[pending.outcome]}
+        </b>
+        : tap what follows
+      </span>
+      <Button size="compact-xs" variant="subtle" onClick={onCancel}>
+        Cancel
+      </Button>
+    </div>
+  );
 }
 
-function pointOf(event: { clientX: number; clientY: number } | TouchEvent): Position {
-  if ("changedTouches" in event) {
-    const touch = event.changedTouches[0];
-    return touch ? [touch.clientX, touch.clientY] : [0, 0];
+function mapColor(node: CanvasNode): string {
+  if (node.type === "note") {
+    const part = node.data.note.kind === "frame" ? 18 : 60;
+    return `color-mix(in srgb, ${noteColor[node.data.note.color]} ${part}%, transparent)`;
   }
-  return [event.clientX, event.clientY];
+  const robot = node.type === "action" ? node.data.action.actor : "";
+  return robot === "" ? "var(--line2)" : robotColor(robot);
 }
 
-function nodeAt([x, y]: Position): string | null {
-  const hit = document.elementFromPoint(x, y)?.closest<HTMLElement>(".react-flow__node");
-  return hit?.dataset.id ?? null;
+/** How notes are changed from the canvas itself. */
+function useNoteDesk(bench: Bench, writing: string | null, setResized: NoteDesk["resizing"]) {
+  const [only, ...others] = bench.selection;
+  const alone = only !== undefined && others.length === 0 ? only : null;
+  const { doc, graph, open, select, mayEdit } = bench;
+  return useMemo<NoteDesk | null>(() => {
+    if (!mayEdit) return null;
+    return {
+      editing: writing,
+      alone,
+      edit: (key) => (key === null ? open(null) : open({ kind: "note", key })),
+      change: (key, change) => void changeNote(doc, graph, key, change),
+      resizing: setResized,
+      remove: (key) => {
+        removeNotes(doc, [key.slice(2)]);
+        select([]);
+      },
+    };
+  }, [doc, graph, open, select, mayEdit, writing, alone, setResized]);
 }
 
-export function Canvas({ bench, canvas, me, map, onPanned }: Props) {
-  const { doc, presence } = useRoom();
-  const { flow } = canvas;
+export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: Props) {
+  const { presence } = useRoom();
+  const { flow, setOver } = canvas;
   const frame = useRef<HTMLDivElement>(null);
+  const store = useStoreApi();
 
   useEffect(
     () =>
       actionCarrier.onDrop(({ load, x, y }) => {
         const box = frame.current?.getBoundingClientRect();
-        if (
-          !bench.mayEdit ||
-          !box ||
-          x < box.left ||
-          x > box.right ||
-          y < box.top ||
-          y > box.bottom
-        )
-          return;
+        if (!box || x < box.left || x > box.right || y < box.top || y > box.bottom) return;
+        if (!bench.mayEdit) return;
         const at = flow.screenToFlowPosition({ x, y });
         const position: Position = [Math.round(at.x - CARD.width / 2), Math.round(at.y - 24)];
-        bench.select([placeAction(bench, load, position)]);
+        const arrow = arrowAt([x, y]);
+        const key = together(bench.doc, () => {
+          const added = placeAction(bench, load, position);
+          if (arrow !== null) insertInto(bench.doc, arrow, added);
+          return added;
+        });
+        bench.select([key]);
       }),
     [flow, bench],
   );
+  // What is carried over an arrow goes into it.
+  useEffect(
+    () =>
+      actionCarrier.subscribe(() => {
+        const carried = actionCarrier.now();
+        setOver(carried ? arrowAt([carried.x, carried.y]) : null);
+      }),
+    [setOver],
+  );
 
-  const openAddAt = (screen: Position, from: { key: string; outcome: Precondition } | null) => {
+  const openAddAt = (screen: Position, from: Pending | null) => {
     const at = flow.screenToFlowPosition({ x: screen[0], y: screen[1] });
     bench.openAdd({ screen, at: [Math.round(at.x), Math.round(at.y)], from });
   };
-
-  const onConnectEnd: OnConnectEnd = (event, state) => {
-    const from = state.fromHandle;
-    if (state.isValid || !from || from.type !== "source") return;
-    const point = pointOf(event);
-    const outcome = outcomeOf(from.id);
-    const target = nodeAt(point);
-    if (target === null) openAddAt(point, { key: from.nodeId, outcome });
-    else if (target !== from.nodeId) selectNew(connect(doc, from.nodeId, target, outcome));
-  };
-  const selectNew = (relation: string | null) => {
-    if (relation !== null) bench.select([relation]);
-  };
+  const connecting = useConnecting(bench, openAddAt);
+  const press = usePress(bench);
+  const desk = useNoteDesk(bench, writing, canvas.setResized);
   const onDoubleClick = (event: MouseEvent) => {
     if (!(event.target as Element).classList.contains("react-flow__pane")) return;
     openAddAt([event.clientX, event.clientY], null);
@@ -106,81 +154,107 @@ export function Canvas({ bench, canvas, me, map, onPanned }: Props) {
       ref={frame}
       className={style.frame}
       onDoubleClick={onDoubleClick}
+      {...press}
+      onPointerDownCapture={(event) => {
+        press.onPointerDownCapture(event);
+        // Under fingers there is no Shift: in the select mode each tap adds or takes away.
+        if (event.pointerType !== "mouse" && bench.tool === "select")
+          store.setState({ multiSelectionActive: true });
+      }}
       onPointerMove={(event) => {
         if (event.pointerType === "touch") return;
+        pointer.current = [event.clientX, event.clientY];
         const at = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY });
         presence.tell({ cursor: [Math.round(at.x), Math.round(at.y)] });
       }}
-      onPointerLeave={() => presence.tell({ cursor: undefined })}
+      onPointerLeave={() => {
+        pointer.current = null;
+        presence.tell({ cursor: undefined });
+      }}
     >
-      <ReactFlow<CanvasNode, Arrow>
-        nodes={canvas.nodes}
-        nodesDraggable={bench.mayEdit}
-        nodesConnectable={bench.mayEdit}
-        edges={canvas.edges}
-        nodeTypes={nodeTypes}
-        edgeTypes={edgeTypes}
-        onNodesChange={canvas.onNodesChange}
-        onEdgesChange={canvas.onEdgesChange}
-        onNodeDrag={canvas.onDrag}
-        onNodeDragStop={canvas.onDragStop}
-        onSelectionDrag={(event, nodes) => nodes[0] && canvas.onDrag(event, nodes[0], nodes)}
-        onSelectionDragStop={(event, nodes) =>
-          nodes[0] && canvas.onDragStop(event, nodes[0], nodes)
-        }
-        onConnect={({ source, target, sourceHandle }) =>
-          selectNew(connect(doc, source, target, outcomeOf(sourceHandle)))
-        }
-        onConnectEnd={onConnectEnd}
-        onEdgeClick={(event, edge) => {
-          const id = edge.data?.relation;
-          if (id) bench.select(event.shiftKey ? [...bench.selection, id] : [id]);
-        }}
-        onNodeClick={(event) => {
-          const onHandle = (event.target as Element).closest(".react-flow__handle") !== null;
-          if (!onHandle) bench.setPanel("details");
-        }}
-        onPaneClick={() => bench.select([])}
-        selectionOnDrag={bench.tool === "select"}
-        panOnDrag={bench.tool === "pan" ? true : [1, 2]}
-        panOnScroll={false}
-        panOnScrollMode={PanOnScrollMode.Free}
-        selectionMode={SelectionMode.Partial}
-        connectionLineType={ConnectionLineType.Bezier}
-        connectionRadius={34}
-        zoomOnDoubleClick={false}
-        deleteKeyCode={null}
-        multiSelectionKeyCode={["Shift", "Meta", "Control"]}
-        minZoom={0.08}
-        maxZoom={2.2}
-        onMoveStart={(event) => {
-          // A move without an event is the page's own.
-          if (event !== null) onPanned();
-        }}
-        onlyRenderVisibleElements={canvas.nodes.length > 150}
-        nodeDragThreshold={3}
-        proOptions={{ hideAttribution: true }}
-        aria-label="Canvas"
-      >
-        <ArrowTips />
-        <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
-        <Cursors me={me} />
-        {map && (
-          <MiniMap<CanvasNode>
-            position="top-right"
-            pannable
-            zoomable
-            style={{ width: 132, height: 92 }}
-            nodeBorderRadius={10}
-            nodeColor={(node) =>
-              node.type === "action" && node.data.action.actor !== ""
-                ? robotColor(node.data.action.actor)
-                : "var(--line2)"
-            }
-            ariaLabel="Map of the canvas"
-          />
-        )}
-      </ReactFlow>
+      <NoteDeskContext value={desk}>
+        <ReactFlow<CanvasNode, Arrow>
+          nodes={canvas.nodes}
+          edges={canvas.edges}
+          nodeTypes={nodeTypes}
+          edgeTypes={edgeTypes}
+          onNodesChange={canvas.onNodesChange}
+          onEdgesChange={canvas.onEdgesChange}
+          onNodeDrag={canvas.onDrag}
+          onNodeDragStop={canvas.onDragStop}
+          onSelectionDrag={(event, nodes) => nodes[0] && canvas.onDrag(event, nodes[0], nodes)}
+          onSelectionDragStop={(event, nodes) =>
+            nodes[0] && canvas.onDragStop(event, nodes[0], nodes)
+          }
+          onConnect={({ source, target, sourceHandle }) =>
+            connecting.draw(source, target, outcomeOf(sourceHandle))
+          }
+          onConnectEnd={connecting.onConnectEnd}
+          connectOnClick={false}
+          edgesReconnectable={bench.mayEdit}
+          reconnectRadius={12}
+          onReconnect={connecting.onReconnect}
+          nodesDraggable={bench.mayEdit}
+          nodesConnectable={bench.mayEdit}
+          snapToGrid={bench.snap}
+          snapGrid={[GRID, GRID]}
+          elevateNodesOnSelect={false}
+          onEdgeClick={(event, edge) => {
+            const id = edge.data?.relation;
+            if (id) bench.select(event.shiftKey ? [...bench.selection, id] : [id]);
+          }}
+          onNodeClick={(event) => {
+            if (connecting.onClick(event)) return;
+            const onNote = (event.target as Element).closest(".react-flow__node-note") !== null;
+            if (!onNote && bench.tool === "pan") bench.setPanel("details");
+          }}
+          onPaneClick={(event) => {
+            if (!connecting.onClick(event)) bench.select([]);
+          }}
+          selectionOnDrag={bench.tool === "select"}
+          panOnDrag={bench.tool === "pan" ? true : [1, 2]}
+          panOnScroll={false}
+          panOnScrollMode={PanOnScrollMode.Free}
+          selectionMode={SelectionMode.Partial}
+          connectionLineType={ConnectionLineType.Bezier}
+          connectionRadius={34}
+          zoomOnDoubleClick={false}
+          deleteKeyCode={null}
+          multiSelectionKeyCode={["Shift", "Meta", "Control"]}
+          minZoom={0.08}
+          maxZoom={2.2}
+          onMoveStart={(event) => {
+            // A move without an event is the page's own.
+            if (event !== null) onPanned();
+          }}
+          onlyRenderVisibleElements={canvas.nodes.length > 150}
+          nodeDragThreshold={3}
+          proOptions={{ hideAttribution: true }}
+          aria-label="Canvas"
+        >
+          <ArrowTips />
+          <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
+          <Cursors me={me} />
+          {map && (
+            <MiniMap<CanvasNode>
+              position="top-right"
+              pannable
+              zoomable
+              style={{ width: 132, height: 92 }}
+              nodeBorderRadius={10}
+              nodeColor={mapColor}
+              ariaLabel="Map of the canvas"
+            />
+          )}
+        </ReactFlow>
+      </NoteDeskContext>
+      {connecting.pending && (
+        <PendingHint
+          bench={bench}
+          pending={connecting.pending}
+          onCancel={() => connecting.setPending(null)}
+        />
+      )}
     </div>
   );
 }

@@ -21,6 +21,7 @@ import { ProblemWord } from "./problem-word";
 import { QuickAdd } from "./quick-add";
 import { SavedWord } from "./saved-word";
 import { Stage } from "./stage";
+import { Surfaces } from "./surfaces";
 import { useEditor } from "./use-bench";
 
 /** What the page around the editor may want to know. */
@@ -101,7 +102,7 @@ export function Editor(props: Props) {
     setLeft(false);
     setPane((now) => (now === "outline" ? "details" : now));
   }, []);
-  const { bench, panel, adding, sight, closeAdd } = useEditor(id, onPanel);
+  const { bench, panel, adding, surface, sight, closeAdd, close } = useEditor(id, onPanel);
   const link = useLink();
   const problems = useProblems(id, link.seq).data;
   const marks = useMemo(() => marksOf(problems?.problems ?? []), [problems]);
@@ -139,11 +140,13 @@ export function Editor(props: Props) {
       compact={!wide}
       phone={phone}
       run={props.run}
+      writing={surface?.kind === "note" ? surface.key : null}
       corner={phone ? null : props.corner}
     />
   );
   const details = <Details id={id} seq={link.seq} panel={panel} problems={problems} />;
-  const strip = props.strip(shown);
+  // A dry-run is told apart from runs: while it is open none of them is shown below it.
+  const strip = bench.dryRun ? null : props.strip(shown);
   return (
     <BenchContext value={bench}>
       {props.bar({
@@ -235,6 +238,7 @@ export function Editor(props: Props) {
           </aside>
         </main>
       )}
+      <Surfaces bench={bench} surface={surface} onClose={close} />
       {adding && <QuickAdd bench={bench} request={adding} known={known} onClose={closeAdd} />}
     </BenchContext>
   );

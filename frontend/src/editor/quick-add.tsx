@@ -2,7 +2,7 @@
 import { Kbd, TextInput } from "@mantine/core";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useEffect, useId, useMemo, useRef, useState } from "react";
-import { connect, type NewAction, together } from "../graph/edit";
+import { connect, insertInto, type NewAction, together } from "../graph/edit";
 import type { Position } from "../graph/model";
 import { CARD } from "../ui/canvas/arrange";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../ui/outcome";
@@ -41,6 +41,7 @@ function placed(bench: Bench, request: AddRequest, template: NewAction): string 
   return together(bench.doc, () => {
     const key = placeAction(bench, template, position);
     if (request.from) connect(bench.doc, request.from.key, key, request.from.outcome);
+    if (request.into) insertInto(bench.doc, request.into, key);
     return key;
   });
 }

@@ -4,12 +4,13 @@ import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useRef } from "react";
 import type { Progress } from "../api/progress";
-import type { Key } from "../graph/model";
+import type { Key, Position } from "../graph/model";
 import { useLink } from "../room/use-room";
 import type { Marks } from "../ui/canvas/marks";
 import { Empty } from "../ui/empty";
-import { useBench } from "./bench";
+import { type Bench, useBench } from "./bench";
 import { Canvas } from "./canvas";
+import { DryRunBar } from "./dry-run/dry-run-bar";
 import style from "./stage.module.css";
 import { Toolbar } from "./toolbar";
 import type { EditorState } from "./use-bench";
@@ -25,11 +26,13 @@ interface Props {
   phone: boolean;
   /** The run that goes, if one does: the view follows it. */
   run: string | null;
+  /** The note whose text is being written. */
+  writing: string | null;
   /** In the lower right corner. */
   corner: ReactNode;
 }
 
-function Inside({ me, sight, progress, marks, compact, phone, run, corner }: Props) {
+function Inside({ me, sight, progress, marks, compact, phone, run, writing, corner }: Props) {
   const bench = useBench();
   const link = useLink();
   const canvas = useCanvas({
@@ -37,11 +40,12 @@ function Inside({ me, sight, progress, marks, compact, phone, run, corner }: Pro
     graph: bench.graph,
     selection: bench.selection,
     select: bench.select,
-    progress,
+    progress: bench.dryRun?.sighting.progress ?? progress,
     marks,
   });
   const { flow, places, sizes } = canvas;
   const frame = useRef<HTMLDivElement>(null);
+  const pointer = useRef<Position | null>(null);
   const arrived = link.seq > 0;
   const begun = arrived && bench.graph.actions.length > 0;
   const { view, lost, onPanned, onFollow } = useView({
@@ -51,64 +55,86 @@ function Inside({ me, sight, progress, marks, compact, phone, run, corner }: Pro
     sizes,
     phone,
     begun,
-    progress,
-    run,
+    progress: bench.dryRun ? NOTHING : progress,
+    run: bench.dryRun ? null : run,
+    pointer,
   });
   useEffect(() => {
     sight.current = { places: () => places, sizes: () => sizes, view };
   }, [sight, view, places, sizes]);
 
+  useDryRunInView(bench);
+
   return (
-    <div className={style.stage} ref={frame}>
-      <Canvas
-        bench={bench}
-        canvas={canvas}
-        me={me}
-        map={!compact && bench.graph.actions.length > 3}
-        onPanned={onPanned}
-      />
-      {!arrived && (
-        <div className={style.waiting} aria-busy="true">
-          <Skeleton height={92} width={208} radius="lg" />
-          <Skeleton height={92} width={208} radius="lg" />
-        </div>
-      )}
-      {arrived && bench.graph.actions.length === 0 && !bench.mayEdit && (
-        <div className={style.empty}>
-          <Empty icon={<IconRouteAltLeft size={22} />} title="Nothing is drawn yet">
-            What the others draw appears here. You are here to look.
-          </Empty>
-        </div>
-      )}
-      {arrived && bench.graph.actions.length === 0 && bench.mayEdit && (
-        <div className={style.empty}>
-          <Empty
-            icon={<IconRouteAltLeft size={22} />}
-            title="What shall be done first?"
-            action={
-              <Button variant="filled" onClick={() => bench.openAdd()}>
-                Add an action
-              </Button>
-            }
-          >
-            Double-click the canvas, press <b>A</b>, or drag an action from the list. Then drag from
-            Entry to it, and from its outcomes to what follows.
-          </Empty>
-        </div>
-      )}
-      <div className={style.tools}>
-        <Toolbar compact={compact} />
-      </div>
-      <div className={style.corner}>
-        {lost && (
-          <Button size="compact-sm" leftSection={<IconFocus2 size={15} />} onClick={onFollow}>
-            Follow the run
-          </Button>
+    <div className={style.whole}>
+      <div className={style.stage} ref={frame} data-dry={bench.dryRun ? true : undefined}>
+        <Canvas
+          bench={bench}
+          canvas={canvas}
+          me={me}
+          map={!compact && bench.graph.actions.length > 3}
+          onPanned={onPanned}
+          pointer={pointer}
+          writing={writing}
+        />
+        {!arrived && (
+          <div className={style.waiting} aria-busy="true">
+            <Skeleton height={92} width={208} radius="lg" />
+            <Skeleton height={92} width={208} radius="lg" />
+          </div>
         )}
-        {corner}
+        {arrived && bench.graph.actions.length === 0 && !bench.mayEdit && (
+          <div className={style.empty}>
+            <Empty icon={<IconRouteAltLeft size={22} />} title="Nothing is drawn yet">
+              What the others draw appears here. You are here to look.
+            </Empty>
+          </div>
+        )}
+        {arrived && bench.graph.actions.length === 0 && bench.mayEdit && (
+          <div className={style.empty}>
+            <Empty
+              icon={<IconRouteAltLeft size={22} />}
+              title="What shall be done first?"
+              action={
+                <Button variant="filled" onClick={() => bench.openAdd()}>
+                  Add an action
+                </Button>
+              }
+            >
+              Double-click the canvas, press <b>A</b>, or drag an action from the list. Then drag
+              from Entry to it, and from its outcomes to what follows.
+            </Empty>
+          </div>
+        )}
+        <div className={style.tools}>
+          <Toolbar compact={compact} />
+        </div>
+        <div className={style.corner}>
+          {lost && (
+            <Button size="compact-sm" leftSection={<IconFocus2 size={15} />} onClick={onFollow}>
+              Follow the run
+            </Button>
+          )}
+          {!bench.dryRun && corner}
+        </div>
       </div>
+      {bench.dryRun && <DryRunBar bench={bench} run={bench.dryRun} start={null} />}
     </div>
   );
+}
+
+const NOTHING: ReadonlyMap<Key, Progress> = new Map();
+
+/** What begins to run in a dry-run comes into view. */
+function useDryRunInView(bench: Bench): void {
+  const { dryRun, places, view } = bench;
+  const keys = dryRun?.sighting.going.map(({ key }) => key).join(" ") ?? "";
+  // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
+  useEffect(() => {
+    const [first] = keys.split(" ");
+    const at = first ? places().get(first) : undefined;
+    if (at) view.reveal(at);
+  }, [keys]);
 }
 
 export function Stage(props: Props) {

@@ -1,34 +1,27 @@
 /** Tools on the canvas, and the menu of every deed. */
-import { ActionIcon, Kbd, Menu, Tooltip } from "@mantine/core";
+import { ActionIcon, Menu, Tooltip } from "@mantine/core";
 import { IconDots } from "@tabler/icons-react";
+import { Fragment } from "react";
 import { useBench } from "./bench";
 import {
   add,
   DEEDS,
+  dryRun,
   fit,
   marquee,
+  note,
   pan,
   redo,
   remove,
+  snap,
   tidy,
   undo,
   zoomIn,
   zoomOut,
 } from "./deeds/all";
-import { type Deed, isEnabled, keysOf, labelOf } from "./deeds/deed";
+import { type Deed, type Group, isEnabled, labelOf } from "./deeds/deed";
+import { Shortcut } from "./shortcut";
 import style from "./toolbar.module.css";
-
-function Shortcut({ deed }: { deed: Deed }) {
-  const [first] = deed.shortcuts;
-  if (first === undefined) return null;
-  return (
-    <span className={style.keys}>
-      {keysOf(first).map((key) => (
-        <Kbd key={key}>{key}</Kbd>
-      ))}
-    </span>
-  );
-}
 
 function Tool({ deed, pressed }: { deed: Deed; pressed?: boolean }) {
   const bench = useBench();
@@ -57,10 +50,14 @@ function Tool({ deed, pressed }: { deed: Deed; pressed?: boolean }) {
   );
 }
 
+const GROUPS: readonly Group[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
+/** Walking and nudging would be eight lines that nobody clicks. */
+const KEYS_ONLY = /^(nudge|walk)-/;
+
 export function DeedMenu() {
   const bench = useBench();
   return (
-    <Menu position="top-start" width={230}>
+    <Menu position="top-start" width={290}>
       <Menu.Target>
         <ActionIcon
           size={34}
@@ -71,40 +68,50 @@ export function DeedMenu() {
           <IconDots size={17} aria-hidden />
         </ActionIcon>
       </Menu.Target>
-      <Menu.Dropdown>
-        {DEEDS.map((deed) => {
-          const Sign = deed.icon;
-          return (
-            <Menu.Item
-              key={deed.name}
-              leftSection={<Sign size={16} aria-hidden />}
-              rightSection={<Shortcut deed={deed} />}
-              disabled={!isEnabled(deed, bench)}
-              onClick={() => deed.run(bench)}
-            >
-              {labelOf(deed, bench)}
-            </Menu.Item>
-          );
-        })}
+      <Menu.Dropdown className={style.menu ?? ""}>
+        {GROUPS.map((group) => (
+          <Fragment key={group}>
+            <Menu.Label>{group}</Menu.Label>
+            {DEEDS.filter((deed) => deed.group === group && !KEYS_ONLY.test(deed.name)).map(
+              (deed) => {
+                const Sign = deed.icon;
+                return (
+                  <Menu.Item
+                    key={deed.name}
+                    leftSection={<Sign size={16} aria-hidden />}
+                    rightSection={<Shortcut deed={deed} />}
+                    disabled={!isEnabled(deed, bench)}
+                    onClick={() => deed.run(bench)}
+                  >
+                    {labelOf(deed, bench)}
+                  </Menu.Item>
+                );
+              },
+            )}
+          </Fragment>
+        ))}
       </Menu.Dropdown>
     </Menu>
   );
 }
 
 export function Toolbar({ compact }: { compact: boolean }) {
-  const { tool, selection } = useBench();
+  const { tool, selection, snap: snapping, dryRun: dry } = useBench();
   return (
     <div className={style.bar} role="toolbar" aria-label="Canvas tools">
       <Tool deed={add} />
-      {!compact && <Tool deed={marquee} pressed={tool === "select"} />}
+      <Tool deed={marquee} pressed={tool === "select"} />
       {!compact && <Tool deed={pan} pressed={tool === "pan"} />}
       <Tool deed={undo} />
       <Tool deed={redo} />
       {(!compact || selection.size > 0) && <Tool deed={remove} />}
+      {!compact && <Tool deed={note} />}
       {!compact && <Tool deed={tidy} />}
+      {!compact && <Tool deed={snap} pressed={snapping} />}
       {!compact && <Tool deed={zoomOut} />}
       {!compact && <Tool deed={zoomIn} />}
       <Tool deed={fit} />
+      <Tool deed={dryRun} pressed={dry !== null} />
       <DeedMenu />
     </div>
   );

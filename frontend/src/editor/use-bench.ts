@@ -1,9 +1,22 @@
 /** The state of an open editor, and the bench that deeds work on. */
+
+import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/person";
 import { useGraph, useLink, useRoom, useUndo } from "../room/use-room";
 import { CARD } from "../ui/canvas/arrange";
-import { type AddRequest, type Bench, freePlace, type Panel, type Tool, type View } from "./bench";
+import {
+  type AddRequest,
+  type Bench,
+  type Format,
+  freePlace,
+  type Panel,
+  type Surface,
+  type Tool,
+  type View,
+} from "./bench";
+import { useDryRun } from "./dry-run/use-dry-run";
+import { takeAway } from "./take-away";
 
 const NONE: ReadonlySet<string> = new Set();
 
@@ -15,6 +28,8 @@ const BLIND: View = {
   reveal: () => {},
   middle: () => [0, 0],
   screenOf: () => [0, 0],
+  pointer: () => null,
+  focus: () => {},
 };
 
 /** What only the canvas knows; filled in by it while it is shown. */
@@ -28,28 +43,30 @@ export interface EditorState {
   readonly bench: Bench;
   readonly panel: Panel;
   readonly adding: AddRequest | null;
+  readonly surface: Surface | null;
   readonly sight: RefObject<Sight>;
   closeAdd(): void;
-}
-
-function download(id: string, name: string): void {
-  const link = document.createElement("a");
-  link.href = `/api/graphs/${encodeURIComponent(id)}/umrf`;
-  link.download = `${name || "graph"}.umrf.graph.json`;
-  link.click();
+  close(): void;
 }
 
 export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorState {
   const { doc, undo, presence } = useRoom();
   const graph = useGraph();
   const { canUndo, canRedo } = useUndo();
-  const role = useMay("edit");
-  const { readOnly } = useLink();
-  const mayEdit = role && readOnly === undefined;
   const [selection, setSelection] = useState(NONE);
   const [tool, setTool] = useState<Tool>("pan");
   const [panel, setPanelNow] = useState<Panel>("details");
   const [adding, setAdding] = useState<AddRequest | null>(null);
+  const [surface, setSurface] = useState<Surface | null>(null);
+  const [snap, setSnap] = useLocalStorage({
+    key: "aa.snap",
+    defaultValue: false,
+    getInitialValueInEffect: false,
+  });
+  const role = useMay("edit");
+  const { readOnly, seq } = useLink();
+  const { dryRun, begin: beginDryRun } = useDryRun(id, graph, seq);
+  const mayEdit = role && readOnly === undefined;
   const sight = useRef<Sight>({ view: BLIND, places: () => new Map(), sizes: () => new Map() });
 
   const select = useCallback(
@@ -79,9 +96,14 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
     setAdding({ screen: latest.current.view.screenOf(at), at, from: null });
   }, []);
   const closeAdd = useCallback(() => setAdding(null), []);
+  const close = useCallback(() => setSurface(null), []);
+  const download = useCallback((format: Format = "umrf") => {
+    if (latest.current) void takeAway(latest.current, format);
+  }, []);
 
   const bench = useMemo<Bench>(
     () => ({
+      id,
       doc,
       undo,
       graph,
@@ -90,25 +112,50 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
       mayEdit,
       selection,
       tool,
+      snap,
+      dryRun,
+      beginDryRun,
       select,
       setTool,
+      setSnap,
       setPanel,
       openAdd,
+      open: setSurface,
       view: {
         fit: () => sight.current.view.fit(),
         zoomIn: () => sight.current.view.zoomIn(),
         zoomOut: () => sight.current.view.zoomOut(),
-        show: (keys) => sight.current.view.show(keys),
+        show: (keys, goal) => sight.current.view.show(keys, goal),
         reveal: (at) => sight.current.view.reveal(at),
         middle: () => sight.current.view.middle(),
         screenOf: (at) => sight.current.view.screenOf(at),
+        pointer: () => sight.current.view.pointer(),
+        focus: (key) => sight.current.view.focus(key),
       },
       places: () => sight.current.places(),
       sizes: () => sight.current.sizes(),
-      download: () => download(id, graph.name),
+      download,
     }),
-    [doc, undo, graph, canUndo, canRedo, mayEdit, selection, tool, select, setPanel, openAdd, id],
+    [
+      id,
+      doc,
+      undo,
+      graph,
+      canUndo,
+      canRedo,
+      mayEdit,
+      selection,
+      tool,
+      snap,
+      dryRun,
+      beginDryRun,
+      select,
+      setSnap,
+      setPanel,
+      openAdd,
+      download,
+    ],
   );
   latest.current = bench;
-  return { bench, panel, adding, sight, closeAdd };
+  return { bench, panel, adding, surface, sight, closeAdd, close };
 }

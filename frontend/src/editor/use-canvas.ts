@@ -5,16 +5,26 @@ import {
   type ReactFlowInstance,
   useReactFlow,
 } from "@xyflow/react";
-import { useCallback, useEffect, useMemo, useRef, useState } from "react";
+import {
+  type MouseEvent as ReactMouseEvent,
+  useCallback,
+  useEffect,
+  useMemo,
+  useRef,
+  useState,
+} from "react";
 import type { Progress } from "../api/progress";
-import { moveActions } from "../graph/edit";
+import { insertInto, moveActions, together } from "../graph/edit";
 import type { Graph, Key, Position } from "../graph/model";
+import { type Note, placeNotes, withContents } from "../graph/notes";
 import type { Person } from "../room/presence";
 import { usePeople, useRoom } from "../room/use-room";
 import { type Places, placesOf, unplaced } from "../ui/canvas/arrange";
 import { type Arrow, type CanvasNode, edgesOf, keep, nodesOf } from "../ui/canvas/elements";
 import type { Marks } from "../ui/canvas/marks";
+import { notePlaces } from "../ui/canvas/note-nodes";
 import { colorsOf } from "../ui/robot";
+import { arrowAt, pointOf } from "./hit";
 
 export interface Size {
   readonly width: number;
@@ -71,7 +81,12 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
   const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
   const [sizes, setSizes] = useState<ReadonlyMap<Key, Size>>(new Map());
   const [drag, setDrag] = useState<Places | null>(null);
-  const rest = useMemo(() => placesOf(graph, sizes), [graph, sizes]);
+  const [resized, setResized] = useState<Note | null>(null);
+  const [over, setOver] = useState<string | null>(null);
+  const rest = useMemo(
+    () => new Map([...placesOf(graph, sizes), ...notePlaces(graph)]),
+    [graph, sizes],
+  );
   const places = useMemo(() => dragged(rest, people, drag), [rest, people, drag]);
   const chosen = useRef(selection);
   chosen.current = selection;
@@ -86,16 +101,20 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
     );
   }, [me, people]);
   const { nodes, edges } = useMemo(() => {
-    const options = { others, places, selected: selection, progress, marks, measured: sizes };
+    // The arrow that would take in what is dragged looks as if it were chosen.
+    const selected = over === null ? selection : new Set([...selection, over]);
+    const options = { others, places, selected, progress, marks, measured: sizes, resized };
     return {
       nodes: keep(drawn.current.nodes, nodesOf(graph, options)),
       edges: keep(drawn.current.edges, edgesOf(graph, options)),
     };
-  }, [graph, others, places, selection, progress, marks, sizes]);
+  }, [graph, others, places, selection, over, progress, marks, sizes, resized]);
   useEffect(() => {
     drawn.current = { nodes, edges };
   }, [nodes, edges]);
 
+  const now = useRef({ graph, rest, sizes });
+  now.current = { graph, rest, sizes };
   const onNodesChange = useCallback(
     (changes: NodeChange<CanvasNode>[]) => {
       const sized = changes.filter((change) => change.type === "dimensions");
@@ -108,12 +127,20 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
       }
       const moves = changes.filter((change) => change.type === "position" && change.dragging);
       if (moves.length > 0) {
+        const { graph, rest, sizes } = now.current;
         setDrag((before) => {
           const next: Places = new Map(before);
           for (const move of moves) {
             if (move.type !== "position" || !move.position) continue;
             next.set(move.id, [round(move.position.x), round(move.position.y)]);
           }
+          const own = new Map(
+            moves.flatMap((move): [string, Position][] => {
+              const at = move.type === "position" ? next.get(move.id) : undefined;
+              return move.type === "position" && at ? [[move.id, at]] : [];
+            }),
+          );
+          for (const [key, at] of withContents(graph, own, rest, sizes)) next.set(key, at);
           return next;
         });
       }
@@ -138,24 +165,56 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
   );
 
   const begun = useRef<Position | null>(null);
-  const onDrag = (_: unknown, node: CanvasNode, all: CanvasNode[]) => {
+  const onDrag = (
+    event: MouseEvent | TouchEvent | ReactMouseEvent,
+    node: CanvasNode,
+    all: CanvasNode[],
+  ) => {
     const at: Position = [node.position.x, node.position.y];
     begun.current ??= rest.get(node.id) ?? at;
     const [dx, dy] = [round(at[0] - begun.current[0]), round(at[1] - begun.current[1])];
-    presence.tell({ drag: { ids: all.map(({ id }) => id), dx, dy } });
+    const moved = new Map(all.map(({ id, position: { x, y } }) => [id, [x, y] as const]));
+    const ids = [...withContents(graph, moved, rest, sizes).keys()];
+    presence.tell({ drag: { ids, dx, dy } });
+    setOver(insertable(graph, all) ? arrowAt(pointOf(event)) : null);
   };
   const onDragStop = (_: unknown, __: CanvasNode, all: CanvasNode[]) => {
-    const moved = all.map(
-      (node) => [node.id, [round(node.position.x), round(node.position.y)]] as const,
+    const moved = new Map(
+      all.map((node) => [node.id, [round(node.position.x), round(node.position.y)]] as const),
     );
     if (begun.current !== null) {
-      const dropped = new Map([...unplaced(graph, rest), ...moved]);
-      moveActions(doc, dropped);
+      const dropped = withContents(graph, moved, rest, sizes);
+      together(doc, () => {
+        moveActions(doc, new Map([...unplaced(graph, rest), ...dropped]));
+        placeNotes(doc, graph, dropped);
+        const [only] = all;
+        if (over !== null && only) insertInto(doc, over, only.id);
+      });
     }
     begun.current = null;
     setDrag(null);
+    setOver(null);
     presence.tell({ drag: undefined });
   };
 
-  return { flow, nodes, edges, places, sizes, onNodesChange, onEdgesChange, onDrag, onDragStop };
+  return {
+    flow,
+    nodes,
+    edges,
+    places,
+    sizes,
+    setResized,
+    setOver,
+    onNodesChange,
+    onEdgesChange,
+    onDrag,
+    onDragStop,
+  };
+}
+
+/** One action that nothing leads to or from can be dropped into an arrow. */
+function insertable(graph: Graph, dragged: readonly CanvasNode[]): boolean {
+  const [only, ...others] = dragged;
+  if (only?.type !== "action" || others.length > 0) return false;
+  return !graph.relations.some(({ parent, child }) => parent === only.id || child === only.id);
 }

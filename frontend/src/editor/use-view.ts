@@ -19,6 +19,8 @@ interface Given {
   progress: ReadonlyMap<Key, Progress>;
   /** The run that goes, if one does. */
   run: string | null;
+  /** Where the pointer rests over the canvas, on screen. */
+  pointer: RefObject<Position | null>;
 }
 
 /** The actions that run, the latest first. */
@@ -29,7 +31,8 @@ export function running(progress: ReadonlyMap<Key, Progress>): Key[] {
     .map(([key]) => key);
 }
 
-export function useView({ flow, frame, places, sizes, phone, begun, progress, run }: Given) {
+export function useView(given: Given) {
+  const { flow, frame, places, sizes, phone, begun, progress, run, pointer } = given;
   const now = useRef({ places, sizes });
   now.current = { places, sizes };
   const least = phone ? READABLE.phone : READABLE.desktop;
@@ -74,7 +77,7 @@ export function useView({ flow, frame, places, sizes, phone, begun, progress, ru
   }, [flow, frame, showAll]);
 
   const show = useCallback(
-    (keys: readonly Key[], goal: "near" | "middle") => {
+    (keys: readonly Key[], goal: "near" | "middle" | "whole") => {
       const some: Places = new Map();
       for (const key of keys) {
         const at = now.current.places.get(key);
@@ -84,6 +87,10 @@ export function useView({ flow, frame, places, sizes, phone, begun, progress, ru
       if (box === null || room === null) return;
       const size = { width: room.clientWidth, height: room.clientHeight };
       const here: Looking = flow.getViewport();
+      if (goal === "whole") {
+        void flow.setViewport(whole(box, size), { duration: 250 });
+        return;
+      }
       const zoom = goal === "middle" ? Math.max(here.zoom, least) : here.zoom;
       const next = fits(box, size, zoom)
         ? (bring(box, size, { ...here, zoom }) ?? (zoom === here.zoom ? null : { ...here, zoom }))
@@ -100,7 +107,7 @@ export function useView({ flow, frame, places, sizes, phone, begun, progress, ru
       fit: () => showAll(200),
       zoomIn: () => void flow.zoomIn({ duration: 120 }),
       zoomOut: () => void flow.zoomOut({ duration: 120 }),
-      show: (keys) => show(keys, "middle"),
+      show: (keys, goal = "middle") => show(keys, goal),
       reveal: ([x, y]) => {
         const room = frame.current;
         if (room === null) return;
@@ -118,8 +125,21 @@ export function useView({ flow, frame, places, sizes, phone, begun, progress, ru
         const at = flow.flowToScreenPosition({ x, y });
         return [at.x, at.y];
       },
+      pointer: () => {
+        const screen = pointer.current;
+        if (screen === null) return null;
+        const at = flow.screenToFlowPosition({ x: screen[0], y: screen[1] });
+        return { screen, at: [Math.round(at.x), Math.round(at.y)] };
+      },
+      focus: (key) => {
+        // What was out of view is drawn first.
+        requestAnimationFrame(() => {
+          const card = frame.current?.querySelector<HTMLElement>(`[data-id="${CSS.escape(key)}"]`);
+          card?.focus({ preventScroll: true });
+        });
+      },
     }),
-    [showAll, show, flow, frame],
+    [showAll, show, flow, frame, pointer],
   );
 
   const follow = useFollow({ run, progress, show });

@@ -2,7 +2,7 @@
 
 import type * as Y from "yjs";
 import { endsOf, relationId, rootOf } from "./layout";
-import { ENTRY, EXIT, type Key, type Precondition, type Response } from "./model";
+import { ENTRY, EXIT, type Key, type Precondition, type Response, spoken } from "./model";
 import {
   after,
   erase,
@@ -170,6 +170,44 @@ export function moveRelation(
     moveKeys(doc, id, to);
     erase(doc, "relations", `${to}|only`);
     return to;
+  });
+}
+
+/**
+ * Leads one arrow, what the child does after one outcome, from or to somewhere else. What the same
+ * relation says of other outcomes stays; when it says nothing else, `required` and remaps go along.
+ */
+export function retarget(
+  doc: Y.Doc,
+  id: string,
+  outcome: Precondition,
+  to: { readonly parent?: Key; readonly child?: Key; readonly outcome?: Precondition },
+): string | null {
+  return together(doc, () => {
+    settleGhosts(doc);
+    const relation = relationOf(doc, id);
+    if (relation === undefined) return null;
+    const { conditions } = relation;
+    const response = conditions[outcome];
+    const parent = to.parent ?? relation.parent;
+    const child = to.child ?? relation.child;
+    const lands = parent === ENTRY ? "on_true" : (to.outcome ?? outcome);
+    const same = parent === relation.parent && child === relation.child;
+    if (same && lands === outcome) return id;
+    const alone = spoken(conditions).every((other) => other === outcome);
+    const moved = alone && !same ? moveRelation(doc, id, { parent, child }) : null;
+    if (moved !== null) {
+      if (lands !== outcome) {
+        setResponse(doc, moved, lands, response);
+        setResponse(doc, moved, outcome, "ignore");
+      }
+      return moved;
+    }
+    const drawn = connect(doc, parent, child, lands, response);
+    if (drawn === null) return null;
+    if (alone && !same) removeRelation(doc, id);
+    else setResponse(doc, id, outcome, "ignore");
+    return drawn;
   });
 }
 

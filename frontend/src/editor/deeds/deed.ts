@@ -1,15 +1,23 @@
-/** A deed: something a person can do, as a value. Toolbar, menu, keys and help are made of these. */
+/** A deed: something a person can do, as a value. Toolbar, menus, palette, keys and help are made of these. */
 import type { Icon } from "@tabler/icons-react";
 import type { Bench } from "../bench";
+
+/** Under which heading help and menus list it. */
+export type Group = "Draw" | "Arrange" | "Look" | "Graph" | "Dry-run";
 
 export interface Deed {
   readonly name: string;
   readonly label: string;
+  readonly group: Group;
   /** `Mod` is Ctrl, and ⌘ on a Mac. The first is shown; all work. */
   readonly shortcuts: readonly string[];
   readonly icon: Icon;
   /** Whether it changes the graph, which not everybody may. */
   readonly changes: boolean;
+  /** The browser raises an event of its own for its shortcut, and gives the clipboard with it. */
+  readonly event?: "copy" | "cut" | "paste";
+  /** Other words that people look for it by. */
+  readonly also?: string;
   enabled(bench: Bench): boolean;
   run(bench: Bench): void;
 }
@@ -45,7 +53,14 @@ export function isPressed(shortcut: string, event: Pressed, mac = onMac): boolea
   // Signs such as "+" or "?" carry their own Shift on some keyboards.
   const sign = key.length === 1 && !/[a-z0-9]/i.test(key);
   const shift = sign || event.shiftKey === parts.includes("Shift");
-  return letter && mod === parts.includes("Mod") && !other && !event.altKey && shift;
+  const alt = event.altKey === parts.includes("Alt");
+  return letter && mod === parts.includes("Mod") && !other && alt && shift;
+}
+
+/** Whether a shortcut is one printed character without Mod or Alt: such keys can be switched off. */
+export function isSingle(shortcut: string): boolean {
+  const parts = shortcut.split("+");
+  return (parts.at(-1) ?? "").length === 1 && !parts.includes("Mod") && !parts.includes("Alt");
 }
 
 const signs: Record<string, string> = {
@@ -53,18 +68,31 @@ const signs: Record<string, string> = {
   Backspace: "⌫",
   Plus: "+",
   ArrowUp: "↑",
+  ArrowDown: "↓",
+  ArrowLeft: "←",
+  ArrowRight: "→",
+  ContextMenu: "Menu",
+  Escape: "Esc",
 };
 
 /** The shortcut as it is printed on keys. */
 export function keysOf(shortcut: string, mac = onMac): string[] {
-  return shortcut.split("+").map((part) => {
+  const parts = shortcut.split("+");
+  const last = parts.at(-1) ?? "";
+  const sign = last.length === 1 && !/[a-z0-9]/i.test(last);
+  return parts.flatMap((part) => {
     if (part === "Mod") return mac ? "⌘" : "Ctrl";
-    if (part === "Shift" && mac) return "⇧";
+    if (part === "Shift") return sign ? [] : mac ? "⇧" : "Shift";
+    if (part === "Alt") return mac ? "⌥" : "Alt";
     return signs[part] ?? (part.length === 1 ? part.toUpperCase() : part);
   });
 }
 
 /** The deed that a key press asks for. */
-export function deedFor(deeds: readonly Deed[], event: Pressed): Deed | null {
-  return deeds.find((deed) => deed.shortcuts.some((key) => isPressed(key, event))) ?? null;
+export function deedFor(deeds: readonly Deed[], event: Pressed, singles = true): Deed | null {
+  return (
+    deeds.find((deed) =>
+      deed.shortcuts.some((key) => (singles || !isSingle(key)) && isPressed(key, event)),
+    ) ?? null
+  );
 }

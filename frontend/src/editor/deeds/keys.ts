@@ -1,17 +1,43 @@
-/** Shortcuts of deeds, where nobody is typing. */
+/** Shortcuts of deeds, where nobody is typing; and the clipboard's own events. */
+import { useLocalStorage } from "@mantine/hooks";
 import { useEffect, useRef } from "react";
 import type { Bench } from "../bench";
+import { copied, hold, pasteText } from "../clipboard";
 import { DEEDS } from "./all";
 import { deedFor, isEnabled } from "./deed";
+
+/** Whether single letters are shortcuts: speech input types letters by itself. */
+export function useSingleKeys() {
+  return useLocalStorage({
+    key: "aa.single-keys",
+    defaultValue: true,
+    getInitialValueInEffect: false,
+  });
+}
+
+const FIELDS = "input, textarea, select, [role=dialog], [role=menu], [role=listbox]";
 
 /** Whether keys belong to what has the focus. */
 function isTaken(target: EventTarget | null): boolean {
   if (!(target instanceof HTMLElement)) return false;
-  if (target.isContentEditable) return true;
-  return (
-    target.closest("input, textarea, select, [role=dialog], [role=menu], [role=listbox]") !== null
-  );
+  return target.isContentEditable || target.closest(FIELDS) !== null;
 }
+
+/** Lists and trees have their own use for arrow keys, Enter and Delete; the canvas shares ours. */
+function isOnCanvas(target: EventTarget | null): boolean {
+  if (!(target instanceof Element) || target === document.body) return true;
+  return target.closest(".react-flow") !== null;
+}
+
+const MOVING = new Set([
+  "ArrowUp",
+  "ArrowDown",
+  "ArrowLeft",
+  "ArrowRight",
+  "Enter",
+  "Delete",
+  "Backspace",
+]);
 
 /** The pointer rests on the canvas and nothing has the focus: Tab is free for the search. */
 function isOverCanvas(): boolean {
@@ -22,30 +48,80 @@ function isOverCanvas(): boolean {
 export function useShortcuts(bench: Bench): void {
   const now = useRef(bench);
   now.current = bench;
+  const [singles] = useSingleKeys();
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
       if (event.defaultPrevented || isTaken(event.target)) return;
-      if (event.key === "/") {
+      if (MOVING.has(event.key) && !isOnCanvas(event.target)) return;
+      if (event.key === "/" && singles) {
         event.preventDefault();
         document.querySelector<HTMLInputElement>("[data-search]")?.focus();
         return;
       }
       if (event.key === "Tab" && isOverCanvas()) {
         event.preventDefault();
-        now.current.openAdd();
+        addAtPointer(now.current);
         return;
       }
-      if (event.key === "Escape") {
-        now.current.select([]);
-        return;
-      }
-      const deed = deedFor(DEEDS, event);
-      if (deed === null) return;
+      const deed = deedFor(DEEDS, event, singles);
+      if (deed === null || deed.event !== undefined) return;
+      // A button does what Enter does to it.
+      if (event.key === "Enter" && event.target instanceof HTMLButtonElement) return;
       // What a deed takes is also kept from the browser while the deed has nothing to do.
       event.preventDefault();
       if (isEnabled(deed, now.current)) deed.run(now.current);
     };
+    // Cards move by arrow keys of their own, which know neither undo nor frames: ours come first.
+    const onCanvasKey = (event: KeyboardEvent) => {
+      if (!event.key.startsWith("Arrow") || isTaken(event.target)) return;
+      if (!(event.target instanceof Element) || !event.target.closest(".react-flow")) return;
+      onKey(event);
+      event.stopPropagation();
+    };
+    window.addEventListener("keydown", onCanvasKey, { capture: true });
     window.addEventListener("keydown", onKey);
-    return () => window.removeEventListener("keydown", onKey);
-  }, []);
+    return () => {
+      window.removeEventListener("keydown", onCanvasKey, { capture: true });
+      window.removeEventListener("keydown", onKey);
+    };
+  }, [singles]);
+  useClipboard(now);
+}
+
+function addAtPointer(bench: Bench): void {
+  const pointer = bench.view.pointer();
+  bench.openAdd(pointer ? { ...pointer, from: null } : undefined);
+}
+
+/** Copy, cut and paste come as events that carry the clipboard, also on plain http. */
+function useClipboard(now: { readonly current: Bench }): void {
+  useEffect(() => {
+    const deedOf = (event: ClipboardEvent) => {
+      const deed = DEEDS.find((each) => each.event === event.type);
+      const free = !event.defaultPrevented && !isTaken(event.target);
+      return deed && free && isEnabled(deed, now.current) ? deed : null;
+    };
+    const onTake = (event: ClipboardEvent) => {
+      // Text that a person has marked is what they want to copy.
+      if (window.getSelection()?.isCollapsed === false || deedOf(event) === null) return;
+      const piece = copied(now.current);
+      hold(piece);
+      event.clipboardData?.setData("text/plain", piece.text);
+      event.preventDefault();
+      if (event.type === "cut") DEEDS.find(({ name }) => name === "remove")?.run(now.current);
+    };
+    const onPaste = (event: ClipboardEvent) => {
+      if (deedOf(event) === null) return;
+      event.preventDefault();
+      void pasteText(now.current, event.clipboardData?.getData("text/plain") ?? "");
+    };
+    window.addEventListener("copy", onTake);
+    window.addEventListener("cut", onTake);
+    window.addEventListener("paste", onPaste);
+    return () => {
+      window.removeEventListener("copy", onTake);
+      window.removeEventListener("cut", onTake);
+      window.removeEventListener("paste", onPaste);
+    };
+  }, [now]);
 }

@@ -13,11 +13,13 @@ import {
   type Response,
   spoken,
 } from "../../graph/model";
+import type { Note } from "../../graph/notes";
 import { OUTCOMES, outcomeWord } from "../outcome";
 import { CARD, PILL, type Places } from "./arrange";
 import { alongCurve, alongLane, anchorOf, placeLabels, sizeOf, type Wish } from "./labels";
 import { type Box, laneBack, laneFor, MOST_CARDS } from "./lanes";
 import { type Mark, type Marks, markWords } from "./marks";
+import { type NoteNode, noteNodes } from "./note-nodes";
 
 export type CardNode = Node<
   {
@@ -30,7 +32,7 @@ export type CardNode = Node<
   "action"
 >;
 export type EndNode = Node<{ end: "entry" | "exit"; progress: null }, "end">;
-export type CanvasNode = CardNode | EndNode;
+export type CanvasNode = CardNode | EndNode | NoteNode;
 
 export interface Answer {
   readonly outcomes: readonly Precondition[];
@@ -84,15 +86,19 @@ export interface NodeOptions {
   marks: Marks;
   others?: ReadonlyMap<Key, string>;
   measured: ReadonlyMap<Key, { width?: number; height?: number }>;
+  /** A note as it is while somebody drags its edges. */
+  resized?: Note | null;
 }
 
 function place(key: Key, options: NodeOptions) {
   const [x, y] = options.places.get(key) ?? [0, 0];
   const measured = options.measured.get(key);
+  const selected = options.selected.has(key);
   return {
     id: key,
     position: { x, y },
-    selected: options.selected.has(key),
+    selected,
+    zIndex: selected ? 1 : 0,
     ...(measured ? { measured } : {}),
   };
 }
@@ -120,7 +126,8 @@ export function nodesOf(graph: Graph, options: NodeOptions): CanvasNode[] {
       },
     }),
   );
-  return [...ends, ...cards];
+  const notes = noteNodes(graph, options);
+  return [...notes.frames, ...ends, ...cards, ...notes.notes];
 }
 
 /** Whether the arrow has been taken: its parent ended this way in its last visit. */
@@ -146,7 +153,7 @@ function boxesOf(graph: Graph, options: NodeOptions): Map<Key, Box> {
 }
 
 /** Where on the lower edge of a card an arrow begins, from its left. */
-function shareOf(entry: boolean, outcome: Precondition): number {
+export function shareOf(entry: boolean, outcome: Precondition): number {
   return entry ? 0.5 : 0.14 + 0.24 * OUTCOMES.indexOf(outcome);
 }
 

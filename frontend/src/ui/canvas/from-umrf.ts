@@ -124,7 +124,7 @@ export function fromUmrf(umrf: unknown): Graph {
     relations: [...relations.values()],
     entryPosition: position(gui.entry) ?? position(object(gui.positions).entry),
     exitPosition: position(gui.exit) ?? position(object(gui.positions).exit),
-    notes: [],
+    notes: Object.entries(object(gui.notes)).map(([id, note]) => [id, JSON.stringify(note)]),
     extra: [],
   };
 }

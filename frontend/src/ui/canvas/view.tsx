@@ -14,10 +14,12 @@ import { placesOf } from "./arrange";
 import { type CanvasNode, edgesOf, nodesOf } from "./elements";
 import { EndPill } from "./end-pill";
 import { NO_MARKS } from "./marks";
+import { NoteCard } from "./note-card";
+import { notePlaces } from "./note-nodes";
 import { ArrowTips, OutcomeArrow } from "./outcome-arrow";
 import "./canvas.css";
 
-export const nodeTypes: NodeTypes = { action: ActionCard, end: EndPill };
+export const nodeTypes: NodeTypes = { action: ActionCard, end: EndPill, note: NoteCard };
 export const edgeTypes: EdgeTypes = { outcome: OutcomeArrow };
 
 const NONE: ReadonlySet<string> = new Set();
@@ -32,7 +34,7 @@ interface Props {
 
 export function GraphView({ graph, progress, selected = NONE, label, onSelect }: Props) {
   const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
-  const places = useMemo(() => placesOf(graph), [graph]);
+  const places = useMemo(() => new Map([...placesOf(graph), ...notePlaces(graph)]), [graph]);
   const options = useMemo(
     () => ({ places, selected, progress, marks: NO_MARKS, measured }),
     [places, selected, progress, measured],

@@ -1,0 +1,251 @@
+/** Drawing an arrow without a pointer: from what, after which outcome, to what. */
+import { Button, Modal } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconFlag, IconPlayerPlay, IconPlus, IconSquareRounded } from "@tabler/icons-react";
+import { useEffect, useRef, useState } from "react";
+import { connect, moveRelation, together } from "../graph/edit";
+import { endsOf } from "../graph/layout";
+import { ENTRY, EXIT, type Key, type Precondition } from "../graph/model";
+import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../ui/outcome";
+import { matching, type Option, PickList } from "../ui/pick-list";
+import { robotColor } from "../ui/robot";
+import style from "./arrow-dialog.module.css";
+import { type Bench, endName, freePlace, placeAction } from "./bench";
+
+/** Everything an arrow can lead from or to, those that are near first. */
+function ends(bench: Bench, end: typeof ENTRY | typeof EXIT, near: Key | null): Option[] {
+  const places = bench.places();
+  const [x0, y0] = (near === null ? null : places.get(near)) ?? bench.view.middle();
+  const far = (key: Key) => {
+    const [x, y] = places.get(key) ?? [0, 0];
+    return Math.hypot(x - x0, y - y0);
+  };
+  const actions = [...bench.graph.actions].sort((a, b) => far(a.key) - far(b.key));
+  return [
+    ...actions.map(
+      ({ key, name, instanceId, actor }): Option => ({
+        id: key,
+        label: `${name} ${instanceId}`,
+        ...(actor === "" ? {} : { sub: actor }),
+        icon: <IconSquareRounded size={16} aria-hidden style={{ color: robotColor(actor) }} />,
+      }),
+    ),
+    end === ENTRY
+      ? { id: ENTRY, label: "Entry", icon: <IconPlayerPlay size={16} aria-hidden /> }
+      : { id: EXIT, label: "Exit", icon: <IconFlag size={16} aria-hidden /> },
+  ];
+}
+
+const LETTERS: Readonly<Record<string, Precondition>> = {
+  "1": "on_true",
+  "2": "on_false",
+  "3": "on_error",
+  "4": "on_stopped",
+  t: "on_true",
+  f: "on_false",
+  e: "on_error",
+  s: "on_stopped",
+};
+
+function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) {
+  const row = useRef<HTMLDivElement>(null);
+  useEffect(() => row.current?.querySelector("button")?.focus(), []);
+  const onKeyDown = (event: React.KeyboardEvent) => {
+    const chosen = LETTERS[event.key.toLowerCase()];
+    const buttons = [...(row.current?.querySelectorAll("button") ?? [])];
+    const at = buttons.indexOf(document.activeElement as HTMLButtonElement);
+    const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+    if (chosen) onPick(chosen);
+    else if (step) buttons[(at + step + buttons.length) % buttons.length]?.focus();
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  return (
+    // biome-ignore lint/a11y/useSemanticElements: a fieldset cannot be laid out as a row everywhere
+    <div
+      ref={row}
+      role="group"
+      aria-label="Outcome"
+      className={style.outcomes}
+      onKeyDown={onKeyDown}
+    >
+      {OUTCOMES.map((outcome, i) => (
+        <Button
+          key={outcome}
+          onClick={() => onPick(outcome)}
+          leftSection={<OutcomeSign outcome={outcome} />}
+          rightSection={<span className={style.digit}>{i + 1}</span>}
+          style={{ color: outcomeColor[outcome] }}
+        >
+          {outcomeWord[outcome]}
+        </Button>
+      ))}
+    </div>
+  );
+}
+
+interface Props {
+  bench: Bench;
+  from: Key | null;
+  to: Key | null;
+  onClose: () => void;
+}
+
+const FRESH = "new ";
+
+export function ArrowDialog({ bench, from: given, to, onClose }: Props) {
+  const [from, setFrom] = useState(given);
+  const [outcome, setOutcome] = useState<Precondition | null>(given === ENTRY ? "on_true" : null);
+  const draw = (parent: Key, child: Key, when: Precondition) => {
+    const target = child.startsWith(FRESH) ? null : child;
+    const relation = together(bench.doc, () => {
+      const key =
+        target ?? placeAction(bench, { name: child.slice(FRESH.length) }, freePlace(bench));
+      return connect(bench.doc, parent, key, when);
+    });
+    onClose();
+    if (relation !== null) bench.select([relation]);
+    else notifications.show({ color: "red", message: "No arrow can lead there." });
+  };
+  const chooseFrom = (key: Key) => {
+    setFrom(key);
+    if (key === ENTRY && to !== null && to !== EXIT) draw(ENTRY, to, "on_true");
+    else if (key === ENTRY) setOutcome("on_true");
+  };
+  const chooseOutcome = (when: Precondition) => {
+    if (from !== null && to !== null) draw(from, to, when);
+    else setOutcome(when);
+  };
+  const step = from === null ? "from" : outcome === null ? "outcome" : "to";
+  const name = from === null ? "…" : endName(bench.graph, from);
+  const targets = (search: string): readonly Option[] => {
+    const all = ends(bench, EXIT, from).filter(({ id }) => from !== ENTRY || id !== EXIT);
+    const found = matching(all, search);
+    const wanted = search.trim();
+    const fresh: Option = {
+      id: FRESH + wanted,
+      label: `New action “${wanted}”`,
+      icon: <IconPlus size={16} aria-hidden />,
+    };
+    return wanted === "" ? found : [...found, fresh];
+  };
+  return (
+    <Modal
+      opened
+      onClose={onClose}
+      title="Draw an arrow"
+      yOffset="14vh"
+      centered={false}
+      transitionProps={{ duration: 80 }}
+    >
+      <p className={style.sentence} aria-live="polite">
+        {from === ENTRY ? (
+          "At the start, run …"
+        ) : (
+          <>
+            When <b>{name}</b> is{" "}
+            {outcome === null ? (
+              "…"
+            ) : (
+              <b className={style.said} style={{ color: outcomeColor[outcome] }}>
+                <OutcomeSign outcome={outcome} /> {outcomeWord[outcome]}
+              </b>
+            )}
+            , run {to === null ? "…" : <b>{endName(bench.graph, to)}</b>}
+          </>
+        )}
+      </p>
+      {step === "from" && (
+        <PickList
+          key="from"
+          label="From"
+          placeholder="From which action?"
+          find={(search) => matching(ends(bench, ENTRY, null), search)}
+          onPick={chooseFrom}
+          none="No action is called so."
+        />
+      )}
+      {step === "outcome" && <OutcomePicker onPick={chooseOutcome} />}
+      {step === "to" && from !== null && outcome !== null && (
+        <PickList
+          key="to"
+          label="To"
+          placeholder="What follows?"
+          find={targets}
+          onPick={(key) => draw(from, key, outcome)}
+          none="No action is called so."
+          take="draw"
+        />
+      )}
+    </Modal>
+  );
+}
+
+/** Leads an arrow, with all that it says, from or to another action. */
+export function RetargetDialog({
+  bench,
+  relation,
+  onClose,
+}: {
+  bench: Bench;
+  relation: string;
+  onClose: () => void;
+}) {
+  const [end, setEnd] = useState<"parent" | "child">("child");
+  const now = endsOf(relation);
+  if (now === null) return null;
+  const lead = (key: Key) => {
+    const moved = moveRelation(bench.doc, relation, { [end]: key });
+    onClose();
+    if (moved !== null) bench.select([moved]);
+    else {
+      notifications.show({
+        color: "red",
+        title: "The arrow stays",
+        message: "These two are tied already, or no arrow can lead there.",
+      });
+    }
+  };
+  const options = ends(bench, end === "child" ? EXIT : ENTRY, now[end]).filter(
+    ({ id }) => id !== now[end] && (id === EXIT || id !== ENTRY || now.parent === ENTRY),
+  );
+  return (
+    <Modal
+      opened
+      onClose={onClose}
+      title="Lead the arrow elsewhere"
+      yOffset="14vh"
+      centered={false}
+      transitionProps={{ duration: 80 }}
+    >
+      <div className={style.outcomes}>
+        <Button
+          variant={end === "child" ? "light" : "default"}
+          aria-pressed={end === "child"}
+          onClick={() => setEnd("child")}
+        >
+          to another than {endName(bench.graph, now.child)}
+        </Button>
+        {now.parent !== ENTRY && (
+          <Button
+            variant={end === "parent" ? "light" : "default"}
+            aria-pressed={end === "parent"}
+            onClick={() => setEnd("parent")}
+          >
+            from another than {endName(bench.graph, now.parent)}
+          </Button>
+        )}
+      </div>
+      <PickList
+        key={end}
+        label={end === "child" ? "To" : "From"}
+        placeholder={end === "child" ? "What follows instead?" : "After which action instead?"}
+        find={(search) => matching(options, search)}
+        onPick={lead}
+        none="No action is called so."
+        take="lead there"
+      />
+    </Modal>
+  );
+}

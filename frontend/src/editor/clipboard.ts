@@ -1,0 +1,142 @@
+/**
+ * The clipboard: UMRF text for everybody, and beside it the exact pieces for our own pages.
+ *
+ * A key press gives a page the system's clipboard on any address. A menu may have it only in a
+ * secure context; elsewhere what was copied last in this browser serves.
+ */
+import { notifications } from "@mantine/notifications";
+import { place, sentence } from "../api/http";
+import { readPieces } from "../api/pieces";
+import { type Clip, clipOf, isEmpty, paste } from "../graph/clip";
+import { mapsFrom } from "../graph/layout";
+import { readGraph } from "../graph/read";
+import { umrfText } from "../graph/umrf-text";
+import { arrange } from "../ui/canvas/arrange";
+import { type Bench, selectedActions } from "./bench";
+
+export interface Held {
+  /** What the system's clipboard got. */
+  readonly text: string;
+  readonly clip: Clip;
+}
+
+const SHELF = "aa.clipboard";
+const MOST = 2_000_000; // characters that are kept for other tabs
+let latest: Held | null = null;
+
+/** What is chosen, as it goes to the clipboard. Notes alone are their own text. */
+export function copied(bench: Bench): Held {
+  const places = bench.places();
+  const clip = clipOf(bench.doc, bench.selection, places);
+  const actions = selectedActions(bench).filter(({ missing }) => !missing);
+  if (actions.length === 0) return { text: JSON.stringify(clip.positions), clip };
+  const keys = new Set(actions.map(({ key }) => key));
+  return { text: umrfText(bench.graph, keys, places), clip };
+}
+
+/** Remembers it for this browser's pages. */
+export function hold(held: Held): void {
+  latest = held;
+  try {
+    const text = JSON.stringify(held);
+    if (text.length <= MOST) localStorage.setItem(SHELF, text);
+    else localStorage.removeItem(SHELF);
+  } catch {
+    // A browser that keeps nothing still has it on this page.
+  }
+}
+
+/** What was copied last in this browser. */
+export function held(): Held | null {
+  try {
+    const text = localStorage.getItem(SHELF);
+    if (text !== null) return JSON.parse(text) as Held;
+  } catch {
+    // as above
+  }
+  return latest;
+}
+
+/** Puts text on the system's clipboard. Whether that worked. */
+export async function writeText(text: string): Promise<boolean> {
+  try {
+    if (window.isSecureContext) {
+      await navigator.clipboard.writeText(text);
+      return true;
+    }
+  } catch {
+    // no permission; the old way may still work
+  }
+  let done = false;
+  const onCopy = (event: ClipboardEvent) => {
+    event.clipboardData?.setData("text/plain", text);
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    done = true;
+  };
+  document.addEventListener("copy", onCopy, { capture: true });
+  document.execCommand("copy");
+  document.removeEventListener("copy", onCopy, { capture: true });
+  return done;
+}
+
+/** The system's clipboard where it may be read, else what was copied last in this browser. */
+export async function readText(): Promise<string> {
+  try {
+    if (window.isSecureContext) return await navigator.clipboard.readText();
+  } catch {
+    // no permission
+  }
+  return held()?.text ?? "";
+}
+
+function failed(message: string): void {
+  notifications.show({ color: "red", title: "Nothing pasted", message, autoClose: 12_000 });
+}
+
+/** The same with places for what has none: files often come without. */
+function placed(clip: Clip): Clip {
+  const graph = readGraph(mapsFrom(clip));
+  if (graph.actions.every(({ position }) => position !== null)) return clip;
+  return { ...clip, positions: { ...Object.fromEntries(arrange(graph)), ...clip.positions } };
+}
+
+function land(bench: Bench, clip: Clip, own: boolean): void {
+  const pointer = bench.view.pointer();
+  const keys = paste(
+    bench.doc,
+    placed(clip),
+    pointer ? { at: pointer.at } : own ? { by: [40, 40] } : { at: bench.view.middle() },
+  );
+  bench.select(keys);
+  requestAnimationFrame(() => {
+    const [first] = keys;
+    const at = first === undefined ? undefined : bench.places().get(first);
+    if (at) bench.view.reveal(at);
+  });
+}
+
+/** Adds what a text holds: our own pieces exactly, any UMRF as the server reads it. */
+export async function pasteText(bench: Bench, text: string): Promise<void> {
+  const ours = held();
+  if (ours !== null && ours.text === text && !isEmpty(ours.clip)) {
+    // Where it came from it would lie on itself.
+    const same = Object.keys(ours.clip.actions).some((key) =>
+      bench.graph.actions.some((action) => action.key === key),
+    );
+    land(bench, ours.clip, same);
+    return;
+  }
+  if (text.trim() === "") {
+    failed("The clipboard has no text. Copy actions here, or UMRF text anywhere.");
+    return;
+  }
+  try {
+    const pieces = await readPieces(text);
+    if (isEmpty(pieces)) failed("This UMRF text has no actions.");
+    else land(bench, pieces, false);
+  } catch (error) {
+    const where = place(error);
+    failed(where === "" ? sentence(error) : `${sentence(error)} (${where})`);
+  }
+}

@@ -1,0 +1,99 @@
+/** The menu of what was pressed, at the place where it was pressed. */
+import { Menu } from "@mantine/core";
+import { Fragment } from "react";
+import { type Bench, selectedActions, selectedNotes, selectedRelations } from "./bench";
+import style from "./context-menu.module.css";
+import * as deeds from "./deeds/all";
+import { type Deed, isEnabled, labelOf } from "./deeds/deed";
+import { Shortcut } from "./shortcut";
+
+/** What can be done with the selection, in groups. */
+export function offered(bench: Bench): readonly (readonly Deed[])[] {
+  const actions = selectedActions(bench).length;
+  const notes = selectedNotes(bench).length;
+  const arrows = selectedRelations(bench).length;
+  const { copy, cut, pasteHere, duplicate, remove, heal } = deeds;
+  if (actions + notes > 1) {
+    return [
+      [copy, cut, duplicate, pasteHere],
+      [deeds.tidySelection, ...deeds.ALIGN, ...deeds.DISTRIBUTE, deeds.frame],
+      [deeds.connectTo, deeds.entry, deeds.exit, deeds.zoomSelection, deeds.copyLink],
+      [remove, heal],
+    ];
+  }
+  if (actions === 1) {
+    return [
+      [deeds.details, deeds.connectTo, deeds.entry, deeds.exit],
+      [copy, cut, duplicate, pasteHere],
+      [deeds.frame, deeds.zoomSelection, deeds.copyLink],
+      [remove, heal],
+    ];
+  }
+  if (notes === 1) return [[deeds.write], [copy, cut, duplicate, deeds.copyLink], [remove]];
+  if (arrows > 0) {
+    return [
+      [deeds.details, deeds.insert, deeds.retarget],
+      [deeds.zoomSelection, deeds.copyLink],
+      [remove],
+    ];
+  }
+  const end = bench.selection.size > 0 ? [deeds.connectTo] : [];
+  return [
+    [...end, deeds.add, deeds.note, pasteHere],
+    [deeds.selectAll, deeds.tidy, deeds.fit, deeds.snap],
+    [deeds.palette, deeds.keys],
+  ];
+}
+
+interface Props {
+  bench: Bench;
+  screen: readonly [number, number];
+  onClose: () => void;
+}
+
+export function ContextMenu({ bench, screen, onClose }: Props) {
+  const groups = offered(bench)
+    .map((group) => group.filter((deed) => isEnabled(deed, bench)))
+    .filter((group) => group.length > 0);
+  return (
+    <Menu
+      opened
+      onChange={(opened) => {
+        if (!opened) onClose();
+      }}
+      position="bottom-start"
+      offset={2}
+      width={250}
+      trapFocus
+      returnFocus
+      transitionProps={{ duration: 60 }}
+    >
+      <Menu.Target>
+        <span className={style.spot} style={{ left: screen[0], top: screen[1] }} />
+      </Menu.Target>
+      <Menu.Dropdown className={style.menu ?? ""} onContextMenu={(event) => event.preventDefault()}>
+        {groups.map((group, i) => (
+          <Fragment key={group[0]?.name}>
+            {i > 0 && <Menu.Divider />}
+            {group.map((deed) => {
+              const Sign = deed.icon;
+              return (
+                <Menu.Item
+                  key={deed.name}
+                  leftSection={<Sign size={16} aria-hidden />}
+                  rightSection={<Shortcut deed={deed} />}
+                  onClick={() => {
+                    onClose();
+                    deed.run(bench);
+                  }}
+                >
+                  {labelOf(deed, bench)}
+                </Menu.Item>
+              );
+            })}
+          </Fragment>
+        ))}
+      </Menu.Dropdown>
+    </Menu>
+  );
+}

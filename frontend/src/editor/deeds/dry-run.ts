@@ -1,0 +1,90 @@
+/** Deeds of a dry-run: play the graph on the canvas, step by step, and decide how things end. */
+import {
+  IconCheck,
+  IconExclamationMark,
+  IconPlayerPlay,
+  IconPlayerSkipBack,
+  IconPlayerTrackNext,
+  IconPlayerTrackPrev,
+  IconTheater,
+  IconX,
+} from "@tabler/icons-react";
+import type { Bench } from "../bench";
+import type { Choice } from "../dry-run/script";
+import type { Deed } from "./deed";
+
+const part = { group: "Dry-run", changes: false, also: "simulate rehearse play test" } as const;
+const playing = (bench: Bench) => bench.dryRun !== null && bench.dryRun.moments.length > 0;
+
+export const dryRun: Deed = {
+  ...part,
+  name: "dry-run",
+  label: "Dry-run",
+  shortcuts: ["d"],
+  icon: IconTheater,
+  enabled: (bench) => bench.dryRun !== null || bench.graph.actions.length > 0,
+  run: (bench) => (bench.dryRun === null ? bench.beginDryRun() : bench.dryRun.close()),
+};
+
+export const play: Deed = {
+  ...part,
+  name: "dry-run-play",
+  label: "Play and pause",
+  shortcuts: ["p"],
+  icon: IconPlayerPlay,
+  enabled: playing,
+  run: ({ dryRun: run }) => {
+    if (run === null) return;
+    if (!run.playing && run.index >= run.moments.length - 1) run.go(0);
+    run.play(!run.playing);
+  },
+};
+
+const step = (by: 1 | -1, label: string, shortcut: string, icon: Deed["icon"]): Deed => ({
+  ...part,
+  name: `dry-run-${by === 1 ? "next" : "back"}`,
+  label,
+  shortcuts: [shortcut],
+  icon,
+  enabled: (bench) =>
+    bench.dryRun !== null &&
+    (by === 1 ? bench.dryRun.index < bench.dryRun.moments.length - 1 : bench.dryRun.index > 0),
+  run: ({ dryRun: run }) => {
+    run?.play(false);
+    run?.go(run.index + by);
+  },
+});
+
+export const next = step(1, "Next moment", ".", IconPlayerTrackNext);
+export const back = step(-1, "Moment before", ",", IconPlayerTrackPrev);
+
+export const restart: Deed = {
+  ...part,
+  name: "dry-run-restart",
+  label: "From the start, undecided",
+  shortcuts: ["0"],
+  icon: IconPlayerSkipBack,
+  enabled: playing,
+  run: (bench) => bench.dryRun?.restart(),
+};
+
+const choice = (outcome: Choice, label: string, shortcut: string, icon: Deed["icon"]): Deed => ({
+  ...part,
+  name: `dry-run-${outcome}`,
+  label,
+  shortcuts: [shortcut],
+  icon,
+  enabled: (bench) => (bench.dryRun?.sighting.going.length ?? 0) > 0,
+  run: ({ dryRun: run, selection }) => {
+    const chosen = run?.sighting.going.find(({ key }) => selection.has(key));
+    run?.choose(outcome, chosen?.key);
+  },
+});
+
+export const CHOICES: readonly Deed[] = [
+  choice("on_true", "It ends true", "1", IconCheck),
+  choice("on_false", "It ends false", "2", IconX),
+  choice("on_error", "It ends with an error", "3", IconExclamationMark),
+];
+
+export const DRY_RUN: readonly Deed[] = [dryRun, play, next, back, restart, ...CHOICES];

@@ -1,0 +1,58 @@
+/** Deeds about the graph as a whole: take it elsewhere, point others to it. */
+
+import { notifications } from "@mantine/notifications";
+import { IconDownload, IconLink, IconPhoto, IconVectorTriangle } from "@tabler/icons-react";
+import { writeText } from "../clipboard";
+import { linkTo } from "../deep-link";
+import type { Deed } from "./deed";
+
+const graph = { group: "Graph", changes: false, enabled: () => true } as const;
+
+export const exportUmrf: Deed = {
+  ...graph,
+  name: "export",
+  label: "Export as UMRF",
+  shortcuts: ["Mod+s"],
+  icon: IconDownload,
+  also: "download save file JSON",
+  run: (bench) => bench.download("umrf"),
+};
+
+export const exportSvg: Deed = {
+  ...graph,
+  name: "export-svg",
+  label: "Export as SVG",
+  shortcuts: [],
+  icon: IconVectorTriangle,
+  also: "picture image download vector",
+  run: (bench) => bench.download("svg"),
+};
+
+export const exportPng: Deed = {
+  ...graph,
+  name: "export-png",
+  label: "Export as PNG",
+  shortcuts: [],
+  icon: IconPhoto,
+  also: "picture image download",
+  run: (bench) => bench.download("png"),
+};
+
+export const copyLink: Deed = {
+  ...graph,
+  name: "copy-link",
+  label: "Copy link",
+  shortcuts: ["Mod+Shift+l"],
+  icon: IconLink,
+  also: "share url address deep link",
+  run: (bench) => {
+    const link = linkTo(bench.id, [...bench.selection]);
+    void writeText(link).then((done) =>
+      notifications.show(
+        done
+          ? { message: "Link copied" }
+          : { title: "The browser did not copy the link", message: link, autoClose: 20_000 },
+      ),
+    );
+  },
+};

@@ -1,0 +1,180 @@
+/** Deeds that change what is seen, not what is drawn. */
+import {
+  IconArrowGuide,
+  IconBraces,
+  IconCommand,
+  IconFocus2,
+  IconFocusCentered,
+  IconHandStop,
+  IconKeyboard,
+  IconMarquee2,
+  IconMenu2,
+  IconZoomIn,
+  IconZoomOut,
+} from "@tabler/icons-react";
+import { ENTRY, type Key } from "../../graph/model";
+import { type Bench, selectedRelations } from "../bench";
+import type { Deed } from "./deed";
+
+const always = () => true;
+const look = { group: "Look", changes: false, enabled: always } as const;
+
+export const palette: Deed = {
+  ...look,
+  name: "palette",
+  label: "Find a command",
+  shortcuts: ["Mod+k"],
+  icon: IconCommand,
+  also: "command palette go to graph action",
+  run: (bench) => bench.open({ kind: "palette" }),
+};
+
+export const keys: Deed = {
+  ...look,
+  name: "keys",
+  label: "Keyboard shortcuts",
+  shortcuts: ["?"],
+  icon: IconKeyboard,
+  also: "help",
+  run: (bench) => bench.open({ kind: "keys" }),
+};
+
+export const menu: Deed = {
+  ...look,
+  name: "menu",
+  label: "Menu for the selection",
+  shortcuts: ["ContextMenu", "Shift+F10"],
+  icon: IconMenu2,
+  run: (bench) => bench.open({ kind: "menu", screen: spotOf(bench) }),
+};
+
+/** Where on screen the selection is, else the middle of the canvas. */
+function spotOf(bench: Bench): readonly [number, number] {
+  const [key] = [...bench.selection].filter((each) => bench.places().has(each));
+  const at = key === undefined ? undefined : bench.places().get(key);
+  const [x, y] = bench.view.screenOf(at ?? bench.view.middle());
+  return [x + 24, y + 24];
+}
+
+export const fit: Deed = {
+  ...look,
+  name: "fit",
+  label: "Fit",
+  shortcuts: ["f", "Shift+!"],
+  icon: IconFocusCentered,
+  also: "zoom to fit all",
+  run: (bench) => bench.view.fit(),
+};
+
+export const zoomSelection: Deed = {
+  ...look,
+  name: "zoom-selection",
+  label: "Show the selection",
+  shortcuts: ["z", "Shift+@"],
+  icon: IconFocus2,
+  also: "zoom to selection",
+  enabled: (bench) => bench.selection.size > 0,
+  run: (bench) => bench.view.show(shownKeys(bench), "whole"),
+};
+
+/** What is chosen, and for arrows what they tie together. */
+export function shownKeys(bench: Bench): Key[] {
+  const ends = selectedRelations(bench).flatMap(({ parent, child }) => [parent, child]);
+  return [...bench.selection, ...ends].filter((key) => bench.places().has(key));
+}
+
+export const zoomIn: Deed = {
+  ...look,
+  name: "zoom-in",
+  label: "Zoom in",
+  shortcuts: ["=", "+"],
+  icon: IconZoomIn,
+  run: (bench) => bench.view.zoomIn(),
+};
+
+export const zoomOut: Deed = {
+  ...look,
+  name: "zoom-out",
+  label: "Zoom out",
+  shortcuts: ["-"],
+  icon: IconZoomOut,
+  run: (bench) => bench.view.zoomOut(),
+};
+
+export const pan: Deed = {
+  ...look,
+  name: "pan",
+  label: "Pan",
+  shortcuts: ["h"],
+  icon: IconHandStop,
+  run: (bench) => bench.setTool("pan"),
+};
+
+export const marquee: Deed = {
+  ...look,
+  name: "marquee",
+  label: "Select",
+  shortcuts: ["v"],
+  icon: IconMarquee2,
+  also: "marquee frame several",
+  run: (bench) => bench.setTool("select"),
+};
+
+export const showJson: Deed = {
+  ...look,
+  name: "json",
+  label: "Show the JSON",
+  shortcuts: ["j"],
+  icon: IconBraces,
+  run: (bench) => bench.setPanel("json"),
+};
+
+/** The nearest neighbour along arrows: down to what follows, up to what comes before, or beside. */
+export function neighbour(bench: Bench, way: "up" | "down" | "left" | "right"): Key | null {
+  const { relations, actions } = bench.graph;
+  const places = bench.places();
+  const [arrow] = selectedRelations(bench);
+  if (arrow && (way === "up" || way === "down")) return way === "up" ? arrow.parent : arrow.child;
+  const [from] = [...bench.selection].filter((key) => places.has(key));
+  if (from === undefined)
+    return relations.find((r) => r.parent === ENTRY)?.child ?? actions[0]?.key ?? null;
+  const at = places.get(from) ?? [0, 0];
+  const after = (key: Key) => relations.filter((r) => r.parent === key).map((r) => r.child);
+  const before = (key: Key) => relations.filter((r) => r.child === key).map((r) => r.parent);
+  const beside = () =>
+    [...new Set([...before(from).flatMap(after), ...after(from).flatMap(before)])].filter(
+      (key) => (places.get(key)?.[0] ?? 0) !== at[0],
+    );
+  const found = way === "down" ? after(from) : way === "up" ? before(from) : beside();
+  const fits = (key: Key) => {
+    const [x] = places.get(key) ?? [0, 0];
+    return key !== from && (way === "left" ? x < at[0] : way === "right" ? x > at[0] : true);
+  };
+  const far = (key: Key) => {
+    const [x, y] = places.get(key) ?? [0, 0];
+    return Math.hypot(x - at[0], y - at[1]);
+  };
+  return found.filter(fits).sort((a, b) => far(a) - far(b))[0] ?? null;
+}
+
+export const WALK: readonly Deed[] = (["up", "down", "left", "right"] as const).map((way) => ({
+  ...look,
+  name: `walk-${way}`,
+  label: {
+    up: "Go to what comes before",
+    down: "Go to what follows",
+    left: "Go to the left",
+    right: "Go to the right",
+  }[way],
+  shortcuts: [`Alt+Arrow${way.charAt(0).toUpperCase()}${way.slice(1)}`],
+  icon: IconArrowGuide,
+  also: "walk neighbour",
+  enabled: (bench: Bench) => bench.graph.actions.length > 0,
+  run: (bench: Bench) => {
+    const key = neighbour(bench, way);
+    if (key === null) return;
+    bench.select([key]);
+    bench.view.reveal(bench.places().get(key) ?? [0, 0]);
+    bench.view.focus(key);
+  },
+}));

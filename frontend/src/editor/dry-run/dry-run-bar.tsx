@@ -1,0 +1,232 @@
+/** The bar of a dry-run: where one is, what happens, how it shall go on. */
+import { ActionIcon, Button, Menu, Select, Tooltip } from "@mantine/core";
+import {
+  IconBolt,
+  IconPlayerPauseFilled,
+  IconPlayerPlayFilled,
+  IconPlayerSkipBack,
+  IconPlayerTrackNext,
+  IconPlayerTrackPrev,
+  IconX,
+} from "@tabler/icons-react";
+import type { ReactNode } from "react";
+import { sentence } from "../../api/http";
+import { fullName } from "../../graph/model";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
+import { type Bench, selectedActions } from "../bench";
+import type { Deed } from "../deeds/deed";
+import { labelOf } from "../deeds/deed";
+import * as deeds from "../deeds/dry-run";
+import { Shortcut } from "../shortcut";
+import style from "./dry-run-bar.module.css";
+import type { Going } from "./play";
+import { type FaultKind, faultWords } from "./script";
+import { type DryRun, SPEEDS } from "./use-dry-run";
+
+const CHOICES = ["on_true", "on_false", "on_error"] as const;
+
+function Step({ bench, deed, children }: { bench: Bench; deed: Deed; children?: ReactNode }) {
+  const Sign = deed.icon;
+  return (
+    <Tooltip
+      label={
+        <>
+          {labelOf(deed, bench)} <Shortcut deed={deed} />
+        </>
+      }
+    >
+      <ActionIcon
+        size={34}
+        aria-label={deed.label}
+        disabled={!deed.enabled(bench)}
+        onClick={() => deed.run(bench)}
+      >
+        {children ?? <Sign size={17} aria-hidden />}
+      </ActionIcon>
+    </Tooltip>
+  );
+}
+
+function time(ms: number): string {
+  const seconds = ms / 1000;
+  if (seconds < 100) return `${seconds.toFixed(1)} s`;
+  const minutes = Math.floor(seconds / 60);
+  return `${minutes}:${String(Math.floor(seconds % 60)).padStart(2, "0")} min`;
+}
+
+/** The action whose end is to be chosen: the selected one if it runs. */
+export function asked(bench: Bench, run: DryRun): Going | undefined {
+  return run.sighting.going.find(({ key }) => bench.selection.has(key)) ?? run.sighting.going[0];
+}
+
+function Choices({ bench, run }: { bench: Bench; run: DryRun }) {
+  const going = asked(bench, run);
+  if (!going) return null;
+  const others = run.sighting.going.length > 1;
+  return (
+    // biome-ignore lint/a11y/useSemanticElements: a fieldset cannot be laid out as a row everywhere
+    <div className={style.choices} role="group" aria-label={`How does ${going.node} end?`}>
+      {others ? (
+        <Select
+          size="xs"
+          w={170}
+          aria-label="Which running action"
+          data={run.sighting.going.map(({ key, node }) => ({ value: key, label: node }))}
+          value={going.key}
+          onChange={(key) => key && bench.select([key])}
+        />
+      ) : (
+        <b>{going.node}</b>
+      )}
+      <span className={style.how}>ends</span>
+      {CHOICES.map((outcome, i) => (
+        <Button
+          key={outcome}
+          size="compact-sm"
+          className={style.choice ?? ""}
+          disabled={run.busy}
+          leftSection={<OutcomeSign outcome={outcome} />}
+          rightSection={<span className={style.digit}>{i + 1}</span>}
+          style={{ color: outcomeColor[outcome] }}
+          onClick={() => run.choose(outcome, going.key)}
+        >
+          {outcomeWord[outcome]}
+        </Button>
+      ))}
+    </div>
+  );
+}
+
+const OF_ACTIONS = ["error", "never", "exception", "deaf"] as const satisfies readonly FaultKind[];
+
+function Faults({ bench, run }: { bench: Bench; run: DryRun }) {
+  const { fault } = run.decided;
+  const [first] = selectedActions(bench);
+  const node = (first && fullName(first)) ?? asked(bench, run)?.node;
+  const at = run.moments[run.index]?.at ?? 0;
+  const said =
+    fault === null
+      ? "Fault"
+      : fault.kind === "stop"
+        ? "Stop pressed"
+        : `${fault.node}: ${faultWords[fault.kind]}`;
+  return (
+    <Menu position="top-end" width={260}>
+      <Menu.Target>
+        <Button
+          size="compact-sm"
+          variant={fault === null ? "subtle" : "light"}
+          color={fault === null ? "gray" : "orange"}
+          leftSection={<IconBolt size={14} aria-hidden />}
+          className={style.fault ?? ""}
+        >
+          {said}
+        </Button>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <Menu.Label>{node === undefined ? "Choose an action first" : node}</Menu.Label>
+        {OF_ACTIONS.map((kind) => (
+          <Menu.Item
+            key={kind}
+            disabled={node === undefined}
+            onClick={() => node !== undefined && run.inject({ kind, node })}
+          >
+            {faultWords[kind]}
+          </Menu.Item>
+        ))}
+        <Menu.Label>Somebody</Menu.Label>
+        <Menu.Item onClick={() => run.inject({ kind: "stop", at })}>{faultWords.stop}</Menu.Item>
+        {fault !== null && (
+          <>
+            <Menu.Divider />
+            <Menu.Item onClick={() => run.inject(null)}>No fault</Menu.Item>
+          </>
+        )}
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
+
+function Said({ run }: { run: DryRun }) {
+  if (run.failed) return <span className={style.failed}>{sentence(run.failed)}</span>;
+  if (run.moments.length === 0)
+    return <span>{run.busy ? "Working it out …" : "Nothing happens."}</span>;
+  const last = run.index === run.moments.length - 1;
+  return (
+    <>
+      {run.words.join(" · ") || "…"}
+      {last && run.cut && <i> · It goes on; the dry-run is cut here.</i>}
+      {last && !run.cut && run.sighting.going.length > 0 && <i> · This never ends by itself.</i>}
+    </>
+  );
+}
+
+export function DryRunBar({ bench, run, start }: { bench: Bench; run: DryRun; start: ReactNode }) {
+  const at = run.moments[run.index]?.at ?? 0;
+  return (
+    <section className={style.bar} aria-label="Dry-run">
+      <div className={style.row}>
+        <span className={style.title}>Dry-run</span>
+        <Step bench={bench} deed={deeds.restart}>
+          <IconPlayerSkipBack size={17} aria-hidden />
+        </Step>
+        <Step bench={bench} deed={deeds.back}>
+          <IconPlayerTrackPrev size={17} aria-hidden />
+        </Step>
+        <Step bench={bench} deed={deeds.play}>
+          {run.playing ? (
+            <IconPlayerPauseFilled size={17} aria-hidden />
+          ) : (
+            <IconPlayerPlayFilled size={17} aria-hidden />
+          )}
+        </Step>
+        <Step bench={bench} deed={deeds.next}>
+          <IconPlayerTrackNext size={17} aria-hidden />
+        </Step>
+        <input
+          type="range"
+          className={style.scrub}
+          aria-label="Moment"
+          aria-valuetext={`${time(at)}: ${run.words.join(", ")}`}
+          min={0}
+          max={Math.max(1, run.moments.length - 1)}
+          value={run.index}
+          disabled={run.moments.length === 0}
+          onChange={(event) => {
+            run.play(false);
+            run.go(Number(event.currentTarget.value));
+          }}
+        />
+        <span className={style.time}>{time(at)}</span>
+        <Select
+          size="xs"
+          w={74}
+          aria-label="Speed"
+          className={style.speed ?? ""}
+          data={SPEEDS.map((speed) => ({ value: String(speed), label: `${speed}×` }))}
+          value={String(run.speed)}
+          onChange={(speed) => run.setSpeed(Number(speed ?? 1))}
+        />
+        <Faults bench={bench} run={run} />
+        <Tooltip
+          label={
+            <>
+              Close <Shortcut deed={deeds.dryRun} />
+            </>
+          }
+        >
+          <ActionIcon size={34} aria-label="Close the dry-run" onClick={run.close}>
+            <IconX size={17} aria-hidden />
+          </ActionIcon>
+        </Tooltip>
+      </div>
+      <div className={style.row}>
+        <p className={style.said} aria-live="polite">
+          <Said run={run} />
+        </p>
+        <Choices bench={bench} run={run} />
+      </div>
+      <p className={style.note}>Nothing of this is recorded. {start}</p>
+    </section>
+  );
+}

@@ -1,0 +1,109 @@
+/** The palette: every deed with its shortcut, and every place to go to. */
+import { Modal } from "@mantine/core";
+import { IconRouteSquare2, IconSquareRounded } from "@tabler/icons-react";
+import { useMemo, useRef } from "react";
+import { useLocation } from "wouter";
+import { useGraphs } from "../api/graphs";
+import { matching, type Option, PickList } from "../ui/pick-list";
+import { robotColor } from "../ui/robot";
+import type { Bench } from "./bench";
+import { DEEDS } from "./deeds/all";
+import { isEnabled, labelOf } from "./deeds/deed";
+import { Shortcut } from "./shortcut";
+
+const MOST = 60;
+/** Names of deeds that were done from here, the last first. */
+let recent: readonly string[] = [];
+
+function deedOptions(bench: Bench): Option[] {
+  const rank = (name: string) => {
+    const at = recent.indexOf(name);
+    return at < 0 ? recent.length : at;
+  };
+  return DEEDS.filter(({ name }) => name !== "palette")
+    .map((deed) => {
+      const Sign = deed.icon;
+      return {
+        id: `deed ${deed.name}`,
+        label: labelOf(deed, bench),
+        also: `${deed.also ?? ""} ${deed.group}`,
+        group: "Commands",
+        icon: <Sign size={16} aria-hidden />,
+        right: <Shortcut deed={deed} />,
+        disabled: !isEnabled(deed, bench),
+        rank: rank(deed.name),
+      };
+    })
+    .sort((a, b) => Number(a.disabled) - Number(b.disabled) || a.rank - b.rank);
+}
+
+function actionOptions({ graph }: Bench): Option[] {
+  return graph.actions.map(({ key, name, instanceId, actor, description }) => ({
+    id: `action ${key}`,
+    label: `${name} ${instanceId}`,
+    sub: [actor, description].filter(Boolean).join(" · "),
+    also: "go to action",
+    group: "Actions of this graph",
+    icon: <IconSquareRounded size={16} aria-hidden style={{ color: robotColor(actor) }} />,
+  }));
+}
+
+export function Palette({ bench, onClose }: { bench: Bench; onClose: () => void }) {
+  const [, go] = useLocation();
+  const graphs = useGraphs().data;
+  // Counted once: the order shall not change under the person's hands.
+  const first = useRef(bench);
+  const options = useMemo<Option[]>(
+    () => [
+      ...deedOptions(first.current),
+      ...actionOptions(first.current),
+      ...(graphs ?? [])
+        .filter(({ id }) => id !== first.current.id)
+        .map(({ id, name, description }) => ({
+          id: `graph ${id}`,
+          label: name || "Untitled",
+          sub: description,
+          also: "go to open graph",
+          group: "Graphs",
+          icon: <IconRouteSquare2 size={16} aria-hidden />,
+        })),
+    ],
+    [graphs],
+  );
+  const onPick = (id: string) => {
+    const [kind = "", key = ""] = id.split(" ");
+    onClose();
+    if (kind === "graph") go(`/graphs/${encodeURIComponent(key)}`);
+    else if (kind === "action") {
+      bench.select([key]);
+      bench.view.show([key]);
+      bench.view.focus(key);
+    } else {
+      recent = [key, ...recent.filter((name) => name !== key)].slice(0, 5);
+      // After the palette has given the focus back.
+      setTimeout(() => DEEDS.find(({ name }) => name === key)?.run(bench), 0);
+    }
+  };
+  return (
+    <Modal
+      opened
+      onClose={onClose}
+      withCloseButton={false}
+      centered={false}
+      yOffset="12vh"
+      size="lg"
+      padding="sm"
+      transitionProps={{ duration: 80 }}
+      aria-label="Commands"
+    >
+      <PickList
+        label="Find a command, an action or a graph"
+        placeholder="What do you want to do, or where to go?"
+        find={(search) => matching(options, search).slice(0, MOST)}
+        onPick={onPick}
+        none="Nothing is called so."
+        take="do it"
+      />
+    </Modal>
+  );
+}

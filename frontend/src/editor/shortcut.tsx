@@ -1,0 +1,19 @@
+/** A deed's first shortcut, as it is printed on keys. */
+import { Kbd } from "@mantine/core";
+import { type Deed, keysOf } from "./deeds/deed";
+import style from "./toolbar.module.css";
+
+export function Keys({ shortcut }: { shortcut: string }) {
+  return (
+    <span className={style.keys}>
+      {keysOf(shortcut).map((key) => (
+        <Kbd key={key}>{key}</Kbd>
+      ))}
+    </span>
+  );
+}
+
+export function Shortcut({ deed }: { deed: Deed }) {
+  const [first] = deed.shortcuts;
+  return first === undefined ? null : <Keys shortcut={first} />;
+}

@@ -1,0 +1,91 @@
+/** Drawing arrows by hand: drag from an outcome, tap an outcome and then what follows, lead elsewhere. */
+import type { Connection, OnConnectEnd } from "@xyflow/react";
+import { type MouseEvent, useCallback, useEffect, useState } from "react";
+import { connect, retarget } from "../graph/edit";
+import type { Key, Position, Precondition } from "../graph/model";
+import { ENTRY } from "../graph/model";
+import type { Arrow } from "../ui/canvas/elements";
+import type { Bench } from "./bench";
+import { nodeAt, pointOf } from "./hit";
+
+export interface Pending {
+  readonly key: Key;
+  readonly outcome: Precondition;
+}
+
+export function outcomeOf(handle: string | null | undefined): Precondition {
+  return handle === "on_false" || handle === "on_error" || handle === "on_stopped"
+    ? handle
+    : "on_true";
+}
+
+/** The outcome whose mark was hit; null when it was something else. */
+function outcomeHit(target: EventTarget): Pending | null {
+  if (!(target instanceof Element)) return null;
+  const handle = target.closest<HTMLElement>(".react-flow__handle.source");
+  const key = handle?.dataset.nodeid;
+  return handle && key !== undefined ? { key, outcome: outcomeOf(handle.dataset.handleid) } : null;
+}
+
+type AddAt = (screen: Position, from: Pending | null) => void;
+
+export function useConnecting(bench: Bench, openAddAt: AddAt) {
+  const { doc, select, mayEdit } = bench;
+  const [pending, setPending] = useState<Pending | null>(null);
+  const draw = useCallback(
+    (parent: Key, child: Key, outcome: Precondition) => {
+      const relation = mayEdit ? connect(doc, parent, child, outcome) : null;
+      if (relation !== null) select([relation]);
+    },
+    [doc, select, mayEdit],
+  );
+  useEffect(() => {
+    if (pending === null) return;
+    const onKey = (event: KeyboardEvent) => {
+      if (event.key === "Escape") setPending(null);
+    };
+    window.addEventListener("keydown", onKey, { capture: true });
+    return () => window.removeEventListener("keydown", onKey, { capture: true });
+  }, [pending]);
+
+  const onConnectEnd: OnConnectEnd = (event, state) => {
+    const from = state.fromHandle;
+    if (state.isValid || !from || from.type !== "source") return;
+    const point = pointOf(event);
+    const outcome = outcomeOf(from.id);
+    const target = nodeAt(point);
+    if (target === null) openAddAt(point, { key: from.nodeId, outcome });
+    else if (target !== from.nodeId) draw(from.nodeId, target, outcome);
+  };
+
+  /** Whether the click was about an arrow, and nothing else shall come of it. */
+  const onClick = (event: MouseEvent): boolean => {
+    if (!mayEdit) return false;
+    const hit = outcomeHit(event.target);
+    const point: Position = [event.clientX, event.clientY];
+    const card = nodeAt(point);
+    if (pending !== null) {
+      setPending(null);
+      if (hit && hit.key === pending.key && hit.outcome === pending.outcome) return true;
+      if (card === null) openAddAt(point, pending);
+      else draw(pending.key, card, pending.outcome);
+      return true;
+    }
+    if (hit === null) return false;
+    setPending(hit);
+    return true;
+  };
+
+  const onReconnect = (edge: Arrow, to: Connection) => {
+    const { data } = edge;
+    if (!data || !mayEdit) return;
+    const moved = retarget(doc, data.relation, data.outcome, {
+      ...(to.source !== edge.source ? { parent: to.source } : {}),
+      ...(to.target !== edge.target ? { child: to.target } : {}),
+      ...(to.source === ENTRY ? {} : { outcome: outcomeOf(to.sourceHandle) }),
+    });
+    if (moved !== null) select([moved]);
+  };
+
+  return { pending, setPending, draw, onConnectEnd, onClick, onReconnect };
+}
