@@ -4,6 +4,7 @@
     ├── BadInput                    400  the bytes or values sent are not what the route takes
     │   └── NotUmrf                 422  readable, but not a UMRF graph
     ├── Unauthenticated             401  no valid credentials
+    │   └── Withdrawn               401  credentials that were valid until they were revoked
     ├── Forbidden                   403  valid credentials, not allowed
     │   ├── WrongHost               403
     │   └── WrongOrigin             403
@@ -56,6 +57,10 @@ class Unauthenticated(Refused):
     """Sign in first"""
 
     status = 401
+
+
+class Withdrawn(Unauthenticated):
+    """Your invitation was revoked"""
 
 
 class Forbidden(Refused):

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import ssl
 import subprocess
 import sys
 import threading
@@ -14,6 +15,10 @@ from typing import Final
 
 import msgspec
 
+from action_assistant.settings import EVERYWHERE, more_hosts
+from action_assistant.sharing import invitations_as_text
+from action_assistant.web.addresses import addresses_of
+from action_assistant.web.certificate import Certificate
 from action_assistant.web.keys import Keys
 from action_assistant.web.listen import bound
 
@@ -31,6 +36,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     database: str | None
     host: str
     port: int
+    share: bool
+    tls: bool
     opens: bool
 
 
@@ -96,6 +103,7 @@ def serve(plan: Plan) -> int:
         for probe in bound(plan.host, port):
             probe.close()
     keys = Keys.of(plan.data)
+    trust = _certified(plan)
     enough = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: enough.set())
@@ -106,7 +114,7 @@ def serve(plan: Plan) -> int:
     for child in children:
         child.start(reading)
     threading.Thread(
-        target=_greet, args=(plan, keys, children, enough), name="greet", daemon=True
+        target=_greet, args=(plan, keys, trust, children, enough), name="greet", daemon=True
     ).start()
     try:
         while not enough.wait(_TICK):
@@ -124,6 +132,7 @@ def serve(plan: Plan) -> int:
 def _children(plan: Plan) -> list[Child]:
     """The runner last: it is the last to end."""
     address = ["--data", str(plan.data), "--host", plan.host]
+    address += [flag for flag, on in (("--share", plan.share), ("--tls", plan.tls)) if on]
     database = ["--database", plan.database] if plan.database else []
     ports = str(plan.port), str(plan.port + 1)
     return [
@@ -140,20 +149,46 @@ def _children(plan: Plan) -> list[Child]:
     ]
 
 
-def _greet(plan: Plan, keys: Keys, children: list[Child], enough: threading.Event) -> None:
+def _certified(plan: Plan) -> ssl.SSLContext | None:
+    """With --tls, how to trust ourselves; the certificate is there before the processes are."""
+    if not plan.tls:
+        return None
+    addresses = addresses_of(
+        host=plan.host, page_port=plan.port, hosts=more_hosts(), share=plan.share, secure=True
+    )
+    certificate = Certificate(plan.data)
+    certificate.renew(addresses.certified())
+    _say(
+        "browsers warn until they trust the authority that signs for this computer: import\n"
+        f"    {certificate.authority}\n    SHA-256 {certificate.fingerprint()}"
+    )
+    return certificate.trusting()
+
+
+def _greet(
+    plan: Plan,
+    keys: Keys,
+    trust: ssl.SSLContext | None,
+    children: list[Child],
+    enough: threading.Event,
+) -> None:
     """Say where the page is once both processes answer, and open it."""
-    host = "127.0.0.1" if plan.host in {"0.0.0.0", "localhost"} else plan.host
-    shown = f"[{host}]" if ":" in host else host
+    here = plan.host if plan.host not in {"0.0.0.0", "::", "localhost", EVERYWHERE} else "127.0.0.1"
+    shown = f"[{here}]" if ":" in here else here
+    scheme = "https" if plan.tls else "http"
     deadline = time.monotonic() + _PATIENCE
     for child in children:
-        while not _answers(f"http://{shown}:{child.port}/healthz"):
+        while not _answers(f"{scheme}://{shown}:{child.port}/healthz", trust):
             if enough.wait(_TICK):
                 return
             if time.monotonic() > deadline:
                 _say(f"{child.name} does not answer yet; the messages above may say why")
                 deadline = float("inf")
-    url = f"http://{shown}:{plan.port}/#t={keys.token}"
+    base = f"{scheme}://{shown}:{plan.port}"
+    url = f"{base}/#t={keys.token}"
     _say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {url}\n")
+    if plan.share:
+        _say(invitations_as_text(base, keys, trust))
     if plan.opens and _has_screen():
         # Through a file that only this user can read: arguments of a browser are visible to all.
         redirect = plan.data / "open.html"
@@ -162,9 +197,9 @@ def _greet(plan: Plan, keys: Keys, children: list[Child], enough: threading.Even
         webbrowser.open(redirect.as_uri())
 
 
-def _answers(url: str) -> bool:
+def _answers(url: str, trust: ssl.SSLContext | None) -> bool:
     try:
-        with urllib.request.urlopen(url, timeout=1) as answer:
+        with urllib.request.urlopen(url, timeout=1, context=trust) as answer:
             return bool(answer.status == 200)
     except (urllib.error.URLError, OSError):
         return False

@@ -16,6 +16,8 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_HOSTS": "more host names that may stand in the address bar, comma separated",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
 }
+#: The host that stands for every address of this computer, of both families.
+EVERYWHERE: Final = "*"
 LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
@@ -29,6 +31,8 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     runner_port: int = 8001
     hosts: tuple[str, ...] = ()
     limits: bool = True
+    share: bool = False
+    tls: bool = False
 
 
 class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
@@ -40,6 +44,8 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     page_port: int = 8000
     hosts: tuple[str, ...] = ()
     limits: bool = True
+    share: bool = False
+    tls: bool = False
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
@@ -63,12 +69,13 @@ def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
     return tuple(name.strip().lower() for name in names.split(",") if name.strip())
 
 
-def check_host(host: str, hosts: tuple[str, ...]) -> None:
-    """Refuse to listen where strangers are unless somebody said by which names."""
-    if host not in LOOPBACK and not hosts:
+def check_host(host: str, hosts: tuple[str, ...], *, share: bool = False) -> None:
+    """Refuse to listen where strangers are unless somebody said so, or by which names."""
+    if host not in LOOPBACK and not hosts and not share:
         raise CannotStart(
             f"Listening on {host} would show this computer's graphs and robots to the network. "
-            "Name the addresses people may use in ACTION_ASSISTANT_HOSTS to do that on purpose."
+            "Use --share to do that on purpose, or name the addresses that people may use in "
+            "ACTION_ASSISTANT_HOSTS."
         )
 
 

@@ -1,5 +1,6 @@
 """Hostile and unlucky clients of one room: what they do is theirs alone to bear."""
 
+import contextlib
 import random
 from typing import Any
 
@@ -7,7 +8,6 @@ import pytest
 from pycrdt import Array, Doc, Map
 
 from action_assistant.editor import wire
-from action_assistant.editor.crowd import AT_ONCE, OF_A_PERSON, OF_AN_ADDRESS, PER_MINUTE, Crowd
 from action_assistant.editor.nesting import DEEPEST_TYPES
 from action_assistant.editor.replica import WAITING_UPDATES, Foreign, Replica, load
 from action_assistant.editor.rooms import Rooms
@@ -15,6 +15,7 @@ from action_assistant.editor.scan import outline
 from action_assistant.editor.wire import Malformed
 from action_assistant.errors import TooMany
 from action_assistant.journal.journal import Journal
+from action_assistant.web.crowd import AT_ONCE, OF_A_PERSON, OF_AN_ADDRESS, PER_MINUTE, Crowd
 from editor import forge
 from editor.client import Client, settle
 
@@ -289,3 +290,25 @@ def test_upgrades_come_in_bursts_and_then_at_a_rate() -> None:
     for _ in range(AT_ONCE * 3):
         with free.admitted("ada", "a"):
             pass
+
+
+def test_where_stop_is_sent_the_first_socket_of_a_person_is_always_admitted() -> None:
+    crowd = Crowd(limits=True, keeps_one=True, clock=lambda: 0.0)
+    held = [crowd.admitted("eve", "a") for _ in range(OF_A_PERSON)]
+    for each in held:
+        each.__enter__()
+    with pytest.raises(TooMany, match="open already"), crowd.admitted("eve", "a"):
+        pass
+    for _ in range(AT_ONCE):  # whoever sits at the same address comes too fast, and is too many
+        with contextlib.suppress(TooMany), crowd.admitted("eve", "a"):
+            pass
+    with (
+        crowd.admitted("ada", "a"),
+        pytest.raises(TooMany, match="short time"),
+        crowd.admitted("ada", "a"),
+    ):
+        pass
+    with crowd.admitted("ada", "a"):  # once it is closed, the next one is the first again
+        pass
+    for each in held:
+        each.__exit__(None, None, None)

@@ -36,8 +36,10 @@ def free_ports() -> int:
 class Product:
     """A running editor and runner. `kill` and `start` may be called in turn."""
 
-    def __init__(self, data: Path) -> None:
+    def __init__(self, data: Path, *flags: str, hosts: str = "") -> None:
         self.data = data
+        self._flags = flags
+        self._hosts = hosts
         self.port = free_ports()
         self.log = data.parent / f"{data.name}.log"
         self._process: subprocess.Popen[bytes] | None = None
@@ -59,6 +61,7 @@ class Product:
             **os.environ,
             "ACTION_ASSISTANT_TOKEN": TOKEN,
             "ACTION_ASSISTANT_URL": self.url,
+            "ACTION_ASSISTANT_HOSTS": self._hosts,
         }
 
     def start(self) -> None:
@@ -73,6 +76,7 @@ class Product:
                     "--port",
                     str(self.port),
                     "--no-open",
+                    *self._flags,
                 ],
                 env=self.environment,
                 stderr=log,
@@ -155,9 +159,9 @@ def _ready(url: str) -> bool:
 
 
 @contextmanager
-def running(data: Path) -> Iterator[Product]:
+def running(data: Path, *flags: str, hosts: str = "") -> Iterator[Product]:
     """A product that runs inside the block."""
-    product = Product(data)
+    product = Product(data, *flags, hosts=hosts)
     product.start()
     try:
         yield product

@@ -17,13 +17,15 @@ from litestar.params import JSONBody
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from action_assistant.errors import Unauthenticated
 from action_assistant.web.access import Needs, person_of
 from action_assistant.web.addresses import Addresses
 from action_assistant.web.asgi import application
-from action_assistant.web.keys import Keys, Person, Session
+from action_assistant.web.keys import Author, Keys, Person, Session
 from action_assistant.web.listen import bound
+from action_assistant.web.revoked import Revoked
 from action_assistant.web.roles import Role
-from action_assistant.web.sessions import session_routes
+from action_assistant.web.sessions import Invited, session_routes
 
 KEYS = Keys("k" * 43)
 BEARER = {"authorization": f"Bearer {KEYS.token}"}
@@ -67,6 +69,16 @@ async def live(socket: WebSocket[Any, Any, Any]) -> None:
     await socket.close()
 
 
+class Nobody:
+    """A reception that knows no invitations."""
+
+    async def look(self, proof: str) -> Invited:
+        raise Unauthenticated(f"{proof} is not known.")
+
+    async def welcome(self, invitation: str, person: Author) -> None:
+        raise AssertionError(f"{person} came by {invitation}")
+
+
 @contextmanager
 def served(folder: Path) -> Iterator[int]:
     """The application on a free port of the loopback interface."""
@@ -75,9 +87,10 @@ def served(folder: Path) -> Iterator[int]:
         other.close()
     port: int = listener.getsockname()[1]
     app = application(
-        [me, stop, start, novelty, broken, live, *session_routes(KEYS, port)],
+        [me, stop, start, novelty, broken, live, *session_routes(KEYS, port, reception=Nobody)],
         title="test",
         keys=KEYS,
+        revoked=Revoked(folder),
         addresses=Addresses(host="127.0.0.1", page_port=port),
         page_port=port,
         page=folder,
@@ -271,7 +284,7 @@ def test_no_path_leads_out_of_the_page(client: httpx.Client, path: str) -> None:
 def test_openapi_says_which_routes_are_open(client: httpx.Client) -> None:
     schema = client.get("/schema/openapi.json", headers=BEARER).json()
     assert schema["security"] == [{"token": []}]
-    for path in ("/healthz", "/readyz", "/api/session"):
+    for path in ("/healthz", "/readyz", "/api/session", "/api/session/invitation"):
         assert all(operation["security"] == [] for operation in schema["paths"][path].values())
     assert "security" not in schema["paths"]["/api/me"]["get"]
 

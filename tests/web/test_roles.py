@@ -10,10 +10,11 @@ from typing import Any, get_args
 import httpx
 import pytest
 from pycrdt import Doc, Map
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from action_assistant.editor import wire
+from action_assistant.web.crowd import OF_A_PERSON, OF_AN_ADDRESS
 from action_assistant.web.keys import Keys
 from action_assistant.web.roles import Deed, Role, allowed, may
 from support.product import TOKEN, Product, running
@@ -96,7 +97,7 @@ def test_every_route_says_who_may_call_it_and_means_it(product: Product, process
     with httpx.Client(base_url=url_of(product, process), trust_env=False, timeout=20) as client:
         for method, path, deed in found:
             if deed is None:
-                open_to_strangers = "/healthz|/readyz|/api/session|/api/invitations/"
+                open_to_strangers = "/healthz|/readyz|/api/session"
                 assert re.match(open_to_strangers, path), f"who may {method} {path}?"
                 continue
             for role in ROLES:
@@ -174,6 +175,27 @@ def test_a_viewer_hears_everything_and_changes_nothing(product: Product, graph: 
         assert closed(viewer) == wire.FORBIDDEN
     with product.editor() as editor:
         assert editor.get(f"/api/graphs/{graph}").json()["name"] == "task"
+
+
+def test_sockets_to_the_runner_are_counted_and_one_is_kept_for_everybody(product: Product) -> None:
+    live = f"{product.runner_url}/api/live"
+    with contextlib.ExitStack() as open_:
+        for _ in range(OF_AN_ADDRESS // OF_A_PERSON):
+            greedy = browser(product, "operator")
+            for _ in range(OF_A_PERSON):
+                open_.enter_context(socket_to(live, greedy))
+            with pytest.raises(InvalidStatus) as refused, socket_to(live, greedy):
+                pass
+            assert refused.value.response.status_code == 429
+            assert refused.value.response.headers["retry-after"] == "5"
+        viewer = browser(product, "viewer")
+        socket = open_.enter_context(socket_to(live, viewer))
+        socket.send(json.dumps({"type": "stop", "run": "all", "stop_id": "mine"}))
+        while (said := json.loads(socket.recv(5)))["type"] != "stopping":
+            pass
+        assert said["stop_id"] == "mine"
+        with pytest.raises(InvalidStatus), socket_to(live, viewer):  # the address has too many
+            pass
 
 
 @contextlib.contextmanager

@@ -4,9 +4,13 @@ import argparse
 import logging
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from action_assistant import places, settings
 from action_assistant.errors import CannotStart
+
+if TYPE_CHECKING:  # slow to load, and most commands do not need it
+    from action_assistant.web.listen import Identity
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -18,6 +22,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     _address(both, port=8000)
     _database(both)
+    _sharing(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
     both.set_defaults(deed=_serve)
 
@@ -28,6 +33,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     _address(editor, port=8000)
     _database(editor)
+    _sharing(editor)
     editor.add_argument("--runner-port", type=_port, metavar="N", help="default: the next port")
     editor.set_defaults(deed=_editor)
 
@@ -37,6 +43,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         epilog="example: action-assistant runner --port 8001 --page-port 8000",
     )
     _address(runner, port=8001)
+    _sharing(runner)
     runner.add_argument("--page-port", type=_port, metavar="N", help="default: the port before")
     runner.set_defaults(deed=_runner)
 
@@ -61,7 +68,11 @@ def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
     parser.add_argument(
         "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
     )
-    parser.add_argument("--host", default="127.0.0.1", metavar="H", help="default: %(default)s")
+    parser.add_argument(
+        "--host",
+        metavar="H",
+        help="default: 127.0.0.1; with --share every address of this computer",
+    )
     parser.add_argument(
         "--port", type=_port, default=port, metavar="N", help="default: %(default)s"
     )
@@ -71,6 +82,40 @@ def _database(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--database", metavar="URL", help="of the editor; default: sqlite, in the data folder"
     )
+
+
+def _sharing(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--share", action="store_true", help="let others on the network in, by links with a role"
+    )
+    parser.add_argument(
+        "--tls", action="store_true", help="encrypt, with a certificate that is made here"
+    )
+
+
+def _host(options: argparse.Namespace) -> str:
+    """Where to listen. Raises CannotStart when that would surprise somebody."""
+    host: str = options.host or (settings.EVERYWHERE if options.share else "127.0.0.1")
+    if options.share and host in {"0.0.0.0", "::"}:
+        host = settings.EVERYWHERE
+    settings.check_host(host, settings.more_hosts(), share=options.share)
+    return host
+
+
+def _identity(
+    chosen: settings.EditorSettings | settings.RunnerSettings, page_port: int
+) -> "Identity | None":
+    """The certificate of a process, with --tls."""
+    from action_assistant.web.addresses import addresses_of
+    from action_assistant.web.certificate import Certificate
+    from action_assistant.web.listen import Identity
+
+    if not chosen.tls:
+        return None
+    addresses = addresses_of(
+        host=chosen.host, page_port=page_port, hosts=chosen.hosts, share=chosen.share, secure=True
+    )
+    return Identity(Certificate(chosen.data), addresses.certified)
 
 
 def _log() -> None:
@@ -84,16 +129,16 @@ def _log() -> None:
 
 
 def _editor_settings(options: argparse.Namespace, data: Path) -> settings.EditorSettings:
-    hosts = settings.more_hosts()
-    settings.check_host(options.host, hosts)
     return settings.EditorSettings(
         data=data,
         database=options.database or f"sqlite:///{data / 'editor.db'}",
-        host=options.host,
+        host=_host(options),
         port=options.port,
         runner_port=options.runner_port or options.port + 1,
-        hosts=hosts,
+        hosts=settings.more_hosts(),
         limits=settings.limits(),
+        share=options.share,
+        tls=options.tls,
     )
 
 
@@ -102,14 +147,16 @@ def _serve(options: argparse.Namespace) -> int:
 
     if options.port == 65535:
         raise CannotStart("The runner needs the port after --port; 65535 has none.")
-    settings.check_host(options.host, settings.more_hosts())
+    host = _host(options)
     data = settings.writable_folder(options.data.resolve())
     return serve(
         Plan(
             data=data,
             database=options.database,
-            host=options.host,
+            host=host,
             port=options.port,
+            share=options.share,
+            tls=options.tls,
             opens=not options.no_open,
         )
     )
@@ -121,7 +168,12 @@ def _editor(options: argparse.Namespace) -> int:
 
     _log()
     chosen = _editor_settings(options, settings.writable_folder(options.data.resolve()))
-    listen(lambda: create_app(chosen), host=chosen.host, port=chosen.port)
+    listen(
+        lambda: create_app(chosen),
+        host=chosen.host,
+        port=chosen.port,
+        identity=_identity(chosen, chosen.port),
+    )
     return 0
 
 
@@ -130,17 +182,22 @@ def _runner(options: argparse.Namespace) -> int:
     from action_assistant.web.listen import serve as listen
 
     _log()
-    hosts = settings.more_hosts()
-    settings.check_host(options.host, hosts)
     chosen = settings.RunnerSettings(
         data=settings.writable_folder(options.data.resolve()),
-        host=options.host,
+        host=_host(options),
         port=options.port,
         page_port=options.page_port or options.port - 1,
-        hosts=hosts,
+        hosts=settings.more_hosts(),
         limits=settings.limits(),
+        share=options.share,
+        tls=options.tls,
     )
-    listen(lambda: create_app(chosen), host=chosen.host, port=chosen.port)
+    listen(
+        lambda: create_app(chosen),
+        host=chosen.host,
+        port=chosen.port,
+        identity=_identity(chosen, chosen.page_port),
+    )
     return 0
 
 

@@ -1,23 +1,16 @@
 """Commands that talk to a running server: import, export, graphs, runs, run, stop."""
 
 import argparse
-import os
 import sys
 import time
 import uuid
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import msgspec
 
-from action_assistant import places
+from action_assistant.commands.client import No, Server, command, print_json, refused, running
 from action_assistant.errors import CannotStart
-from action_assistant.web.keys import TOKEN_FILE
-
-if TYPE_CHECKING:  # slow to load, and most commands do not need it
-    import httpx
 
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _POLL: Final = 0.2  # seconds
@@ -25,25 +18,25 @@ _POLL: Final = 0.2  # seconds
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the commands of this module."""
-    bring = _command(commands, "import", "bring UMRF files in as graphs", "patrol.umrf.graph.json")
+    bring = command(commands, "import", "bring UMRF files in as graphs", "patrol.umrf.graph.json")
     bring.add_argument("files", type=Path, nargs="+", metavar="FILE")
     bring.set_defaults(deed=_import)
 
-    export = _command(commands, "export", "print a graph as UMRF", "patrol --at 120 > patrol.json")
+    export = command(commands, "export", "print a graph as UMRF", "patrol --at 120 > patrol.json")
     export.add_argument("graph", metavar="GRAPH", help="id or name")
     export.add_argument("--at", type=int, metavar="SEQ", help="as it was then")
     export.set_defaults(deed=_export)
 
-    graphs = _command(commands, "graphs", "list the graphs", "--json")
+    graphs = command(commands, "graphs", "list the graphs", "--json")
     graphs.add_argument("--json", action="store_true", help="as JSON, for programs")
     graphs.set_defaults(deed=_graphs)
 
-    runs = _command(commands, "runs", "list the runs, newest first", "--graph patrol")
+    runs = command(commands, "runs", "list the runs, newest first", "--graph patrol")
     runs.add_argument("--graph", metavar="GRAPH", help="id or name")
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(deed=_runs)
 
-    run = _command(
+    run = command(
         commands,
         "run",
         "publish a graph as it is now, start it and wait for its end; exit 1 unless it ends true",
@@ -56,7 +49,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     run.add_argument("--no-wait", action="store_true", help="print the run's id and return")
     run.set_defaults(deed=_run)
 
-    stop = _command(
+    stop = command(
         commands, "stop", "stop a run, or all of them; exit 1 unless it is proven", "--all"
     )
     which = stop.add_mutually_exclusive_group(required=True)
@@ -66,117 +59,9 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     stop.set_defaults(deed=_stop)
 
 
-def _command(
-    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
-    name: str,
-    text: str,
-    example: str,
-) -> argparse.ArgumentParser:
-    parser = commands.add_parser(
-        name, help=text, description=text, epilog=f"example: action-assistant {name} {example}"
-    )
-    parser.add_argument("--url", metavar="URL", help="of the editor (default: port 8000 here)")
-    parser.add_argument(
-        "--data", type=Path, default=places.data(), metavar="DIR", help="that holds the token"
-    )
-    return parser
-
-
-class Server:
-    """A running editor and its runner, as a program sees them."""
-
-    def __init__(self, editor: "httpx.Client", runner_url: str) -> None:
-        self._client = editor
-        self._runner_url = runner_url
-
-    def editor(self, method: str, path: str, **body: Any) -> "httpx.Response":
-        """Ask the editor; a refusal becomes one sentence."""
-        return _asked(self._client, method, path, **body)
-
-    def runner(self, method: str, path: str, **body: Any) -> "httpx.Response":
-        """Ask the runner."""
-        return _asked(self._client, method, self._runner_url + path, **body)
-
-    def graph_id(self, asked: str) -> str:
-        """The id of a graph that is named by id or name."""
-        graphs = self.editor("GET", "/api/graphs").json()
-        if any(graph["id"] == asked for graph in graphs):
-            return asked
-        named = [graph["id"] for graph in graphs if graph["name"] == asked]
-        if len(named) != 1:
-            raise _No(
-                f"No graph is called {asked!r}."
-                if not named
-                else f"{len(named)} graphs are called {asked!r}; name one by id: {', '.join(named)}."
-            )
-        found: str = named[0]
-        return found
-
-
-class _No(Exception):
-    """The answer is no."""
-
-
-def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "httpx.Response":
-    import httpx
-
-    try:
-        answer = client.request(method, path, **body)
-    except httpx.HTTPError as error:
-        raise CannotStart(
-            f"No answer from {error.request.url.copy_with(path='/', query=None)} ({error}). "
-            "Is it running? Start it with `action-assistant serve`."
-        ) from error
-    if answer.is_error:
-        raise _No(_sentence(answer))
-    return answer
-
-
-def _sentence(answer: "httpx.Response") -> str:
-    try:
-        problem = answer.json()
-        place = (problem.get("where") or {}).get("path", "")
-        return f"{problem['title']}: {problem['detail']}" + (f" (at {place})" if place else "")
-    except (ValueError, KeyError, AttributeError):
-        return f"{answer.request.url} answered {answer.status_code}."
-
-
-def _token(data: Path) -> str:
-    token = os.environ.get("ACTION_ASSISTANT_TOKEN")
-    if token:
-        return token
-    try:
-        return (data / TOKEN_FILE).read_text().strip()
-    except OSError as error:
-        raise CannotStart(
-            f"No token in {data} ({error.strerror}); name the data folder of the server with "
-            "--data, or set ACTION_ASSISTANT_TOKEN."
-        ) from error
-
-
-@contextmanager
-def _server(options: argparse.Namespace) -> Iterator[Server]:
-    import httpx
-
-    url = options.url or os.environ.get("ACTION_ASSISTANT_URL") or "http://127.0.0.1:8000"
-    headers = {"authorization": f"Bearer {_token(options.data)}"}
-    with httpx.Client(base_url=url, headers=headers, timeout=30, trust_env=False) as client:
-        config = _asked(client, "GET", "/api/config").json()
-        yield Server(client, config["runner_url"])
-
-
-def _print_json(value: object) -> None:
-    sys.stdout.buffer.write(msgspec.json.format(msgspec.json.encode(value)) + b"\n")
-
-
-def _refused(error: _No) -> int:
-    print(f"action-assistant: {error}", file=sys.stderr)
-    return 1
-
-
 def _import(options: argparse.Namespace) -> int:
     code = 0
-    with _server(options) as server:
+    with running(options) as server:
         for path in options.files:
             try:
                 body = path.read_bytes()
@@ -184,8 +69,8 @@ def _import(options: argparse.Namespace) -> int:
                 raise CannotStart(f"Cannot read {path}: {error.strerror}.") from error
             try:
                 made = server.editor("POST", "/api/graphs", content=body, headers=_JSON).json()
-            except _No as error:
-                code = _refused(_No(f"{path}: {error}"))
+            except No as error:
+                code = refused(No(f"{path}: {error}"))
                 continue
             print(f"{made['id']}  {made['name']}")
     return code
@@ -195,22 +80,22 @@ _JSON: Final = {"content-type": "application/json"}
 
 
 def _export(options: argparse.Namespace) -> int:
-    with _server(options) as server:
+    with running(options) as server:
         try:
             graph = server.graph_id(options.graph)
             query = {"at": options.at} if options.at is not None else {}
             answer = server.editor("GET", f"/api/graphs/{graph}/umrf", params=query)
-        except _No as error:
-            return _refused(error)
+        except No as error:
+            return refused(error)
         sys.stdout.write(answer.text if answer.text.endswith("\n") else answer.text + "\n")
     return 0
 
 
 def _graphs(options: argparse.Namespace) -> int:
-    with _server(options) as server:
+    with running(options) as server:
         graphs = server.editor("GET", "/api/graphs").json()
     if options.json:
-        _print_json(graphs)
+        print_json(graphs)
         return 0
     for graph in graphs:
         print(f"{graph['id']}  {graph['updated_at'][:19]}  {graph['name']}")
@@ -218,14 +103,14 @@ def _graphs(options: argparse.Namespace) -> int:
 
 
 def _runs(options: argparse.Namespace) -> int:
-    with _server(options) as server:
+    with running(options) as server:
         try:
             query = {"graph": server.graph_id(options.graph)} if options.graph else {}
             runs = server.runner("GET", "/api/runs", params=query).json()
-        except _No as error:
-            return _refused(error)
+        except No as error:
+            return refused(error)
     if options.json:
-        _print_json(runs)
+        print_json(runs)
         return 0
     for run in runs:
         what = run["state"] + (f" ({run['result']})" if run["result"] else "")
@@ -241,7 +126,7 @@ def _run(options: argparse.Namespace) -> int:
             script = msgspec.json.decode(options.script.read_bytes())
         except (OSError, msgspec.DecodeError) as error:
             raise CannotStart(f"Cannot read the script {options.script}: {error}.") from error
-    with _server(options) as server:
+    with running(options) as server:
         try:
             graph = server.graph_id(options.graph)
             label = {"label": options.label} if options.label else {}
@@ -259,8 +144,8 @@ def _run(options: argparse.Namespace) -> int:
             run = server.runner("POST", "/api/runs", json=order).json()
             print(run["id"], flush=True)
             return 0 if options.no_wait else _watch(server, run["id"])
-        except _No as error:
-            return _refused(error)
+        except No as error:
+            return refused(error)
 
 
 def _watch(server: Server, run: str) -> int:
@@ -280,7 +165,7 @@ def _watch(server: Server, run: str) -> int:
 
 def _stop(options: argparse.Namespace) -> int:
     """Want it stopped, then wait for what proves that nothing moves."""
-    with _server(options) as server:
+    with running(options) as server:
         try:
             path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
             stopping: list[str] = server.runner("POST", path).json()["runs"]
@@ -293,8 +178,8 @@ def _stop(options: argparse.Namespace) -> int:
                 if time.monotonic() > deadline:
                     break
                 time.sleep(_POLL)
-        except _No as error:
-            return _refused(error)
+        except No as error:
+            return refused(error)
     for run in unproven:
         print(
             f"STOP UNCONFIRMED for run {run['number']} of {run['graph_name']}: it is "

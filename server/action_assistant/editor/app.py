@@ -13,15 +13,16 @@ from litestar.types import ASGIApp
 from action_assistant import places
 from action_assistant.editor import epochs
 from action_assistant.editor import happenings as h
-from action_assistant.editor.api import about, drawing, graphs, room, versions
+from action_assistant.editor.api import about, drawing, graphs, invitations, room, versions
 from action_assistant.editor.house import Door, House
 from action_assistant.editor.people import People
 from action_assistant.errors import BadInput
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
-from action_assistant.web.addresses import Addresses
+from action_assistant.web.addresses import addresses_of
 from action_assistant.web.asgi import Readiness, application
 from action_assistant.web.keys import Keys
+from action_assistant.web.revoked import Revoked
 from action_assistant.web.sessions import session_routes
 
 log: Final = logging.getLogger(__name__)
@@ -36,6 +37,7 @@ async def open_house(settings: EditorSettings) -> AsyncIterator[House]:
         async with epochs.living_in(journal, settings.data) as epoch:
             house = House(settings, journal, await People.known(journal), epoch)
             try:
+                await house.invitations.agree()
                 if new:
                     await _greet(house, places.examples())
                 yield house
@@ -50,6 +52,13 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     Journal.prepare(settings.database, "editor")
     keys = Keys.of(settings.data)
     door = Door()
+    addresses = addresses_of(
+        host=settings.host,
+        page_port=settings.port,
+        hosts=settings.hosts,
+        share=settings.share,
+        secure=settings.tls,
+    )
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
@@ -62,7 +71,14 @@ def create_app(settings: EditorSettings) -> ASGIApp:
 
     return application(
         [
-            *session_routes(keys, settings.port),
+            *session_routes(
+                keys,
+                settings.port,
+                secure=settings.tls,
+                limits=settings.limits,
+                reception=lambda: door.house.invitations,
+            ),
+            *invitations.routes(door, addresses),
             *about.routes(door),
             *graphs.routes(door),
             *versions.routes(door),
@@ -71,7 +87,8 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         ],
         title="TeMoto Action Assistant: editor",
         keys=keys,
-        addresses=Addresses(host=settings.host, page_port=settings.port, hosts=settings.hosts),
+        revoked=Revoked(settings.data),
+        addresses=addresses,
         page_port=settings.port,
         lifespan=[lifespan],
         ready=ready,

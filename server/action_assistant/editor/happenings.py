@@ -13,6 +13,7 @@ from sqlalchemy import Executable, delete, insert, update
 
 from action_assistant.journal import tables
 from action_assistant.journal.events import Draft, Event
+from action_assistant.web.roles import Role
 
 UPDATED: Final = "graph.updated.v1"  # the body is the Yjs update as it came
 DEFERRED: Final = "graph.deferred.v1"  # one that waits for others, which come later in the log
@@ -24,9 +25,13 @@ DELETED: Final = "graph.deleted.v1"
 RECOVERED: Final = "graph.recovered.v1"
 PUBLISHED: Final = "version.published.v1"
 NAMED: Final = "person.named.v1"
+INVITED: Final = "invitation.made.v1"
+ACCEPTED: Final = "invitation.accepted.v1"
+REVOKED: Final = "invitation.revoked.v1"
 EPOCH: Final = "epoch.begun.v1"
 
 PEOPLE: Final = "people"
+INVITATIONS: Final = "invitations"
 #: Not people: what this program does by itself, and the graphs that come with it.
 SERVER: Final = "server"
 EXAMPLES: Final = "examples"
@@ -73,6 +78,27 @@ class Named(msgspec.Struct, frozen=True):
     name: str
 
 
+class MadeInvitation(msgspec.Struct, frozen=True):
+    """A link was made. What its secret is follows from `id` and the token."""
+
+    id: str
+    role: Role
+    label: str = ""
+
+
+class AcceptedInvitation(msgspec.Struct, frozen=True):
+    """Somebody, the event's author, came in by a link for the first time."""
+
+    id: str
+    name: str
+
+
+class RevokedInvitation(msgspec.Struct, frozen=True):
+    """A link lets nobody in any more, and nobody stay."""
+
+    id: str
+
+
 def graph_stream(graph: str) -> str:
     """The stream of a graph's document."""
     return f"graph/{graph}"
@@ -113,7 +139,39 @@ def fold(event: Event) -> Sequence[Executable]:
             delete(tables.person).where(tables.person.c.id == event.author),
             insert(tables.person).values(row),
         ]
+    if event.stream == INVITATIONS:
+        return _invitation(event)
     return ()
+
+
+def _invitation(event: Event) -> Sequence[Executable]:
+    match event.kind:
+        case "invitation.made.v1":
+            made = msgspec.json.decode(event.body, type=MadeInvitation)
+            row: dict[str, Any] = {
+                "id": made.id,
+                "role": made.role,
+                "label": made.label,
+                "made_at": event.at,
+                "made_by": event.author,
+            }
+            return [insert(tables.invitation).values(row)]
+        case "invitation.accepted.v1":
+            came = msgspec.json.decode(event.body, type=AcceptedInvitation)
+            row = {
+                "invitation": came.id,
+                "person": event.author,
+                "name": came.name,
+                "at": event.at,
+            }
+            same = (tables.guest.c.invitation == came.id, tables.guest.c.person == event.author)
+            return [delete(tables.guest).where(*same), insert(tables.guest).values(row)]
+        case "invitation.revoked.v1":
+            gone = msgspec.json.decode(event.body, type=RevokedInvitation)
+            this = update(tables.invitation).where(tables.invitation.c.id == gone.id)
+            return [this.values(revoked_at=event.at, revoked_by=event.author)]
+        case _:
+            return ()
 
 
 def _about(event: Event, graph: str) -> Sequence[Executable]:

@@ -1,8 +1,8 @@
 """What one editor process is made of."""
 
 from action_assistant.editor.catalogue import Catalogue
-from action_assistant.editor.crowd import Crowd
 from action_assistant.editor.history import History
+from action_assistant.editor.invitations import Invitations
 from action_assistant.editor.library import Library
 from action_assistant.editor.people import People
 from action_assistant.editor.rooms import Rooms
@@ -10,6 +10,9 @@ from action_assistant.editor.sights import Sights
 from action_assistant.editor.versions import Versions
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
+from action_assistant.web.crowd import Crowd
+from action_assistant.web.keys import Keys
+from action_assistant.web.revoked import Revoked
 
 
 class House:
@@ -28,6 +31,9 @@ class House:
         self.catalogue = Catalogue(journal, self.rooms, self.sights)
         self.versions = Versions(journal, self.sights)
         self.library = Library(journal, self.sights)
+        self.invitations = Invitations(
+            journal, people, Keys.of(settings.data), Revoked(settings.data)
+        )
         self.history = History(journal, people, self.versions)
 
 

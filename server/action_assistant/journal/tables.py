@@ -108,6 +108,29 @@ person: Final = Table(
     Column("seen_at", BigInteger, nullable=False),
 )
 
+#: A link that lets people in with a role.
+invitation: Final = Table(
+    "invitation",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("role", Text, nullable=False),
+    Column("label", Text, nullable=False),
+    Column("made_at", BigInteger, nullable=False),
+    Column("made_by", Text, nullable=False),
+    Column("revoked_at", BigInteger),
+    Column("revoked_by", Text),
+)
+
+#: Who came in by which link, under which name and when that was first.
+guest: Final = Table(
+    "guest",
+    EDITOR,
+    Column("invitation", Text, primary_key=True),
+    Column("person", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("at", BigInteger, nullable=False),
+)
+
 # --- runner -----------------------------------------------------------------------------------
 
 #: A run. `number` counts for people; `request_id` makes a start happen once; `summary` is the run as

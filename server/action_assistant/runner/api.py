@@ -13,7 +13,7 @@ from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 from sqlalchemy import Row
 
-from action_assistant.errors import BadInput
+from action_assistant.errors import BadInput, TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive, robots_api, shapes
 from action_assistant.runner.admission import SIMULATOR, read_request
@@ -24,7 +24,8 @@ from action_assistant.runner.live import Hub, Stopping, attend
 from action_assistant.runner.review import routes as review
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.runs import State
-from action_assistant.web.access import Needs, person_of, require
+from action_assistant.web.access import Needs, person_of, refuse, require
+from action_assistant.web.crowd import Crowd
 
 _PAGE: Final = 500  # events read at once
 _ALIVE_S: Final = 15.0  # between two signs of life of an event stream
@@ -36,6 +37,7 @@ class House:
 
     control: Control
     hub: Hub
+    crowd: Crowd
     journal: Journal
     desk: Desk
 
@@ -211,7 +213,12 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
 def _live(house: House) -> ControllerRouterHandler:
     @websocket("/api/live")
     async def live(socket: WebSocket[Any, Any, Any]) -> None:
-        await attend(socket, house.hub)
+        address = socket.client.host if socket.client is not None else ""
+        try:
+            with house.crowd.admitted(person_of(socket).id, address):
+                await attend(socket, house.hub)
+        except TooMany as refused:
+            await refuse(socket.scope, socket.receive, socket.send, refused)
 
     return live
 

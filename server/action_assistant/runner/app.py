@@ -19,9 +19,12 @@ from action_assistant.runner.live import Hub
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.robots import Robots
 from action_assistant.settings import RunnerSettings
-from action_assistant.web.addresses import Addresses
+from action_assistant.web.addresses import addresses_of
 from action_assistant.web.asgi import Readiness, application
+from action_assistant.web.crowd import Crowd
 from action_assistant.web.keys import Keys
+from action_assistant.web.revoked import Revoked
+from action_assistant.web.sessions import revocation
 
 
 def wall_clock() -> int:
@@ -39,6 +42,7 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
         robots = Robots(reach=reach)
         async with _kept(reach), Control.opened(journal, robots, wall=wall_clock) as control:
             house.control, house.hub = control, Hub(control, wall_clock)
+            house.crowd = Crowd(limits=settings.limits, keeps_one=True)
             house.journal = journal
             house.desk = Desk(control, journal, anyio.to_thread.run_sync, wall_clock)
             async with anyio.create_task_group() as tasks:
@@ -66,6 +70,7 @@ def _database(settings: RunnerSettings) -> str:
 def create_app(settings: RunnerSettings) -> ASGIApp:
     """The runner as an ASGI application. Raises CannotStart."""
     Journal.prepare(_database(settings), "runner")
+    revoked = Revoked(settings.data)
     house = House()
 
     @asynccontextmanager
@@ -91,10 +96,17 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         }
 
     return application(
-        routes(house),
+        [*routes(house), revocation(revoked)],
         title="TeMoto Action Assistant: runner",
         keys=Keys.of(settings.data),
-        addresses=Addresses(host=settings.host, page_port=settings.page_port, hosts=settings.hosts),
+        revoked=revoked,
+        addresses=addresses_of(
+            host=settings.host,
+            page_port=settings.page_port,
+            hosts=settings.hosts,
+            share=settings.share,
+            secure=settings.tls,
+        ),
         page_port=settings.page_port,
         lifespan=[lifespan],
         ready=ready,

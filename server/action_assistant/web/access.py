@@ -1,5 +1,6 @@
 """The door of both processes: Host, Origin and credentials, before any route and any upgrade."""
 
+import asyncio
 import getpass
 import logging
 import re
@@ -7,22 +8,33 @@ from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
 from typing import Any, Final
 
+import anyio
 from litestar.connection import ASGIConnection
 from litestar.enums import ScopeType
 from litestar.handlers.base import BaseRouteHandler
 from litestar.types import ASGIApp, HTTPScope, Message, Receive, Scope, Send, WebSocketScope
 
-from action_assistant.errors import Forbidden, Refused, Unauthenticated, WrongHost, WrongOrigin
+from action_assistant.errors import (
+    Forbidden,
+    Refused,
+    Unauthenticated,
+    Withdrawn,
+    WrongHost,
+    WrongOrigin,
+)
 from action_assistant.web.addresses import Addresses
 from action_assistant.web.keys import Keys, Person, Session
 from action_assistant.web.problems import problem_of
+from action_assistant.web.revoked import SESSION_ENDED, Leashes, Revoked
 from action_assistant.web.roles import OWNER, Deed, allowed, may
 
 log: Final = logging.getLogger(__name__)
 
 _CALLS: Final = frozenset({"http", "websocket"})
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
-_STOPS: Final = re.compile(r"/api/stop|/api/runs/[^/]+/stop")
+_STOPS: Final = re.compile(r"/api/stop|/api/(runs|robots)/[^/]+/stop")
+_LIVE: Final = "/api/live"
+_GOODBYE: Final = 1.0  # seconds that a close frame gets
 _HEADERS: Final = (
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),
@@ -89,6 +101,7 @@ class Access:
         page_port: int,
         is_open: Callable[[str, bool], bool],
         policy: Callable[[str], str],
+        revoked: Revoked,
     ) -> None:
         self._app = app
         self._keys = keys
@@ -96,6 +109,8 @@ class Access:
         self._cookie = cookie_name(page_port)
         self._is_open = is_open
         self._policy = policy
+        self._revoked = revoked
+        self._leashes = Leashes(revoked)
         self._local = Person("local", _user_name(), OWNER)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -108,12 +123,49 @@ class Access:
         try:
             preflight = self._admit(scope, headers)
         except Refused as refused:
-            await _refuse(scope, receive, send, refused)
+            await refuse(scope, receive, send, refused)
             return
         if preflight:
             await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
             return
-        await self._app(scope, receive, send)
+        session: Session | None = scope["state"].get("session")
+        if session is None or not _lasts(scope, headers):
+            await self._app(scope, receive, send)
+        else:
+            await self._leashed(session, scope, receive, send)
+
+    async def _leashed(
+        self, session: Session, scope: HTTPScope | WebSocketScope, receive: Receive, send: Send
+    ) -> None:
+        """Pass on, but only as long as the session lasts. Stop outlives one that merely expired."""
+        begun = over = False
+
+        async def sent(message: Message) -> None:
+            nonlocal begun, over
+            begun = True
+            over = message["type"] == "websocket.close" or message.get("more_body") is False
+            await send(message)
+
+        with self._leashes.hold(session, outlives=scope["path"] == _LIVE) as leash:
+            try:
+                await self._app(scope, receive, sent)
+                if not leash.is_cut:
+                    return
+                await asyncio.sleep(0)  # the cancellation may still be on its way
+            except asyncio.CancelledError:
+                if not leash.is_cut:
+                    raise
+        leash.let_go()
+        log.info("a session has ended: %s is closed", scope["path"])
+        last: Any = {"type": "http.response.body", "body": b"", "more_body": False}
+        if scope["type"] == ScopeType.WEBSOCKET:
+            last = {"type": "websocket.close", "code": SESSION_ENDED, "reason": "session ended"}
+        elif not begun:
+            await refuse(scope, receive, send, _ended(session))
+            return
+        if not over:
+            with anyio.move_on_after(_GOODBYE):
+                await send(last)
 
     def _admit(self, scope: HTTPScope | WebSocketScope, headers: dict[str, str]) -> bool:
         """Raise a refusal, or return whether this is a preflight that needs no route."""
@@ -143,7 +195,8 @@ class Access:
             state["person"] = self._local
             return
         session = self._session(headers)
-        if session is not None and (not session.expired or _is_stop(method, path)):
+        revoked = session is not None and self._revoked.holds(session.invitation)
+        if session is not None and not revoked and (not session.expired or _is_stop(method, path)):
             if origin is None and method not in _SAFE:
                 raise WrongOrigin("A browser says which page is asking; this request does not.")
             if headers.get("sec-fetch-site") == "cross-site" and path.startswith("/api/"):
@@ -154,11 +207,7 @@ class Access:
         if session is not None:  # genuine, yet good for nothing but being the same person again
             state["expired"] = session
         if not self._is_open(path, "text/html" in headers.get("accept", "")):
-            raise Unauthenticated(
-                "Your session has ended: open the link that the server printed."
-                if session is not None
-                else "Open the link that the server printed, or send its token as a Bearer token."
-            )
+            raise _ended(session)
 
     def _session(self, headers: dict[str, str]) -> Session | None:
         try:
@@ -192,6 +241,24 @@ class Access:
         return dressed
 
 
+def _ended(session: Session | None) -> Refused:
+    """Why somebody without a session that lasts is not let in."""
+    if session is None:
+        return Unauthenticated(
+            "Open the link that the server printed, or send its token as a Bearer token."
+        )
+    if session.expired:
+        return Unauthenticated("Your session has ended: open the link that the server printed.")
+    return Withdrawn("The link that you came in by was revoked. Ask for another one.")
+
+
+def _lasts(scope: HTTPScope | WebSocketScope, headers: dict[str, str]) -> bool:
+    """Whether this may stay open: sockets, and streams of events."""
+    if scope["type"] == ScopeType.WEBSOCKET:
+        return True
+    return "text/event-stream" in headers.get("accept", "") or scope["path"].endswith("/events")
+
+
 def _is_stop(method: str, path: str) -> bool:
     return method == "POST" and _STOPS.fullmatch(path) is not None
 
@@ -207,14 +274,17 @@ def _headers(scope: HTTPScope | WebSocketScope) -> dict[str, str]:
     return found
 
 
-async def _refuse(
+async def refuse(
     scope: HTTPScope | WebSocketScope, receive: Receive, send: Send, refused: Refused
 ) -> None:
+    """Answer a request, or one for an upgrade, with a refusal."""
     log.info("refused %s: %s", scope["path"], refused.detail)
     body = problem_of(refused)
     fields = [(b"content-type", b"application/problem+json")]
     if refused.status == 401:
         fields.append((b"www-authenticate", b"Bearer"))
+    if refused.status == 429:
+        fields.append((b"retry-after", b"5"))
     if scope["type"] == ScopeType.WEBSOCKET:
         await receive()  # websocket.connect
         await _answer(send, refused.status, fields, body, prefix="websocket.")

@@ -22,13 +22,13 @@ from action_assistant.web.addresses import Addresses, host_name
 from action_assistant.web.keys import Keys
 from action_assistant.web.page import Page
 from action_assistant.web.problems import problem_handlers
+from action_assistant.web.revoked import Revoked
 from action_assistant.web.roles import Deed
 
 log: Final = logging.getLogger(__name__)
 
 BODY_LIMIT: Final = 10_000_000  # bytes; a graph file of 10 MB is refused with 413
-_OPEN: Final = frozenset({"/healthz", "/readyz", "/api/session"})
-_OPEN_BELOW: Final = "/api/invitations/"
+_OPEN: Final = frozenset({"/healthz", "/readyz", "/api/session", "/api/session/invitation"})
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
@@ -49,6 +49,7 @@ def application(
     *,
     title: str,
     keys: Keys,
+    revoked: Revoked,
     addresses: Addresses,
     page_port: int,
     lifespan: Sequence[Lifespan] = (),
@@ -79,13 +80,14 @@ def application(
         is_open=lambda path, html: (
             _answers_strangers(path) or (shown is not None and shown.knows(path, html))
         ),
-        policy=lambda host: _policy(host, page_port, runner_port),
+        policy=lambda host: _policy(host, page_port, runner_port, secure=addresses.secure),
+        revoked=revoked,
     )
     return _Named(outer, inner)
 
 
 def _answers_strangers(path: str) -> bool:
-    return path in _OPEN or path.startswith(_OPEN_BELOW)
+    return path in _OPEN
 
 
 def _decisions(inner: Litestar) -> dict[tuple[str, str], Deed]:
@@ -134,14 +136,13 @@ class _Named:
         await self._outer(scope, receive, send)
 
 
-def _policy(host: str, page_port: int, runner_port: int | None) -> str:
+def _policy(host: str, page_port: int, runner_port: int | None, *, secure: bool) -> str:
+    http, ws = ("https", "wss") if secure else ("http", "ws")
     connect = "'self'"
     name = host_name(host)
     if runner_port is not None and name:
         shown = f"[{name}]" if ":" in name else name
-        connect += (
-            f" ws://{shown}:{page_port} http://{shown}:{runner_port} ws://{shown}:{runner_port}"
-        )
+        connect += f" {ws}://{shown}:{page_port} {http}://{shown}:{runner_port} {ws}://{shown}:{runner_port}"
     return (
         "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
         f"img-src 'self' data: blob:; font-src 'self'; connect-src {connect}; object-src 'none'; "

@@ -98,6 +98,10 @@ class Keys:
         expires = time.time() + SESSION_SECONDS
         return Session(secrets.token_urlsafe(12), person, expires, invitation)
 
+    def secret_of(self, invitation: str) -> str:
+        """The secret of a link (256 bit): only who knows the token can tell it from the id."""
+        return _text(hmac.digest(self._seal, b"invitation\0" + invitation.encode(), "sha256"))
+
     def sealed(self, session: Session) -> str:
         """The cookie's value."""
         person = session.person

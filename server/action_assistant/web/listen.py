@@ -2,10 +2,12 @@
 
 import asyncio
 import errno
+import logging
 import os
 import socket
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import uvicorn
@@ -13,19 +15,29 @@ from litestar.enums import ScopeType
 from litestar.types import ASGIApp, Message, Receive, Scope, Send
 
 from action_assistant.errors import CannotStart
+from action_assistant.settings import EVERYWHERE
+from action_assistant.web.certificate import Certificate
+
+log: Final = logging.getLogger(__name__)
 
 WEBSOCKET_LIMIT: Final = 1_114_112  # bytes; an update of 1 MiB and its frame
 GRACE: Final = 5  # seconds that open requests get when the process is told to end
+_LOOK_S: Final = 60.0  # between two looks at the certificate
 UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it was sent is gone
 
 
-def serve(make: Callable[[], ASGIApp], *, host: str, port: int) -> None:
+def serve(
+    make: Callable[[], ASGIApp], *, host: str, port: int, identity: "Identity | None" = None
+) -> None:
     """Serve what `make` makes until told to end; nothing is touched before the address is ours.
+    With an `identity` over TLS.
 
     Raises CannotStart when the address is taken or unknown.
     """
     sockets = bound(host, port)
     try:
+        if identity is not None:
+            identity.certificate.renew(identity.names())
         endings = Endings(make())
     except BaseException:
         for listener in sockets:
@@ -44,12 +56,45 @@ def serve(make: Callable[[], ASGIApp], *, host: str, port: int) -> None:
         ws_ping_interval=10,
         ws_ping_timeout=10,
         timeout_graceful_shutdown=GRACE,
+        ssl_certfile=identity.certificate.chain if identity is not None else None,
+        ssl_keyfile=str(identity.certificate.key) if identity is not None else None,
     )
+    if identity is not None:
+        identity.keep(config)
     server = _Server(config, endings)
     _end_with_parent(server)
     server.run(sockets=sockets)
     if not server.started:
         raise CannotStart("The process could not be set up; the log above says why.")
+
+
+class Identity:
+    """Who we are under TLS: a certificate, renewed in time and when our names have changed."""
+
+    def __init__(self, certificate: Certificate, names: Callable[[], Sequence[str]]) -> None:
+        self.certificate: Final = certificate
+        self.names: Final = names
+        self._loaded = 0  # when the certificate that is in use was written
+
+    def keep(self, config: uvicorn.Config) -> None:
+        """Look now and then. New connections get the new certificate, open ones stay."""
+
+        def look() -> None:
+            while True:
+                time.sleep(_LOOK_S)
+                try:
+                    fresh = self.certificate.renew(self.names())
+                    loaded = self.certificate.chain.stat().st_mtime_ns
+                except (CannotStart, OSError) as error:
+                    log.error("the certificate was not renewed: %s", error)
+                    continue
+                if (fresh or loaded != self._loaded) and config.ssl is not None:
+                    config.ssl.load_cert_chain(self.certificate.chain, self.certificate.key)
+                    self._loaded = loaded
+                    log.info("a new certificate is in use")
+
+        self._loaded = self.certificate.chain.stat().st_mtime_ns
+        threading.Thread(target=look, name="certificate", daemon=True).start()
 
 
 class Endings:
@@ -118,8 +163,12 @@ class _Server(uvicorn.Server):
 
 def bound(host: str, port: int) -> list[socket.socket]:
     """Sockets for the address; both loopback families for a loopback name, so that nobody else
-    can stand in for us under `localhost`."""
-    hosts = ["127.0.0.1", "::1"] if host in {"127.0.0.1", "localhost"} else [host]
+    can stand in for us under `localhost`; both families for everywhere."""
+    hosts = [host]
+    if host in {"127.0.0.1", "localhost"}:
+        hosts = ["127.0.0.1", "::1"]
+    elif host == EVERYWHERE:
+        hosts = ["0.0.0.0", "::"]
     found: list[socket.socket] = []
     for name in hosts:
         family = socket.AF_INET6 if ":" in name else socket.AF_INET
@@ -136,7 +185,7 @@ def bound(host: str, port: int) -> list[socket.socket]:
             listener.listen(2048)
         except OSError as error:
             listener.close()
-            if name == "::1" and error.errno != errno.EADDRINUSE:
+            if name in {"::1", "::"} and found and error.errno != errno.EADDRINUSE:
                 continue  # IPv6 is known to the kernel but switched off
             for other in found:
                 other.close()

@@ -1,6 +1,7 @@
-"""Signing in: the token is traded once for a cookie that either process can verify."""
+"""Signing in: a token or an invitation is traded for a cookie that either process can verify."""
 
-from typing import Annotated, Any, Final
+from collections.abc import Callable
+from typing import Annotated, Any, Final, Protocol
 
 import msgspec
 from litestar import Request, Response, delete, get, post
@@ -8,17 +9,25 @@ from litestar.datastructures import Cookie
 from litestar.params import JSONBody
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.errors import Unauthenticated
-from action_assistant.web.access import cookie_name, known_person, session_of
-from action_assistant.web.keys import SESSION_SECONDS, Keys, Person, Session
+from action_assistant.errors import BadInput, TooMany, Unauthenticated
+from action_assistant.web.access import Needs, cookie_name, known_person, session_of
+from action_assistant.web.crowd import Pace
+from action_assistant.web.keys import SESSION_SECONDS, Author, Keys, Person, Session
+from action_assistant.web.revoked import Revoked
+from action_assistant.web.roles import Role, rank
 
 _NAME: Final = 60  # characters
+_TRIES_AT_ONCE: Final = 60  # of one address: a class may sit behind one
+_TRIES_PER_MINUTE: Final = 30  # after that
+_Asking = Request[Any, Any, Any]
 
 
 class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the page sends: the token on first sight, a name when the person gives one."""
+    """What the page sends: the token or an invitation on first sight, a name when the person gives
+    one. An invitation is `ID.SECRET`, as its link has it."""
 
     token: str | None = None
+    invitation: Annotated[str, msgspec.Meta(max_length=200)] | None = None
     name: Annotated[str, msgspec.Meta(max_length=_NAME)] | None = None
 
 
@@ -29,8 +38,50 @@ class SignedIn(msgspec.Struct, frozen=True):
     named: bool
 
 
-def session_routes(keys: Keys, page_port: int) -> list[ControllerRouterHandler]:
+class Looking(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A link that somebody wants to know more about before using it."""
+
+    invitation: Annotated[str, msgspec.Meta(max_length=200)]
+
+
+class Invited(msgspec.Struct, frozen=True):
+    """What a link invites to, and who made it."""
+
+    id: str
+    role: Role
+    by: str
+
+
+class Revocation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An invitation that lets nobody in any more."""
+
+    invitation: str
+
+
+class Reception(Protocol):
+    """Knows invitations."""
+
+    async def look(self, proof: str) -> Invited:
+        """What a link invites to. Raises Unauthenticated."""
+
+    async def welcome(self, invitation: str, person: Author) -> None:
+        """Remember who came in by it."""
+
+
+def session_routes(
+    keys: Keys,
+    page_port: int,
+    *,
+    reception: Callable[[], Reception],
+    secure: bool = False,
+    limits: bool = True,
+) -> list[ControllerRouterHandler]:
     """The routes under `/api/session`."""
+    pace = Pace(_TRIES_AT_ONCE, _TRIES_PER_MINUTE)
+
+    def admit(request: _Asking) -> None:
+        if limits and not pace.takes(request.client.host if request.client else ""):
+            raise TooMany("Too many tries from your address; wait a minute.")
 
     def signed_in(session: Session) -> Response[SignedIn]:
         body = SignedIn(session.person, bool(session.person.name))
@@ -40,38 +91,41 @@ def session_routes(keys: Keys, page_port: int) -> list[ControllerRouterHandler]:
             max_age=SESSION_SECONDS,
             httponly=True,
             samesite="strict",
+            secure=secure,
             path="/",
         )
         return Response(body, status_code=200, cookies=[cookie])
 
     @get("/api/session", summary="Who is signed in")
-    async def who(request: Request[Any, Any, Any]) -> SignedIn:
+    async def who(request: _Asking) -> SignedIn:
         session = _live(request)
         return SignedIn(session.person, bool(session.person.name))
 
     @post("/api/session", status_code=200, summary="Sign in, or change one's name")
-    async def sign_in(
-        data: JSONBody[SignIn], request: Request[Any, Any, Any]
-    ) -> Response[SignedIn]:
+    async def sign_in(data: JSONBody[SignIn], request: _Asking) -> Response[SignedIn]:
         name = " ".join((data.name or "").split())
-        if data.token is not None:
-            if not keys.opens(data.token):
-                raise Unauthenticated("This is not the token of this server.")
-            known = known_person(request)
-            if known is None:
-                return signed_in(keys.new_session(name))
-            # The link again, in a browser that is or was signed in: the same person, since what
-            # older tabs have written belongs to them.
-            return signed_in(keys.new_session(name or known.name, person_id=known.id))
-        now = _live(request)
-        return signed_in(
-            keys.new_session(
-                name or now.person.name,
-                role=now.person.role,
-                invitation=now.invitation,
-                person_id=now.person.id,
-            )
-        )
+        match data:
+            case SignIn(token=None, invitation=None):
+                return signed_in(_renamed(keys, _live(request), name))
+            case SignIn(token=str(token), invitation=None):
+                if not keys.opens(token):
+                    admit(request)
+                    raise Unauthenticated("This is not the token of this server.")
+                # The link again, in a browser that is or was signed in: the same person, since what
+                # older tabs have written belongs to them.
+                known = known_person(request)
+                id_ = known.id if known else None
+                return signed_in(keys.new_session(name or _name(known), person_id=id_))
+            case SignIn(token=None, invitation=str(proof)):
+                admit(request)
+                return signed_in(await _invited(keys, reception(), proof, name, request))
+            case _:
+                raise BadInput("Send the token or an invitation, not both.")
+
+    @post("/api/session/invitation", status_code=200, summary="What an invitation leads to")
+    async def look(data: JSONBody[Looking], request: _Asking) -> Invited:
+        admit(request)
+        return await reception().look(data.invitation)
 
     @delete("/api/session", summary="Sign out")
     async def sign_out() -> Response[None]:
@@ -79,10 +133,62 @@ def session_routes(keys: Keys, page_port: int) -> list[ControllerRouterHandler]:
         response.delete_cookie(cookie_name(page_port), path="/")
         return response
 
-    return [who, sign_in, sign_out]
+    return [who, sign_in, look, sign_out]
 
 
-def _live(request: Request[Any, Any, Any]) -> Session:
+def revocation(revoked: Revoked) -> ControllerRouterHandler:
+    """For a process that knows no invitations: the runner, which may be on another computer."""
+
+    @post(
+        "/api/revocations",
+        status_code=204,
+        summary="End every session that came in by an invitation",
+        guards=[Needs("share")],
+    )
+    async def revoke(data: JSONBody[Revocation]) -> None:
+        try:
+            revoked.add(data.invitation)
+        except ValueError as error:
+            raise BadInput(f"{error}.", where={"path": "/invitation"}) from error
+
+    return revoke
+
+
+async def _invited(
+    keys: Keys, reception: Reception, proof: str, name: str, request: _Asking
+) -> Session:
+    """A session for who comes by a link. Who may do more already keeps that: a link takes nothing
+    away."""
+    invited = await reception.look(proof)
+    now = session_of(request)
+    if now is not None and rank(now.person.role) >= rank(invited.role):
+        return _renamed(keys, now, name)
+    known = known_person(request)
+    session = keys.new_session(
+        name or _name(known),
+        role=invited.role,
+        invitation=invited.id,
+        person_id=known.id if known is not None else None,
+    )
+    await reception.welcome(invited.id, session.person)
+    return session
+
+
+def _renamed(keys: Keys, session: Session, name: str) -> Session:
+    person = session.person
+    return keys.new_session(
+        name or person.name,
+        role=person.role,
+        invitation=session.invitation,
+        person_id=person.id,
+    )
+
+
+def _name(known: Person | None) -> str:
+    return known.name if known is not None else ""
+
+
+def _live(request: _Asking) -> Session:
     session = session_of(request)
     if session is None:
         raise Unauthenticated("Open the link that the server printed.")

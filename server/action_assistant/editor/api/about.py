@@ -67,8 +67,9 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
     async def get_config(request: Request[Any, Any, Any]) -> Config:
         host = host_name(request.headers.get("host", "")) or "127.0.0.1"
         shown = f"[{host}]" if ":" in host else host
-        port = door.house.settings.runner_port
-        return Config("local", VERSION, f"http://{shown}:{port}")
+        settings = door.house.settings
+        scheme = "https" if settings.tls else "http"
+        return Config("local", VERSION, f"{scheme}://{shown}:{settings.runner_port}")
 
     @get("/api/people", summary="Everyone who acted here", operation_id="listPeople")
     async def list_people() -> list[Participant]:

@@ -13,9 +13,8 @@ from action_assistant.editor import wire
 from action_assistant.editor.house import Door
 from action_assistant.editor.member import Member
 from action_assistant.editor.room import Room
-from action_assistant.errors import Refused, TooMany
-from action_assistant.web.access import person_of
-from action_assistant.web.problems import PROBLEM_JSON, problem_of
+from action_assistant.errors import Refused
+from action_assistant.web.access import person_of, refuse
 from action_assistant.web.roles import allowed
 
 log: Final = logging.getLogger(__name__)
@@ -127,19 +126,4 @@ async def _refuse(socket: Socket, refused: Refused) -> None:
     if socket.connection_state != "init":
         await socket.close(wire.RESTARTING, wire.REASONS[wire.RESTARTING])
         return
-    await socket.receive()  # websocket.connect
-    body = problem_of(refused)
-    fields = [
-        (b"content-type", PROBLEM_JSON.encode()),
-        (b"content-length", str(len(body)).encode()),
-    ]
-    if isinstance(refused, TooMany):
-        fields.append((b"retry-after", b"5"))
-    start: Any = {
-        "type": "websocket.http.response.start",
-        "status": refused.status,
-        "headers": fields,
-    }
-    end: Any = {"type": "websocket.http.response.body", "body": body, "more_body": False}
-    await socket.send(start)
-    await socket.send(end)
+    await refuse(socket.scope, socket.receive, socket.send, refused)

@@ -1,0 +1,148 @@
+"""How commands talk to a running server: with the token, over HTTP or TLS."""
+
+import argparse
+import contextlib
+import os
+import socket
+import ssl
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from action_assistant import places
+from action_assistant.errors import CannotStart
+from action_assistant.web.certificate import Certificate
+from action_assistant.web.keys import TOKEN_FILE
+
+if TYPE_CHECKING:  # slow to load, and most commands do not need it
+    import httpx
+
+
+def command(
+    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
+    name: str,
+    text: str,
+    example: str,
+    *,
+    of: str = "",
+) -> argparse.ArgumentParser:
+    """A command that needs a running server. `of` is the command that it belongs to."""
+    words = " ".join(word for word in ("action-assistant", of, name, example) if word)
+    parser = commands.add_parser(name, help=text, description=text, epilog=f"example: {words}")
+    parser.add_argument("--url", metavar="URL", help="of the editor (default: port 8000 here)")
+    parser.add_argument(
+        "--data", type=Path, default=places.data(), metavar="DIR", help="that holds the token"
+    )
+    return parser
+
+
+class Server:
+    """A running editor and its runner, as a program sees them."""
+
+    def __init__(self, editor: "httpx.Client", runner_url: str) -> None:
+        self._client = editor
+        self._runner_url = runner_url
+
+    def editor(self, method: str, path: str, **body: Any) -> "httpx.Response":
+        """Ask the editor; a refusal becomes one sentence."""
+        return _asked(self._client, method, path, **body)
+
+    def runner(self, method: str, path: str, **body: Any) -> "httpx.Response":
+        """Ask the runner."""
+        return _asked(self._client, method, self._runner_url + path, **body)
+
+    def graph_id(self, asked: str) -> str:
+        """The id of a graph that is named by id or name."""
+        graphs = self.editor("GET", "/api/graphs").json()
+        if any(graph["id"] == asked for graph in graphs):
+            return asked
+        named = [graph["id"] for graph in graphs if graph["name"] == asked]
+        if len(named) != 1:
+            raise No(
+                f"No graph is called {asked!r}."
+                if not named
+                else f"{len(named)} graphs are called {asked!r}; name one by id: {', '.join(named)}."
+            )
+        found: str = named[0]
+        return found
+
+
+class No(Exception):
+    """The answer is no."""
+
+
+def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "httpx.Response":
+    import httpx
+
+    try:
+        answer = client.request(method, path, **body)
+    except httpx.HTTPError as error:
+        raise CannotStart(
+            f"No answer from {error.request.url.copy_with(path='/', query=None)} ({error}). "
+            "Is it running? Start it with `action-assistant serve`."
+        ) from error
+    if answer.is_error:
+        raise No(_sentence(answer))
+    return answer
+
+
+def _sentence(answer: "httpx.Response") -> str:
+    try:
+        problem = answer.json()
+        place = (problem.get("where") or {}).get("path", "")
+        return f"{problem['title']}: {problem['detail']}" + (f" (at {place})" if place else "")
+    except (ValueError, KeyError, AttributeError):
+        return f"{answer.request.url} answered {answer.status_code}."
+
+
+def _token(data: Path) -> str:
+    token = os.environ.get("ACTION_ASSISTANT_TOKEN")
+    if token:
+        return token
+    try:
+        return (data / TOKEN_FILE).read_text().strip()
+    except OSError as error:
+        raise CannotStart(
+            f"No token in {data} ({error.strerror}); name the data folder of the server with "
+            "--data, or set ACTION_ASSISTANT_TOKEN."
+        ) from error
+
+
+@contextmanager
+def running(options: argparse.Namespace) -> Iterator[Server]:
+    """The server that a command speaks to, with the token. Raises CannotStart, No."""
+    import httpx
+
+    data = options.data.resolve()
+    trust = Certificate(data).trusting_too()
+    headers = {"authorization": f"Bearer {_token(data)}"}
+    base = options.url or os.environ.get("ACTION_ASSISTANT_URL") or _here(trust)
+    with httpx.Client(
+        base_url=base, headers=headers, timeout=30, trust_env=False, verify=trust
+    ) as client:
+        config = _asked(client, "GET", "/api/config").json()
+        yield Server(client, config["runner_url"])
+
+
+def _here(trust: ssl.SSLContext) -> str:
+    """Where the server of this computer is: it may have been started with --tls or without."""
+    with (
+        contextlib.suppress(OSError),
+        socket.create_connection(("127.0.0.1", 8000), 2) as plain,
+        trust.wrap_socket(plain, server_hostname="127.0.0.1"),
+    ):
+        return "https://127.0.0.1:8000"
+    return "http://127.0.0.1:8000"
+
+
+def print_json(value: object) -> None:
+    sys.stdout.buffer.write(msgspec.json.format(msgspec.json.encode(value)) + b"\n")
+
+
+def refused(error: No) -> int:
+    print(f"action-assistant: {error}", file=sys.stderr)
+    return 1

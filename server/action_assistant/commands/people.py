@@ -1,0 +1,105 @@
+"""`people`: who may come in by which link, and the end of a link."""
+
+import argparse
+from typing import Any
+
+from action_assistant import settings
+from action_assistant.commands.client import No, Server, command, print_json, refused, running
+from action_assistant.errors import CannotStart, Refused
+from action_assistant.web.revoked import Revoked
+
+
+def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the commands of this module."""
+    people = commands.add_parser(
+        "people",
+        help="links that let people in: list, invite, revoke",
+        description="Links that let people in without the token, each with a role.",
+        epilog="example: action-assistant people invite editor --label Mari",
+    )
+    words = people.add_subparsers(dest="word", required=True, metavar="WORD")
+
+    listed = command(words, "list", "the links, and who came in by them", "", of="people")
+    listed.add_argument("--json", action="store_true", help="as JSON, for programs")
+    listed.set_defaults(deed=_list)
+
+    invite = command(words, "invite", "make a link", "operator --label 'lab tablet'", of="people")
+    invite.add_argument("role", choices=["viewer", "editor", "operator"])
+    invite.add_argument("--label", default="", help="whom it is for")
+    invite.set_defaults(deed=_invite)
+
+    revoke = command(
+        words,
+        "revoke",
+        "end a link and every session that came in by it, also while no server answers",
+        "trlQRDEFzMaX",
+        of="people",
+    )
+    revoke.add_argument("id", metavar="ID", help="as `people list` shows it")
+    revoke.set_defaults(deed=_revoke)
+
+
+def _list(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        try:
+            sharing = server.editor("GET", "/api/invitations").json()
+        except No as error:
+            return refused(error)
+        if options.json:
+            print_json(sharing)
+            return 0
+        for each in sharing["invitations"]:
+            _show(sharing["origins"], each)
+    return 0
+
+
+def _invite(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        try:
+            wanted = {"role": options.role, "label": options.label}
+            made = server.editor("POST", "/api/invitations", json=wanted).json()
+            _show(server.editor("GET", "/api/invitations").json()["origins"], made)
+        except No as error:
+            return refused(error)
+    return 0
+
+
+def _show(origins: list[str], invitation: dict[str, Any]) -> None:
+    label = f"  {invitation['label']}" if invitation["label"] else ""
+    over = "  (revoked)" if "revoked_at" in invitation else ""
+    print(f"{invitation['id']}  {invitation['role']}{label}{over}")
+    for guest in invitation["guests"]:
+        print(f"    {guest['person']['name'] or 'somebody without a name'}, since {guest['at']}")
+    if "path" in invitation:
+        for origin in origins[:1]:
+            print(f"    {origin}{invitation['path']}")
+
+
+def _revoke(options: argparse.Namespace) -> int:
+    """Both processes are told; where none answers, the data folder is, which both look at."""
+    try:
+        with running(options) as server:
+            return _revoke_at(server, options.id)
+    except CannotStart as silent:
+        if options.url:
+            raise
+        try:
+            Revoked(settings.writable_folder(options.data.resolve())).add(options.id)
+        except (ValueError, Refused) as error:
+            raise CannotStart(f"{silent} {error}") from error
+        print("No server answers; the link is marked as revoked in the data folder.")
+        return 0
+    except No as error:
+        return refused(error)
+
+
+def _revoke_at(server: Server, invitation: str) -> int:
+    gone = server.editor("POST", f"/api/invitations/{invitation}/revoke").json()
+    try:
+        server.runner("POST", "/api/revocations", json={"invitation": invitation})
+    except (No, CannotStart) as error:
+        return refused(
+            No(f"Revoked, but a runner with a data folder of its own has not been told: {error}")
+        )
+    print(f"{gone['id']}  {gone['role']} is revoked; {len(gone['guests'])} came in by it.")
+    return 0

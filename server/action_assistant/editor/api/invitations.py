@@ -1,0 +1,97 @@
+"""Routes of invitations, for owners: links with a role, who came in by them, and their end."""
+
+import io
+from typing import Annotated, Any, Literal
+
+import msgspec
+import segno
+from litestar import Request, Response, get, post
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.editor.house import Door
+from action_assistant.editor.invitations import Invitation
+from action_assistant.errors import BadInput, Conflict
+from action_assistant.web.access import Needs, person_of
+from action_assistant.web.addresses import Addresses
+
+
+class Sharing(msgspec.Struct, frozen=True):
+    """How others reach this server, and the links to it.
+
+    `origins`: where the page is for them, the likeliest first; empty when the server listens on this
+    computer only. `secure`: whether what is sent is encrypted.
+    """
+
+    origins: tuple[str, ...]
+    secure: bool
+    invitations: list[Invitation]
+
+
+class Inviting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A link to be made; `label` says whom it is for."""
+
+    role: Literal["viewer", "editor", "operator"]
+    label: Annotated[str, msgspec.Meta(max_length=200)] = ""
+
+
+def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
+    """Everything under `/api/invitations`."""
+
+    @get(
+        "/api/invitations",
+        summary="All links, the newest first, with who came in by them",
+        operation_id="listInvitations",
+        guards=[Needs("share")],
+    )
+    async def list_invitations() -> Sharing:
+        secure = door.house.settings.tls
+        return Sharing(addresses.origins(), secure, await door.house.invitations.all())
+
+    @post(
+        "/api/invitations",
+        summary="Make a link that lets people in with a role",
+        operation_id="invite",
+        guards=[Needs("share")],
+    )
+    async def invite(data: Inviting, request: Request[Any, Any, Any]) -> Response[Invitation]:
+        house, person = door.house, person_of(request)
+        await house.people.seen(person)
+        made = await house.invitations.make(data.role, data.label, person.id)
+        location = f"/api/invitations/{made.id}"
+        return Response(made, status_code=201, headers={"location": location})
+
+    @post(
+        "/api/invitations/{invitation:str}/revoke",
+        status_code=200,
+        summary="End a link, and at once every session that came in by it",
+        operation_id="revokeInvitation",
+        guards=[Needs("share")],
+    )
+    async def revoke(invitation: str, request: Request[Any, Any, Any]) -> Invitation:
+        house, person = door.house, person_of(request)
+        await house.people.seen(person)
+        return await house.invitations.revoke(invitation, person.id)
+
+    @get(
+        "/api/invitations/{invitation:str}/qr",
+        summary="A link as a QR code (SVG), for the page at `origin`",
+        operation_id="getInvitationCode",
+        guards=[Needs("share")],
+    )
+    async def code(invitation: str, origin: str) -> Response[bytes]:
+        if not addresses.allows_origin(origin):
+            raise BadInput("The page is not to be found there.", where={"path": "/origin"})
+        found = await door.house.invitations.get(invitation)
+        if found.path is None:
+            raise Conflict("This link was revoked.")
+        headers = {"cache-control": "no-store"}
+        return Response(_svg(origin + found.path), media_type="image/svg+xml", headers=headers)
+
+    return [list_invitations, invite, revoke, code]
+
+
+def _svg(link: str) -> bytes:
+    out = io.BytesIO()
+    drawn = segno.make(link, error="l", micro=False)
+    drawn.save(out, kind="svg", scale=8, border=2, light="white", xmldecl=False)
+    return out.getvalue()
