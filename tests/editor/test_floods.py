@@ -20,7 +20,7 @@ from action_assistant.editor import wire
 from action_assistant.web.crowd import AT_ONCE, OF_A_PERSON
 from editor import forge
 from editor.process import BEARER, Editor, running
-from editor.test_sockets import acks, closed, eventually, masked, upgraded
+from editor.test_sockets import acks, closed, eventually, goodbye, masked, upgraded
 
 RECONNECTS = int(os.environ.get("TEST_RECONNECTS", "1000"))
 MB = 1 << 20
@@ -106,7 +106,7 @@ async def test_a_forger_is_closed_and_the_victims_edit_survives(editor: Editor, 
             ):
                 pass
             await forger.send_bytes(wire.change(forge.entry(4711, 1, "late", "stolen")))
-            assert await closed(forger) == wire.FORBIDDEN
+            assert await goodbye(forger) == (wire.FORBIDDEN, wire.OTHER_CLIENT)
         victim.get("things", type=Map)["late"] = "mine"
         reader: Doc[Any] = Doc()
         async with editor.socket(graph, **token), editor.joined(graph, reader):

@@ -45,13 +45,18 @@ async def acks(session: httpx_ws.AsyncWebSocketSession, messages: int) -> tuple[
                 return durable, seq
 
 
-async def closed(session: httpx_ws.AsyncWebSocketSession) -> int:
-    """Read until the server closes; its code."""
+async def goodbye(session: httpx_ws.AsyncWebSocketSession) -> tuple[int, str | None]:
+    """Read until the server closes; its code and what it says."""
     try:
         while True:
             await session.receive(timeout=5)
     except httpx_ws.WebSocketDisconnect as ended:
-        return ended.code
+        return ended.code, ended.reason
+
+
+async def closed(session: httpx_ws.AsyncWebSocketSession) -> int:
+    """Read until the server closes; its code."""
+    return (await goodbye(session))[0]
 
 
 async def test_stock_clients_converge(editor: Editor, http: httpx.Client, graph: str) -> None:

@@ -1,9 +1,10 @@
 /**
  * The connection of one document to its room: Yjs sync, awareness and acknowledgements.
  *
- * Speaks y-protocols (sync 0, awareness 1, query awareness 3) and, as our server offers it, type
- * 100: how many of this socket's messages are durable, and up to which entry of the log this client
- * has been sent. So the page can say "saved" and mean it, and can name the moment it shows.
+ * Speaks y-protocols (sync 0, awareness 1, query awareness 3) and, as our server offers it, kinds of
+ * its own: how many of this socket's messages are durable and up to which entry of the log this
+ * client has been sent (so that the page can say "saved" and mean it), which history this is, and
+ * whether both show the same.
  *
  * Works without React. Edits go into `doc` at any time, also before the first answer and while
  * offline; they are merged, and counted in `unsaved` until the server has stored them. With a
@@ -15,77 +16,72 @@ import * as awarenessProtocol from "y-protocols/awareness";
 import { Awareness, removeAwarenessStates } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
-import { browser, freshId, type Kept, type Waiting } from "./device";
+import { browser, epochName, freshId, type Kept, type Waiting } from "./device";
 import * as frames from "./frames";
-import { type Stranded, strandedIn, wentBack } from "./history";
+import { type Before, Replaced, type Stranded, strandedIn, wentBack } from "./history";
 import { Keeping } from "./keeping";
+import { Line, type Speaker } from "./line";
 import { Outbox } from "./outbox";
-import type { Admit, ConnectOptions, Keep, Link, Room, Socket, Why } from "./room";
+import type { ConnectOptions, Keep, Link, Room, Socket, Why } from "./room";
+import { Watchman } from "./sameness";
 
 export * from "./room";
 
-/** The server says something at least every 15 s; a socket this silent is dead. */
-const SILENCE_MS = 30_000;
-const OPENING_MS = 10_000;
-const FIRST_RETRY_MS = 300;
-const LAST_RETRY_MS = 10_000;
-/** Nobody looks at a hidden page; with nothing to save it may take its time. */
-const HIDDEN_RETRY_MS = 60_000;
-/** An answer to a question that any living server answers at once. */
-const PROBE_MS = 5_000;
 /** Above this, edits that wait travel one by one; a message may have 1 MiB. */
 const LARGE = 1 << 19;
-const OPEN = 1;
 
 type Change = Partial<Omit<Link, "why" | "readOnly">> & {
   why?: Why | undefined;
   readOnly?: string | undefined;
 };
 
-const madeNow = (update: Uint8Array): Waiting => ({ id: freshId(), update, at: Date.now() });
+const madeNow = (update: Uint8Array, before: Before): Waiting => ({
+  id: freshId(),
+  update,
+  at: Date.now(),
+  before,
+});
 
 export function connect(options: ConnectOptions): Room {
   return new Connection(options);
 }
 
-class Connection implements Room {
+class Connection implements Room, Speaker {
   readonly doc: Y.Doc;
   readonly awareness: Awareness;
-  private readonly url: string;
-  private readonly openSocket: (url: string) => Socket;
-  private readonly random: () => number;
+  private readonly address: string;
   private readonly outbox = new Outbox();
   private readonly listeners = new Set<() => void>();
   private readonly keeping: Keeping | null;
-  private readonly admit: Admit | null;
+  private readonly replaced: Replaced;
+  private readonly watchman: Watchman;
+  private readonly line: Line;
   private current: Link = { state: "connecting", unsaved: 0, seq: 0 };
-  private socket: Socket | null = null;
-  private heardAt = 0;
-  private probedAt: number | null = null;
-  private turn = 0;
-  private attempts = 0;
-  private retry: ReturnType<typeof setTimeout> | undefined;
-  private readonly watch: ReturnType<typeof setInterval>;
+  /** The history that this document belongs to; empty while nobody has said. */
+  private epoch = "";
+  private told = "";
   private closed = false;
 
   constructor(options: ConnectOptions) {
     this.doc = options.doc ?? new Y.Doc();
     this.awareness = new Awareness(this.doc);
-    const url = new URL(options.url);
-    url.searchParams.set("acks", "1");
-    this.url = url.href;
-    this.openSocket = options.open ?? ((address) => new WebSocket(address) as unknown as Socket);
-    this.random = options.random ?? Math.random;
+    this.address = options.url;
+    this.replaced = new Replaced(this.doc, this);
     this.doc.on("update", this.onUpdate);
     this.awareness.on("update", this.onAwareness);
-    globalThis.addEventListener?.("online", this.onWake);
-    globalThis.addEventListener?.("offline", this.onWake);
-    globalThis.document?.addEventListener("visibilitychange", this.onVisibility);
-    this.watch = setInterval(this.onWatch, 1_000);
-    this.admit = options.admit ?? null;
+    this.watchman = new Watchman(this.doc, this.atRest);
+    this.line = new Line(
+      {
+        url: () => this.url(),
+        open: options.open ?? ((address) => new WebSocket(address) as unknown as Socket),
+        random: options.random ?? Math.random,
+        admit: options.admit ?? null,
+      },
+      this,
+    );
     this.keeping = options.keep ? this.keepingOf(options.keep) : null;
-    if (this.keeping !== null && !options.keep?.anew) void this.recall(this.keeping);
-    else this.dial();
+    if (this.keeping !== null) void this.recall(this.keeping);
+    else this.line.dial();
   }
 
   // Bound, so that they can be handed to `useSyncExternalStore`.
@@ -117,32 +113,31 @@ class Connection implements Room {
 
   reconnect(): void {
     if (this.closed) return;
-    this.attempts = 0;
-    this.drop();
     this.say({ state: "connecting", why: undefined });
-    this.dial();
+    this.line.redial();
   }
 
   close(): void {
     if (this.closed) return;
     this.awareness.setLocalState(null);
     this.closed = true;
-    clearInterval(this.watch);
-    clearTimeout(this.retry);
-    globalThis.removeEventListener?.("online", this.onWake);
-    globalThis.removeEventListener?.("offline", this.onWake);
-    globalThis.document?.removeEventListener("visibilitychange", this.onVisibility);
     this.doc.off("update", this.onUpdate);
     this.awareness.off("update", this.onAwareness);
-    this.drop();
+    this.replaced.close();
+    this.watchman.close();
+    this.line.close();
     this.awareness.destroy();
     this.keeping?.close();
     this.say({ state: "offline" });
   }
 
+  histories(): { readonly here: string; readonly theirs: string } {
+    return { here: this.keeping?.epoch ?? this.epoch, theirs: this.told };
+  }
+
   stranded(): Stranded | null {
-    if (this.current.why !== "other-epoch") return null;
-    return strandedIn(this.doc, this.outbox.edits);
+    const { edits } = this.outbox;
+    return edits.length === 0 ? null : strandedIn(this.doc, edits);
   }
 
   async forget(): Promise<void> {
@@ -172,21 +167,20 @@ class Connection implements Room {
 
   // -- the device -----------------------------------------------------------------------------
 
-  private keepingOf({ device = browser(), graph, person, anew }: Keep): Keeping {
-    const keeping = new Keeping(device, { graph, person }, () => this.say({}));
-    if (anew) keeping.begin();
-    return keeping;
+  private keepingOf({ device = browser(), graph, person, epoch }: Keep): Keeping {
+    return new Keeping(device, { graph, person }, epoch ?? null, () => this.say({}));
   }
 
   private async recall(keeping: Keeping): Promise<void> {
     const kept = await keeping.load((late) => {
       if (this.closed || late === null) return;
       this.adopt(late);
-      if (late.waiting.length > 0) this.reconnectNow(); // so that they go the usual way
+      if (late.waiting.length > 0) this.line.redial(); // so that they go the usual way
     });
     if (this.closed) return;
+    this.epoch = epochName(keeping.epoch);
     if (kept !== null) this.adopt(kept);
-    this.dial();
+    this.line.dial();
   }
 
   private adopt({ known, waiting, seq }: Kept): void {
@@ -206,140 +200,61 @@ class Connection implements Room {
       ? Y.encodeStateAsUpdate(this.doc)
       : null;
 
-  // -- the socket -----------------------------------------------------------------------------
+  // -- the line -------------------------------------------------------------------------------
 
-  private dial(): void {
-    clearTimeout(this.retry);
-    this.turn += 1;
-    if (this.admit === null) this.enter();
-    else void this.knock(this.admit, this.turn);
+  private url(): string {
+    const url = new URL(this.address);
+    url.searchParams.set("acks", "1");
+    if (this.epoch !== "") {
+      url.searchParams.set("epoch", this.epoch);
+      if (this.current.seq > 0) url.searchParams.set("seq", String(this.current.seq));
+    }
+    return url.href;
   }
 
-  private async knock(admit: Admit, turn: number): Promise<void> {
-    const why = await admit(this.attempts > 0).catch(() => "nobody" as const);
-    if (turn !== this.turn || this.closed) return;
-    if (why === null) this.enter();
-    else if (why === "nobody") this.stayAway(undefined);
-    else this.say({ state: "refused", why });
+  hasWork(): boolean {
+    return this.outbox.unsaved > 0;
   }
 
-  private enter(): void {
-    const socket = this.openSocket(this.url);
-    socket.binaryType = "arraybuffer";
-    this.socket = socket;
-    this.heardAt = Date.now();
-    this.probedAt = null;
-    socket.onopen = () => this.onOpen(socket);
-    socket.onmessage = ({ data }) => this.onMessage(socket, data);
-    socket.onclose = ({ code }) => this.onClose(socket, code);
-    socket.onerror = () => undefined; // a close event follows
+  probe(): Uint8Array<ArrayBuffer> {
+    return frames.question(this.doc);
   }
 
-  private onOpen(socket: Socket): void {
-    if (socket !== this.socket) return;
-    this.heardAt = Date.now();
+  onOpen(): void {
     this.outbox.fresh();
     this.say({ readOnly: undefined });
-    this.send(frames.question(this.doc));
+    this.line.send(frames.question(this.doc));
     // The others saw us go: only a newer clock brings us back.
     const state = this.awareness.getLocalState();
     if (state !== null) this.awareness.setLocalState(state);
   }
 
-  private onClose(socket: Socket, code: number): void {
-    if (socket !== this.socket) return;
-    this.drop();
-    const refused = frames.REFUSED.get(code);
-    if (refused !== undefined) {
-      this.say({ state: "refused", why: refused });
-      return;
-    }
-    this.stayAway(frames.PASSING.get(code));
-  }
-
-  private stayAway(why: Why | undefined): void {
+  onAway(why: Why | undefined): void {
     this.say({ state: "offline", why });
-    this.dialLater();
   }
 
-  private dialLater(): void {
-    const idle = globalThis.document?.visibilityState === "hidden" && this.outbox.unsaved === 0;
-    const soon = Math.min(LAST_RETRY_MS, FIRST_RETRY_MS * 2 ** this.attempts);
-    const longest = idle ? HIDDEN_RETRY_MS : soon;
-    this.attempts += 1;
-    clearTimeout(this.retry);
-    this.retry = setTimeout(() => this.dial(), longest * (0.5 + this.random() / 2));
+  onRefused(why: Why): void {
+    this.say({ state: "refused", why });
   }
 
-  /** Forgets the socket; the others are out of sight until it is back. */
-  private drop(): void {
-    clearTimeout(this.retry);
-    this.turn += 1;
-    const socket = this.socket;
-    this.socket = null;
-    if (socket !== null) {
-      socket.onopen = socket.onmessage = socket.onclose = null;
-      socket.close();
-    }
+  /** The others are out of sight until the socket is back. */
+  onDrop(): void {
     const others = [...this.awareness.meta.keys()].filter((id) => id !== this.doc.clientID);
     removeAwarenessStates(this.awareness, others, this);
     // Whoever is still there comes back with the clock that is known; only strangers may do that.
     for (const id of others) this.awareness.meta.delete(id);
   }
 
-  /** The network or the page changed: try at once, or see whether the socket still lives. */
-  private readonly onWake = (): void => {
-    if (this.closed) return;
-    if (this.current.state === "offline") this.reconnectNow();
-    else if (this.current.state === "live") this.probe();
-  };
-
-  private readonly onVisibility = (): void => {
-    if (globalThis.document.visibilityState === "visible") this.onWake();
-  };
-
-  private probe(): void {
-    this.probedAt = Date.now();
-    this.send(frames.question(this.doc));
-  }
-
-  private reconnectNow(): void {
-    this.attempts = 0;
-    this.drop();
-    this.dial();
-  }
-
-  private readonly onWatch = (): void => {
-    if (this.socket === null) return;
-    const limit = this.socket.readyState === OPEN ? SILENCE_MS : OPENING_MS;
-    const now = Date.now();
-    const mute = this.probedAt !== null && now - this.probedAt > PROBE_MS;
-    if (mute || now - this.heardAt > limit) this.onClose(this.socket, 1006);
-  };
-
-  private send(frame: Uint8Array<ArrayBuffer>): void {
-    if (this.socket?.readyState === OPEN) this.socket.send(frame);
-  }
-
   // -- what comes in --------------------------------------------------------------------------
 
-  private onMessage(socket: Socket, data: unknown): void {
-    if (socket !== this.socket) return;
-    this.heardAt = Date.now();
-    this.probedAt = null;
-    if (!(data instanceof ArrayBuffer)) return;
-    try {
-      this.take(socket, decoding.createDecoder(new Uint8Array(data)));
-    } catch (error) {
-      console.error("The room sent something that cannot be read", error);
-      this.onClose(socket, 1006);
-    }
+  onMessage(data: Uint8Array): void {
+    this.take(decoding.createDecoder(data));
   }
 
-  private take(socket: Socket, decoder: decoding.Decoder): void {
+  private take(decoder: decoding.Decoder): void {
     switch (decoding.readVarUint(decoder)) {
       case frames.SYNC:
-        this.takeSync(socket, decoder);
+        this.takeSync(decoder);
         break;
       case frames.AWARENESS: {
         const update = decoding.readVarUint8Array(decoder);
@@ -355,26 +270,32 @@ class Connection implements Room {
         if (stored.length > 0) this.keeping?.stored(stored);
         this.keeping?.shows(seq, this.copy);
         this.say({ unsaved: this.outbox.unsaved, seq });
+        this.watchman.stir();
         break;
       }
+      case frames.COMPARE:
+        if (this.watchman.differs(decoder)) this.line.refuse("differs");
+        break;
       case frames.READ_ONLY:
         this.say({ readOnly: decoding.readVarString(decoder) });
+        break;
+      case frames.EPOCH:
+        this.named(decoding.readVarString(decoder));
         break;
     }
   }
 
-  private takeSync(socket: Socket, decoder: decoding.Decoder): void {
+  private takeSync(decoder: decoding.Decoder): void {
     const step = decoding.readVarUint(decoder);
     const content = decoding.readVarUint8Array(decoder);
     switch (step) {
       case sync.messageYjsSyncStep1:
-        if (wentBack(this.doc, this.outbox.edits, content))
-          this.onClose(socket, frames.OTHER_EPOCH);
+        if (wentBack(this.doc, this.outbox.edits, content)) this.line.refuse("other-epoch");
         else this.give(content);
         break;
       case sync.messageYjsSyncStep2:
         this.learn(content);
-        this.attempts = 0;
+        this.line.arrived();
         this.say({ state: "live", why: undefined });
         break;
       case sync.messageYjsUpdate:
@@ -382,6 +303,24 @@ class Connection implements Room {
         break;
     }
   }
+
+  /** The server says which history it has. */
+  private named(epoch: string): void {
+    this.told = epoch;
+    if (this.epoch !== "") return;
+    this.epoch = epoch;
+    this.keeping?.name(epoch, () => this.outbox.edits);
+  }
+
+  /** What is shown, when everything of it is the log up to `seq` and nothing else. */
+  private readonly atRest = (): {
+    readonly seq: number;
+    send(frame: Uint8Array<ArrayBuffer>): void;
+  } | null => {
+    const { state, unsaved, seq } = this.current;
+    if (state !== "live" || unsaved > 0 || seq === 0) return null;
+    return { seq, send: (frame) => this.line.send(frame) };
+  };
 
   private learn(update: Uint8Array): void {
     Y.applyUpdate(this.doc, update, this);
@@ -396,14 +335,14 @@ class Connection implements Room {
     const edits = this.outbox.edits;
     if (whole.length <= LARGE || edits.length === 0) {
       this.outbox.sentAll();
-      this.send(frames.answer(whole));
+      this.line.send(frames.answer(whole));
       return;
     }
     this.outbox.sentSome(0);
-    this.send(frames.answer(frames.NOTHING));
+    this.line.send(frames.answer(frames.NOTHING));
     edits.forEach(({ update }, n) => {
       this.outbox.sentSome(n + 1);
-      this.send(frames.change(update));
+      this.line.send(frames.change(update));
     });
   }
 
@@ -414,11 +353,15 @@ class Connection implements Room {
     transaction: Y.Transaction,
   ): void => {
     if (origin === this) return;
-    if (transaction.local) this.outbox.edited(this.keeping?.edited(update) ?? madeNow(update));
+    if (transaction.local) {
+      const edit = madeNow(update, this.replaced.take());
+      this.keeping?.edited(edit);
+      this.outbox.edited(edit);
+    }
     // Until the room asked for what it lacks, everything travels with that answer, in order.
-    if (this.outbox.answered && this.socket?.readyState === OPEN) {
+    if (this.outbox.answered && this.line.isOpen) {
       this.outbox.sentAll();
-      this.send(frames.change(update));
+      this.line.send(frames.change(update));
     }
     this.say({ unsaved: this.outbox.unsaved });
   };
@@ -432,6 +375,6 @@ class Connection implements Room {
   };
 
   private sendAwareness(): void {
-    this.send(frames.presence(this.awareness));
+    this.line.send(frames.presence(this.awareness));
   }
 }

@@ -7,6 +7,8 @@
  * refuses it, each call here rejects, and the room says that nothing is kept.
  */
 
+import type { Before } from "./history";
+
 /** Whose copy of which graph. */
 export interface Shelf {
   readonly graph: string;
@@ -19,10 +21,12 @@ export interface Waiting {
   readonly update: Uint8Array;
   /** Milliseconds since 1970. */
   readonly at: number;
+  /** What it replaced; absent where that is not known. */
+  readonly before?: Before;
 }
 
 export interface Kept {
-  /** Names one history of the graph; a restored backup begins another. */
+  /** One history of the graph, see `epochName`. */
   readonly epoch: string;
   /** The copy shows the log up to this entry. */
   readonly seq: number;
@@ -50,13 +54,27 @@ export interface OtherPerson {
 }
 
 export interface Device {
-  /** What is kept; null when nothing is. An epoch whose edits still wait goes before a newer one. */
-  read(shelf: Shelf): Promise<Kept | null>;
+  /** What is kept, of all histories, the last used one at the end. */
+  read(shelf: Shelf): Promise<readonly Kept[]>;
   write(shelf: Shelf, epoch: string, batch: Batch): Promise<void>;
   /** Lets go of everything kept of one epoch, edits that wait included. */
   forget(shelf: Shelf, epoch: string): Promise<void>;
   /** The others with edits of this graph that wait here. */
   others(shelf: Shelf): Promise<readonly OtherPerson[]>;
+}
+
+/** Of a graph whose server has not said yet which history it has. */
+export const UNNAMED = "0";
+
+/** A place for a document that begins anew although the server calls the history the same. */
+export function epochAnew(name: string): string {
+  return `${name || UNNAMED}~${freshId()}`;
+}
+
+/** What the server calls the history that is kept under this epoch; empty when it has not said. */
+export function epochName(epoch: string): string {
+  const [name = UNNAMED] = epoch.split("~");
+  return name === UNNAMED ? "" : name;
 }
 
 const NAME = "action-assistant";
@@ -92,8 +110,7 @@ export function deviceOf(factory: IDBFactory | undefined = globalThis.indexedDB)
       const range = within(shelf.graph, shelf.person.id);
       const copies = (await answer(work.objectStore("copies").getAll(range))) as Copy[];
       copies.sort((a, b) => a.usedAt - b.usedAt);
-      const found = await Promise.all(copies.map((copy) => readOne(work, copy)));
-      return found.find(({ waiting }) => waiting.length > 0) ?? found.at(-1) ?? null;
+      return Promise.all(copies.map((copy) => readOne(work, copy)));
     },
     async write(shelf, epoch, batch) {
       const store = await database();

@@ -19,14 +19,17 @@ export class FakeDevice implements Device {
   /** Resolves reads when it does; a hanging device otherwise. */
   ready: Promise<void> = Promise.resolve();
 
-  async read({ graph, person }: Shelf): Promise<Kept | null> {
+  async read({ graph, person }: Shelf): Promise<readonly Kept[]> {
     await this.ready;
     this.check();
-    const mine = this.entries.filter((e) => e.graph === graph && e.person.id === person.id);
-    const found = mine.find(({ waiting }) => waiting.size > 0) ?? mine.at(-1);
-    if (found === undefined) return null;
-    const { epoch, seq, known, waiting } = found;
-    return { epoch, seq, known: [...known], waiting: [...waiting.values()] };
+    return this.entries
+      .filter((e) => e.graph === graph && e.person.id === person.id)
+      .map(({ epoch, seq, known, waiting }) => ({
+        epoch,
+        seq,
+        known: [...known],
+        waiting: [...waiting.values()],
+      }));
   }
 
   async write(shelf: Shelf, epoch: string, batch: Batch): Promise<void> {
@@ -67,7 +70,11 @@ export class FakeDevice implements Device {
     const old = this.entries.find(
       (e) => e.graph === graph && e.person.id === person.id && e.epoch === epoch,
     );
-    if (old !== undefined) return old;
+    if (old !== undefined) {
+      this.entries.splice(this.entries.indexOf(old), 1);
+      this.entries.push(old);
+      return old;
+    }
     const fresh = { graph, person, epoch, seq: 0, known: [], waiting: new Map() };
     this.entries.push(fresh);
     return fresh;

@@ -4,14 +4,16 @@ import * as decoding from "lib0/decoding";
 import * as encoding from "lib0/encoding";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
+import { mapsOf } from "../graph/layout";
 import type { Socket } from "./connect";
+import { fingerprint } from "./sameness";
 
 export class FakeSocket implements Socket {
   binaryType: BinaryType = "blob";
   readyState = 0;
   onopen: (() => void) | null = null;
   onmessage: ((event: { data: unknown }) => void) | null = null;
-  onclose: ((event: { code: number }) => void) | null = null;
+  onclose: ((event: { code: number; reason?: string }) => void) | null = null;
   onerror: (() => void) | null = null;
   /** Document messages that were committed. */
   durable = 0;
@@ -35,9 +37,9 @@ export class FakeSocket implements Socket {
   }
 
   /** The server or the network ends it. */
-  end(code: number): void {
+  end(code: number, reason = ""): void {
     this.readyState = 3;
-    this.onclose?.({ code });
+    this.onclose?.({ code, reason });
   }
 
   deliver(data: Uint8Array): void {
@@ -50,8 +52,16 @@ export class FakeServer {
   seq = 0;
   /** While set, what comes in is taken but not committed: no broadcast, no ack. */
   stalled = false;
+  /** Which history this is; empty for a server that does not say. */
+  epoch: string;
+  /** How many comparisons did not fit. */
+  divergences = 0;
   readonly sockets: FakeSocket[] = [];
   private readonly log: { socket: FakeSocket; update: Uint8Array }[] = [];
+
+  constructor(epoch = "") {
+    this.epoch = epoch;
+  }
 
   readonly open = (url: string): FakeSocket => {
     const socket = new FakeSocket(url, this);
@@ -70,6 +80,18 @@ export class FakeServer {
     const socket = this.last;
     socket.readyState = 1;
     socket.onopen?.();
+    if (this.epoch !== "") {
+      const named = encoding.createEncoder();
+      encoding.writeVarUint(named, 103);
+      encoding.writeVarString(named, this.epoch);
+      socket.deliver(encoding.toUint8Array(named));
+      const known = new URL(socket.url).searchParams;
+      const other = (known.get("epoch") ?? this.epoch) !== this.epoch;
+      if (other || Number(known.get("seq") ?? 0) > this.seq) {
+        socket.end(4409);
+        return socket;
+      }
+    }
     const encoder = encoding.createEncoder();
     encoding.writeVarUint(encoder, 0);
     sync.writeSyncStep1(encoder, this.doc);
@@ -79,7 +101,9 @@ export class FakeServer {
 
   take(socket: FakeSocket, data: Uint8Array): void {
     const decoder = decoding.createDecoder(data);
-    if (decoding.readVarUint(decoder) !== 0) return;
+    const sort = decoding.readVarUint(decoder);
+    if (sort === 101) this.compare(socket, decoder);
+    if (sort !== 0) return;
     const kind = decoding.readVarUint(decoder);
     const content = decoding.readVarUint8Array(decoder);
     if (kind !== sync.messageYjsSyncStep1) {
@@ -134,6 +158,16 @@ export class FakeServer {
     encoding.writeVarUint(encoder, 1);
     encoding.writeVarUint8Array(encoder, encoding.toUint8Array(inner));
     this.last.deliver(encoding.toUint8Array(encoder));
+  }
+
+  private compare(socket: FakeSocket, decoder: decoding.Decoder): void {
+    const [seq, entries, total] = [0, 0, 0].map(() => decoding.readVarUint(decoder));
+    if (seq !== this.seq) return;
+    const mine = fingerprint(mapsOf(this.doc));
+    if (mine.entries !== entries || mine.total !== total) this.divergences += 1;
+    const encoder = encoding.createEncoder();
+    for (const n of [101, seq, mine.entries, mine.total]) encoding.writeVarUint(encoder, n);
+    socket.deliver(encoding.toUint8Array(encoder));
   }
 
   private ack(socket: FakeSocket): void {

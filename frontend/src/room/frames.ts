@@ -5,18 +5,22 @@ import { type Awareness, encodeAwarenessUpdate } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import type * as Y from "yjs";
 import type { Why } from "./room";
+import type { Fingerprint } from "./sameness";
 
 export const SYNC = 0;
 export const AWARENESS = 1;
 export const QUERY_AWARENESS = 3;
 /** How many document messages of this socket are durable, and up to where it was sent the log. */
 export const ACK = 100;
+/** A fingerprint of what is shown: the page's, then the server's. */
+export const COMPARE = 101;
 /** A sentence: why nobody may change this document. */
 export const READ_ONLY = 102;
+/** Which history of the graph this is. */
+export const EPOCH = 103;
 
-export const OTHER_EPOCH = 4409;
 /** Close codes after which coming again by itself is of no use. */
-export const REFUSED: ReadonlyMap<number, Why> = new Map([
+const REFUSED: ReadonlyMap<number, Why> = new Map([
   [1003, "not-accepted"],
   [1007, "not-accepted"],
   [1008, "forbidden"],
@@ -24,8 +28,17 @@ export const REFUSED: ReadonlyMap<number, Why> = new Map([
   [4401, "session-ended"],
   [4403, "forbidden"],
   [4404, "no-such-graph"],
-  [OTHER_EPOCH, "other-epoch"],
+  [4409, "other-epoch"],
 ]);
+const FORBIDDEN = 4403;
+/** Two documents with one client id: this one has to take another. */
+const OTHER_CLIENT = "client id of another person";
+
+/** Why the server does not let this page in, if that is what a close says. */
+export function refusedBy(code: number, reason: string): Why | undefined {
+  return code === FORBIDDEN && reason === OTHER_CLIENT ? "other-client" : REFUSED.get(code);
+}
+
 /** Close codes of what passes. */
 export const PASSING: ReadonlyMap<number, Why> = new Map([
   [1012, "restarting"],
@@ -50,6 +63,13 @@ export function answer(update: Uint8Array): Bytes {
 /** One update. */
 export function change(update: Uint8Array): Bytes {
   return edit(sync.messageYjsUpdate, update);
+}
+
+/** What we show after entry `seq` of the log. */
+export function compare(seq: number, { entries, total }: Fingerprint): Bytes {
+  return message(COMPARE, (encoder) => {
+    for (const number of [seq, entries, total]) encoding.writeVarUint(encoder, number);
+  });
 }
 
 /** What we say about ourselves. */

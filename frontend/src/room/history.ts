@@ -7,13 +7,26 @@
  */
 
 import * as Y from "yjs";
-import { mapsFrom, mapsOf, ROOTS, type Root, rootOf, splitKey } from "../graph/layout";
+import {
+  endsOf,
+  type Maps,
+  mapsFrom,
+  mapsOf,
+  ROOTS,
+  type Root,
+  rootOf,
+  splitKey,
+} from "../graph/layout";
+import { ENTRY, EXIT } from "../graph/model";
 import { together } from "../graph/pen";
 import { same } from "../graph/same";
-import type { Waiting } from "./device";
+import type { Kept, Waiting } from "./device";
 
 /** Plain values by key; `undefined` where the key is erased. */
 export type Difference = { readonly [R in Root]: ReadonlyMap<string, unknown> };
+
+/** What an edit replaced: values by key, `undefined` where there was none. */
+export type Before = readonly (readonly [root: Root, key: string, value: unknown])[];
 
 /** Edits that wait, on a history that is no more the server's. */
 export interface Stranded {
@@ -22,6 +35,51 @@ export interface Stranded {
   readonly at: number;
   /** What they changed, by key, with the values that they gave. */
   readonly difference: Difference;
+  /** The values that the first of them found there, as far as they are known. */
+  readonly before: Difference;
+  /** The graph as it was here, with these edits. */
+  readonly here: Maps;
+}
+
+/** Notes what the person's edits replace, while the document still knows it. */
+export class Replaced {
+  private readonly doc: Y.Doc;
+  private readonly ignore: unknown;
+  private found: [Root, string, unknown][] = [];
+  private readonly watched: readonly (readonly [Root, (event: Y.YMapEvent<unknown>) => void])[];
+
+  /** Not of transactions whose origin is `ignore`. */
+  constructor(doc: Y.Doc, ignore: unknown) {
+    this.doc = doc;
+    this.ignore = ignore;
+    this.watched = ROOTS.map((root) => [root, (event) => this.see(root, event)] as const);
+    for (const [root, see] of this.watched) rootOf(doc, root).observe(see);
+  }
+
+  /** What was replaced since this was asked last. */
+  take(): Before {
+    const found = this.found;
+    this.found = [];
+    return found;
+  }
+
+  close(): void {
+    for (const [root, see] of this.watched) rootOf(this.doc, root).unobserve(see);
+  }
+
+  private see(root: Root, { transaction, changes }: Y.YMapEvent<unknown>): void {
+    if (!transaction.local || transaction.origin === this.ignore) return;
+    for (const [key, { oldValue }] of changes.keys) this.found.push([root, key, oldValue]);
+  }
+}
+
+/** The edits of a copy that was kept on the device, as `strandedIn`. */
+export function strandedOf({ known, waiting }: Pick<Kept, "known" | "waiting">): Stranded {
+  const doc = new Y.Doc();
+  for (const update of known) Y.applyUpdate(doc, update);
+  const before = mapsOf(doc);
+  for (const { update } of waiting) Y.applyUpdate(doc, update);
+  return strandedIn(doc, waiting, before);
 }
 
 /** Whether a server with this state vector lacks something that was durable when we last heard. */
@@ -36,8 +94,8 @@ export function wentBack(doc: Y.Doc, waiting: readonly Waiting[], server: Uint8A
   return [...known].some(([client, clock]) => (theirs.get(client) ?? 0) < clock);
 }
 
-/** What the waiting edits changed in the document. */
-export function strandedIn(doc: Y.Doc, waiting: readonly Waiting[]): Stranded {
+/** What the waiting edits changed in the document. `base`: what it was before all of them. */
+export function strandedIn(doc: Y.Doc, waiting: readonly Waiting[], base?: Maps): Stranded {
   const difference = mutable();
   for (const root of ROOTS) rootOf(doc, root); // makes them maps, also where nobody has looked yet
   for (const { update } of waiting) {
@@ -47,7 +105,25 @@ export function strandedIn(doc: Y.Doc, waiting: readonly Waiting[]): Stranded {
       for (const { clock, len } of ranges) note(doc, difference, client, clock, len);
     }
   }
-  return { edits: waiting.length, at: waiting.at(-1)?.at ?? 0, difference };
+  const before = mutable();
+  for (const [root, key, value] of waiting.flatMap((edit) => edit.before ?? [])) {
+    if (!before[root].has(key)) before[root].set(key, value);
+  }
+  for (const root of base === undefined ? [] : ROOTS) {
+    for (const key of difference[root].keys()) {
+      if (!before[root].has(key)) before[root].set(key, base?.[root].get(key));
+    }
+  }
+  for (const root of ROOTS) {
+    for (const [key, value] of before[root]) {
+      // Made and taken back again.
+      if (difference[root].has(key) && same(difference[root].get(key), value)) {
+        difference[root].delete(key);
+      }
+    }
+  }
+  const edits = waiting.length;
+  return { edits, at: waiting.at(-1)?.at ?? 0, difference, before, here: mapsOf(doc) };
 }
 
 function note(
@@ -84,19 +160,25 @@ export function differenceOf(before: Y.Doc, after: Y.Doc): Difference {
 }
 
 /**
- * Makes the same changes here as one fresh edit. Fields of actions that are not there are left out,
- * since nobody would see them. Answers how many keys changed.
+ * Makes the same changes here as one fresh edit. What belongs to actions that are not there is left
+ * out, since nobody would see it. Answers how many keys changed.
  */
 export function applyDifference(doc: Y.Doc, difference: Difference): number {
   const actions = rootOf(doc, "actions");
-  const lives = (head: string) => actions.has(head) || difference.actions.get(head) !== undefined;
+  const lives = (aid: string) =>
+    difference.actions.has(aid) ? difference.actions.get(aid) !== undefined : actions.has(aid);
+  const isEnd = (key: string) => key === ENTRY || key === EXIT || lives(key);
+  const fits = (root: Root, { head, rest }: { head: string; rest: string }) => {
+    if (root === "actions") return rest === "" || lives(head);
+    const ends = root === "relations" ? endsOf(head) : null;
+    return ends === null || (isEnd(ends.parent) && isEnd(ends.child));
+  };
   let changed = 0;
   together(doc, () => {
     for (const root of ROOTS) {
       const map = rootOf(doc, root);
       for (const [key, value] of difference[root]) {
-        const { head, rest } = splitKey(key);
-        if (root === "actions" && rest !== "" && !lives(head)) continue;
+        if (value !== undefined && !fits(root, splitKey(key))) continue;
         if (value === undefined ? !map.has(key) : same(map.get(key), value)) continue;
         if (value === undefined) map.delete(key);
         else map.set(key, value);

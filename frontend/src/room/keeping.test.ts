@@ -29,7 +29,7 @@ afterEach(() => {
 
 const settle = () => vi.advanceTimersByTimeAsync(0);
 
-async function open(person = ADA, more: { anew?: boolean; graph?: string } = {}): Promise<Room> {
+async function open(person = ADA, more: { epoch?: string; graph?: string } = {}): Promise<Room> {
   const room = connect({
     url: "ws://host/room",
     open: server.open,
@@ -239,7 +239,7 @@ test("a server that went back gets nothing merged into it; the edits wait for a 
   await vi.advanceTimersByTimeAsync(60_000);
   expect(server.sockets.length).toBe(1);
 
-  const fresh = await open(ADA, { anew: true });
+  const fresh = await open(ADA, { epoch: "0~anew" });
   server.accept();
   if (stranded) applyDifference(fresh.doc, stranded.difference);
   await settle();

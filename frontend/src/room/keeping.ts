@@ -5,7 +5,7 @@
  * others change is written with the next edit that may build on it, or a little later.
  */
 
-import { type Batch, type Device, freshId, type Kept, type Shelf, type Waiting } from "./device";
+import { type Batch, type Device, type Kept, type Shelf, UNNAMED, type Waiting } from "./device";
 
 /** A device that has not answered by then is not waited for. */
 const PATIENCE_MS = 3_000;
@@ -14,11 +14,10 @@ const AGAIN_MS = 10_000;
 /** After so many updates the copy is written anew as a whole. */
 const TAIL = 200;
 
-/** Of graphs that were never taken back to an older state. */
-const FIRST_EPOCH = "0";
-
 export class Keeping {
-  private epoch = "";
+  /** Under which history all this is kept. */
+  epoch = UNNAMED;
+  private readonly only: string | null;
   private readonly device: Device;
   private readonly shelf: Shelf;
   private readonly onChange: () => void;
@@ -34,9 +33,12 @@ export class Keeping {
   private failed = false;
   private closed = false;
 
-  constructor(device: Device, shelf: Shelf, onChange: () => void) {
+  /** `only` this history, if it is given; else the one that was used last. */
+  constructor(device: Device, shelf: Shelf, only: string | null, onChange: () => void) {
     this.device = device;
     this.shelf = shelf;
+    this.only = only;
+    this.epoch = only ?? UNNAMED;
     this.onChange = onChange;
   }
 
@@ -45,10 +47,23 @@ export class Keeping {
     return this.opened && !this.failed && this.waits.length === 0;
   }
 
-  /** Begins an epoch of its own without looking at what is kept. */
-  begin(): void {
-    this.epoch = freshId();
-    this.opened = true;
+  /** The server has said which history this is: what was kept without a name moves there. */
+  name(epoch: string, waiting: () => readonly Waiting[]): void {
+    if (this.epoch === UNNAMED) void this.move(epoch, waiting);
+  }
+
+  private async move(epoch: string, waiting: () => readonly Waiting[]): Promise<void> {
+    while (this.writing !== null) await this.writing;
+    this.epoch = epoch;
+    this.waits = [...waiting()];
+    this.tail = TAIL + 1; // the copy is written whole
+    this.flush();
+    while (this.writing !== null) await this.writing;
+    try {
+      if (this.opened && !this.failed) await this.device.forget(this.shelf, UNNAMED);
+    } catch (error) {
+      this.fail(error);
+    }
   }
 
   /** What is kept; `late` is called when the device answers only after we went on without it. */
@@ -70,9 +85,12 @@ export class Keeping {
 
   private async read(): Promise<Kept | null> {
     try {
-      const kept = await this.device.read(this.shelf);
+      const all = await this.device.read(this.shelf);
+      // It may have been named meanwhile.
+      const only = this.epoch === UNNAMED ? this.only : this.epoch;
+      const kept = (only === null ? all.at(-1) : all.find((each) => each.epoch === only)) ?? null;
       this.opened = true;
-      this.epoch = kept?.epoch ?? FIRST_EPOCH;
+      this.epoch = kept?.epoch ?? this.epoch;
       this.seq = Math.max(this.seq, kept?.seq ?? 0);
       this.tail += kept?.known.length ?? 0;
       if (this.waits.length > 0) this.flush();
@@ -84,11 +102,9 @@ export class Keeping {
   }
 
   /** The person changed something. */
-  edited(update: Uint8Array): Waiting {
-    const edit = { id: freshId(), update, at: Date.now() };
+  edited(edit: Waiting): void {
     this.waits.push(edit);
     this.flush();
-    return edit;
   }
 
   /** Something durable came from the server. */
@@ -114,7 +130,8 @@ export class Keeping {
   /** Forgets everything that is kept of this epoch. */
   async forget(): Promise<void> {
     clearTimeout(this.timer);
-    await this.writing;
+    this.waits = [];
+    while (this.writing !== null) await this.writing;
     this.waits = [];
     this.known = [];
     this.durable = [];

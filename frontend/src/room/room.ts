@@ -12,6 +12,8 @@ export type Why =
   | "forbidden"
   | "no-such-graph"
   | "other-epoch"
+  | "other-client"
+  | "differs"
   | "not-accepted"
   | "restarting"
   | "too-slow";
@@ -40,7 +42,9 @@ export interface Room {
   settled(signal?: AbortSignal): Promise<number>;
   /** Tries at once, also after a refusal (the person signed in again, say). */
   reconnect(): void;
-  /** The edits that wait on another history of the graph; null unless `why` is `other-epoch`. */
+  /** Which history is kept here, and which one the server named last; empty when none is known. */
+  histories(): { readonly here: string; readonly theirs: string };
+  /** The edits that are not durable, as values; null when there are none. */
   stranded(): Stranded | null;
   /** Forgets everything kept here of this history, edits that wait included. */
   forget(): Promise<void>;
@@ -54,7 +58,7 @@ export interface Socket {
   readonly readyState: number;
   onopen: (() => void) | null;
   onmessage: ((event: { data: unknown }) => void) | null;
-  onclose: ((event: { code: number }) => void) | null;
+  onclose: ((event: { code: number; reason?: string }) => void) | null;
   onerror: (() => void) | null;
   send(data: Uint8Array<ArrayBuffer>): void;
   close(code?: number): void;
@@ -83,8 +87,8 @@ export type Admit = (again: boolean) => Promise<Why | null>;
 export interface Keep extends Shelf {
   /** The browser's storage by default. */
   readonly device?: Device;
-  /** Begins anew: what is kept of an older history stays where it is and is not shown. */
-  readonly anew?: boolean;
+  /** Only this history: what is kept of others stays where it is and is not shown. */
+  readonly epoch?: string;
 }
 
 /** The address of a graph's room on the server that the page came from. */

@@ -3,7 +3,6 @@
 import {
   createContext,
   type ReactNode,
-  useCallback,
   useContext,
   useEffect,
   useMemo,
@@ -11,68 +10,32 @@ import {
   useState,
   useSyncExternalStore,
 } from "react";
-import type * as Y from "yjs";
-import { undoOf } from "../graph/edit";
 import { EMPTY_GRAPH, type Graph } from "../graph/model";
-import { followGraph, type GraphSource } from "../graph/read";
-import { type ConnectOptions, connect, type Keep, type Link, type Room } from "./connect";
+import type { Keep, Link } from "./connect";
 import { browser, type OtherPerson } from "./device";
-import { doorOf } from "./door";
-import { applyDifference, type Stranded } from "./history";
-import { type Person, type PresenceSource, presenceOf, type View } from "./presence";
+import { type Stranded, strandedOf } from "./history";
+import type { OpenRoom } from "./open-room";
+import type { Person, View } from "./presence";
+import { type Notice, type Stay, Visit } from "./visit";
 
-/** Everything that belongs to one open graph. */
-export interface OpenRoom {
-  readonly room: Room;
-  readonly doc: Y.Doc;
-  readonly source: GraphSource;
-  readonly presence: PresenceSource;
-  readonly undo: Y.UndoManager;
-}
+export type { OpenRoom } from "./open-room";
 
-/** What to do about edits that wait on a history which the server has left. */
+/** What there is to decide about edits that wait on a history which the server has left. */
 export interface Choice {
   readonly stranded: Stranded;
-  /**
-   * Opens the graph as the server has it now, makes the same changes there as one fresh edit, and
-   * lets go of the old ones once that is stored. Answers how many keys changed. When it fails, the
-   * old ones are still on the device.
-   */
-  apply(): Promise<number>;
-  /** Lets go of the edits and opens the graph as the server has it now. */
+  /** Makes these of the changes in the graph as it is now, and lets go of the rest once stored. */
+  apply(chosen: Stranded["difference"]): Promise<number>;
+  /** Lets go of the edits. */
   drop(): Promise<void>;
 }
 
 interface Held {
-  readonly open: OpenRoom;
+  readonly visit: Visit;
+  readonly stay: Stay;
   readonly keep: Keep | undefined;
-  begin(difference: Stranded["difference"] | null): Promise<number>;
 }
 
 const RoomContext = createContext<Held | null>(null);
-
-/** Opens a room without React; `leave` closes all of it. */
-export function openRoom(options: ConnectOptions): OpenRoom & { leave(): void } {
-  const room = connect(options);
-  const source = followGraph(room.doc);
-  const presence = presenceOf(room.awareness);
-  const undo = undoOf(room.doc);
-  return {
-    room,
-    doc: room.doc,
-    source,
-    presence,
-    undo,
-    leave() {
-      presence.close();
-      source.close();
-      undo.destroy();
-      room.close();
-    },
-  };
-}
-
-type Opened = ReturnType<typeof openRoom>;
 
 /**
  * Keeps the room at `url` open as long as it is shown. Children see it through the hooks below.
@@ -90,62 +53,34 @@ export function RoomProvider({
   readonly fallback?: ReactNode;
   readonly children: ReactNode;
 }) {
-  const [open, setOpen] = useState<Opened | null>(null);
   const keep = useSteady(given);
-  const now = useRef<Opened | null>(null);
-  const enter = useCallback(
-    (anew: boolean): Opened => {
-      const fresh = openRoom({
-        url,
-        ...(keep && { keep: { ...keep, anew }, admit: doorOf(keep.graph, keep.person.id) }),
-      });
-      now.current = fresh;
-      setOpen(fresh);
-      return fresh;
-    },
-    [url, keep],
-  );
+  const [held, setHeld] = useState<Held | null>(null);
   useEffect(() => {
-    enter(false);
+    const visit = new Visit({ url, ...(keep && { keep }) });
+    const show = () => setHeld({ visit, stay: visit.now(), keep });
+    const stop = visit.onChange(show);
+    show();
     return () => {
-      now.current?.leave();
-      now.current = null;
-      setOpen(null);
+      stop();
+      visit.leave();
+      setHeld(null);
     };
-  }, [enter]);
+  }, [url, keep]);
+  useBeforeLeaving(held);
+  return held === null ? fallback : <RoomContext value={held}>{children}</RoomContext>;
+}
+
+/** Asks before the page is closed, when something would be lost by that. */
+function useBeforeLeaving(held: Held | null): void {
+  const open = held?.stay.open;
   useEffect(() => {
     const onLeave = (event: BeforeUnloadEvent) => {
-      const link = now.current?.room.link();
+      const link = open?.room.link();
       if (link && link.unsaved > 0 && !link.kept) event.preventDefault();
     };
     window.addEventListener("beforeunload", onLeave);
     return () => window.removeEventListener("beforeunload", onLeave);
-  }, []);
-  const begin = useCallback(
-    async (difference: Stranded["difference"] | null) => {
-      const old = now.current;
-      if (old === null) return 0;
-      if (difference === null) {
-        await old.room.forget();
-        old.leave();
-        enter(false);
-        return 0;
-      }
-      const { room, doc } = enter(true);
-      try {
-        await room.settled(untilRefused(room));
-        const changed = applyDifference(doc, difference);
-        await room.settled(untilRefused(room));
-        await old.room.forget();
-        return changed;
-      } finally {
-        old.leave();
-      }
-    },
-    [enter],
-  );
-  const held = useMemo(() => open && { open, keep, begin }, [open, keep, begin]);
-  return held === null ? fallback : <RoomContext value={held}>{children}</RoomContext>;
+  }, [open]);
 }
 
 /** The same object as long as graph and person are the same; the name in it is the newest. */
@@ -166,18 +101,6 @@ function useSteady(keep: Keep | undefined): Keep | undefined {
   }, [graph, device, id]);
 }
 
-/** Aborts when a room is refused. */
-function untilRefused(room: Room): AbortSignal {
-  const controller = new AbortController();
-  const stop = room.onLink(() => {
-    const { state, why } = room.link();
-    if (state !== "refused") return;
-    controller.abort(new Error(`the room is closed: ${why}`));
-    stop();
-  });
-  return controller.signal;
-}
-
 function useHeld(): Held {
   const held = useContext(RoomContext);
   if (held === null) throw new Error("useRoom needs a RoomProvider around it");
@@ -186,7 +109,7 @@ function useHeld(): Held {
 
 /** The room around this component. */
 export function useRoom(): OpenRoom {
-  return useHeld().open;
+  return useHeld().stay.open;
 }
 
 /** The graph now. Actions and relations that did not change are the same objects as before. */
@@ -230,29 +153,43 @@ export function useViewOf(client: number | null): View | null {
 
 /** What there is to decide about edits that wait on another history; null when nothing is. */
 export function useChoice(): Choice | null {
-  const { open, begin } = useHeld();
-  const { why } = useLink();
+  const { visit, stay } = useHeld();
+  const [stranded] = stay.stranded;
   return useMemo(() => {
-    const stranded = why === "other-epoch" ? open.room.stranded() : null;
-    if (stranded === null) return null;
+    if (stranded === undefined) return null;
     return {
       stranded,
-      apply: () => begin(stranded.difference),
-      drop: async () => void (await begin(null)),
+      apply: (chosen) => visit.apply(stranded, chosen),
+      drop: () => visit.drop(stranded),
     };
-  }, [open, begin, why]);
+  }, [visit, stranded]);
+}
+
+/** What may be said softly about this room, until it was read. */
+export function useNotice(): { readonly notice: Notice; dismiss(): void } | null {
+  const { visit, stay } = useHeld();
+  const { notice } = stay;
+  return useMemo(() => notice && { notice, dismiss: () => visit.dismiss() }, [visit, notice]);
 }
 
 const NOBODY: readonly OtherPerson[] = [];
 
 /** The others whose edits of this graph wait on this device until they sign in again. */
-export function useOthersWaiting(): readonly OtherPerson[] {
+export interface OthersWaiting {
+  readonly others: readonly OtherPerson[];
+  /** What somebody changed, to save it as a file; never to send it. */
+  read(id: string): Promise<readonly Stranded[]>;
+  /** Lets go of somebody's edits for good. */
+  forget(id: string): Promise<void>;
+}
+
+export function useOthersWaiting(): OthersWaiting {
   const { keep } = useHeld();
   const [others, setOthers] = useState(NOBODY);
+  const device = keep && (keep.device ?? browser());
   useEffect(() => {
-    if (keep === undefined) return;
+    if (keep === undefined || device === undefined) return;
     let gone = false;
-    const device = keep.device ?? browser();
     device.others(keep).then(
       (found) => !gone && setOthers(found),
       () => !gone && setOthers(NOBODY), // a device that keeps nothing keeps nobody's
@@ -260,8 +197,24 @@ export function useOthersWaiting(): readonly OtherPerson[] {
     return () => {
       gone = true;
     };
-  }, [keep]);
-  return others;
+  }, [keep, device]);
+  return useMemo(() => {
+    const waiting = async (id: string) => {
+      if (keep === undefined || device === undefined) return [];
+      const all = await device.read({ graph: keep.graph, person: { id, name: "" } });
+      return all.filter((kept) => kept.waiting.length > 0);
+    };
+    return {
+      others,
+      read: async (id) => (await waiting(id)).map(strandedOf),
+      forget: async (id) => {
+        if (keep === undefined || device === undefined) return;
+        const shelf = { graph: keep.graph, person: { id, name: "" } };
+        for (const { epoch } of await waiting(id)) await device.forget(shelf, epoch);
+        setOthers((now) => now.filter((other) => other.id !== id));
+      },
+    };
+  }, [keep, device, others]);
 }
 
 /** Whether there is something to undo or redo. */

@@ -35,6 +35,8 @@ const refusals: Readonly<Record<Why, string>> = {
   forbidden: "You may look at this graph, not change it.",
   "no-such-graph": "This graph is gone.",
   "other-epoch": "The server went back to an older state of this graph, from a backup perhaps.",
+  "other-client": "This page is opened anew.",
+  differs: "This page showed something else than the server has and is opened anew.",
   "not-accepted": "The server refused a change.",
   restarting: "The server restarts.",
   "too-slow": "The connection is too slow.",

@@ -65,9 +65,10 @@ class Taken:
         self.panicked = False
 
 
-def refuse(offer: Offer, code: int, reason: Refused) -> None:
+def refuse(offer: Offer, code: int, reason: Refused, said: str | None = None) -> None:
+    """Take nothing of an offer; `said` is what its socket is told beside the code."""
     if offer.member is not None:
-        offer.member.refuse(code)
+        offer.member.refuse(code, said)
     if offer.done is not None and not offer.done.done():
         offer.done.set_exception(reason)
 

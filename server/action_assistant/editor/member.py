@@ -35,6 +35,7 @@ class Member:
         self.acks: Final = acks
         self.synced = False  # has been sent the document
         self.refused = False  # nothing more is taken from it
+        self.said: str | None = None  # why, where the close code does not tell enough
         self.handled = 0  # edits of this socket that the room has dealt with
         self._heard = 0  # edits that the socket brought
         self._frames: deque[bytes] = deque()
@@ -144,9 +145,10 @@ class Member:
             self._room_again.set()
             self._news.set()
 
-    def refuse(self, code: int) -> None:
+    def refuse(self, code: int, said: str | None = None) -> None:
         """End this socket for what it did; what it sent after that is not looked at."""
         self.refused = True
+        self.said = self.said if self.closed else said
         self.close(code)
 
     @property

@@ -238,7 +238,8 @@ class Room:
                 continue
             except Foreign as error:
                 log.warning("%s: %s forged an edit: %s", self.stream, item.author, error)
-                refuse(item, wire.FORBIDDEN, BadInput("The update speaks for somebody else."))
+                reason = BadInput("The update speaks for somebody else.")
+                refuse(item, wire.FORBIDDEN, reason, wire.OTHER_CLIENT)
                 continue
             except TooMuchWaits:
                 refuse(item, wire.TOO_BIG, TooLarge("Too much waits for what never came."))

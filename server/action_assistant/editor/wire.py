@@ -39,6 +39,9 @@ REASONS: Final = {
     OTHER_EPOCH: "other epoch",
 }
 
+#: In the place of FORBIDDEN's: a page then takes another client id and goes on.
+OTHER_CLIENT: Final = "client id of another person"
+
 UPDATE_LIMIT: Final = 1 << 20  # bytes
 NOTHING_NEW: Final = b"\x00\x00"  # an update without structs and deletions
 

@@ -86,7 +86,7 @@ async def _converse(socket: Socket, room: Room, member: Member) -> None:
         room.leave(member)
     if code != _NORMAL:
         with anyio.move_on_after(_GOODBYE):
-            await socket.close(code, wire.REASONS.get(code))
+            await socket.close(code, member.said or wire.REASONS.get(code))
 
 
 async def _listen(socket: Socket, room: Room, member: Member) -> None:

@@ -1,0 +1,38 @@
+/** Everything that belongs to one open graph. */
+
+import type * as Y from "yjs";
+import { undoOf } from "../graph/edit";
+import { followGraph, type GraphSource } from "../graph/read";
+import { type ConnectOptions, connect, type Room } from "./connect";
+import { type PresenceSource, presenceOf } from "./presence";
+
+export interface OpenRoom {
+  readonly room: Room;
+  readonly doc: Y.Doc;
+  readonly source: GraphSource;
+  readonly presence: PresenceSource;
+  readonly undo: Y.UndoManager;
+}
+
+export type Opened = OpenRoom & { leave(): void };
+
+/** Opens a room; `leave` closes all of it. */
+export function openRoom(options: ConnectOptions): Opened {
+  const room = connect(options);
+  const source = followGraph(room.doc);
+  const presence = presenceOf(room.awareness);
+  const undo = undoOf(room.doc);
+  return {
+    room,
+    doc: room.doc,
+    source,
+    presence,
+    undo,
+    leave() {
+      presence.close();
+      source.close();
+      undo.destroy();
+      room.close();
+    },
+  };
+}
