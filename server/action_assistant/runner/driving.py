@@ -115,7 +115,7 @@ class OpenRun:
         self._stop_trouble = ""
         self._hung = ""
         self._early: list[Report] = []
-        self._rest = Rest()
+        self._rest = Rest(exact=owns_link)
         self._heard_at = anyio.current_time()
         self._began_at = anyio.current_time()
         self._seen_wall: int | None = None
@@ -298,10 +298,11 @@ class OpenRun:
             except (NoAnswer, TimeoutError) as nothing:
                 self._hear_nothing(str(nothing))
             else:
-                self._take(answer, order)
+                self._take(answer, order, began)
                 await self._compare(answer)
             cost = anyio.current_time() - began
-            pace = _STOP_POLL_S if self._stop_wanted.is_set() else _POLL_S
+            hurry = self._stop_wanted.is_set() or self._rest.pending
+            pace = _STOP_POLL_S if hurry else _POLL_S
             wait = max(pace, 5 * cost)
 
     def _hear_nothing(self, why: str) -> None:
@@ -311,7 +312,7 @@ class OpenRun:
             at = self._wall()
             self.tell(Silent(at, at - round(silent * 1e6), self._stop_trouble))
 
-    def _take(self, answer: Answer, order: int) -> None:
+    def _take(self, answer: Answer, order: int, asked: float) -> None:
         """Draw the conclusions that one answer allows, and no others."""
         name = self.run.graph_name
         if len({self.run.incarnation, answer.incarnation} - {None, ""}) > 1:
@@ -336,7 +337,7 @@ class OpenRun:
         shown = [own, *(part for part in parts if part.run in {None, self.run.id})]
         self._note(shown)
         if servers == 1:
-            self._conclude(shown, answer, order)
+            self._conclude(shown, answer, order, asked)
         else:
             self._stop_trouble = _SEVERAL.format(servers=servers or "no")
 
@@ -380,12 +381,11 @@ class OpenRun:
             since = answer.at - round(waited * 1e6)
             self.tell(Silent(answer.at, since, "The engine answers but does not show this run."))
 
-    def _conclude(self, shown: list[Snapshot], answer: Answer, order: int) -> None:
-        own, moving = shown[0], any(each.active for each in shown)
-        at_rest = not moving and self._rest.seen(own)
+    def _conclude(self, shown: list[Snapshot], answer: Answer, order: int, asked: float) -> None:
+        own, at_rest = shown[0], self._rest.seen(shown, asked)
         if self.run.desired != "stopped":
             end = self.run.apparent_end
-            if end is not None and own.state in TERMINAL and not moving:
+            if end is not None and own.state in TERMINAL and at_rest:
                 self._end(end, "")
             return
         if self._stop_sent is None or order <= self._stop_sent:
@@ -393,6 +393,8 @@ class OpenRun:
         if at_rest:
             self.tell(Proof(answer.at, answer.asked_at, hash_of(shown)))
             self._end(self.run.apparent_end or "stopped", "")
+        elif self._rest.pending:
+            self._stop_trouble = "nothing moves, but an action may still be about to begin"
         elif own.state == "FINISHED":
             self._stop_trouble = (
                 "the graph has finished, so the engine ignores Stop, while "

@@ -10,7 +10,9 @@ import msgspec
 from action_assistant.runner.links.port import Link, NotSent
 from action_assistant.runner.seen import TERMINAL, Snapshot
 
-_REST_S: Final = 1.0  # a graph that never began is believed only after it was seen so for this long
+_LOADING_S: Final = 1.0  # an action that is triggered for the first time has begun within this time
+_STARTING_S: Final = 0.3  # and one that has run before within this
+_NEVER_BEGAN: Final = frozenset({"UNINITIALIZED", "INITIALIZED"})
 _SEND_S: Final = 1.0
 
 
@@ -32,23 +34,37 @@ def hash_of(shown: Sequence[Snapshot]) -> str:
 
 
 class Rest:
-    """Whether a graph will not move by itself. RUNNING without a running node may be about to start
-    one; one that never began has been seen between two steps of its start."""
+    """Whether a graph will not move by itself.
 
-    def __init__(self) -> None:
+    An engine that stops or finishes a graph passes by an action that it has triggered and that is
+    still being loaded: that one begins a little later, in a graph that has ended (recorded). So one
+    look is not enough: a graph must be seen at rest for a while, a longer one when it has actions
+    that have never begun. RUNNING without a running action may always be about to start one. `exact`
+    is an engine that hides nothing, as the simulator.
+    """
+
+    def __init__(self, *, exact: bool) -> None:
+        self._exact = exact
         self._since: float | None = None
 
     def forget(self) -> None:
         """It was not seen."""
         self._since = None
 
-    def seen(self, graph: Snapshot) -> bool:
-        """After one more look at the graph."""
-        if graph.state in TERMINAL:
-            return True
-        if graph.state not in {"UNINITIALIZED", "INITIALIZED"}:
+    @property
+    def pending(self) -> bool:
+        """Whether it looked at rest, but not for long enough yet."""
+        return self._since is not None
+
+    def seen(self, shown: Sequence[Snapshot], asked: float) -> bool:
+        """After one more look, asked for at `asked`, at a graph and then its sub-graphs."""
+        state = shown[0].state
+        moving = any(each.active for each in shown)
+        if moving or state not in TERMINAL | _NEVER_BEGAN:
             self._since = None
             return False
-        now = anyio.current_time()
-        self._since = self._since if self._since is not None else now
-        return now - self._since >= _REST_S
+        if self._exact and state in TERMINAL:
+            return True
+        idle = any(each in _NEVER_BEGAN for graph in shown for each in graph.nodes.values())
+        self._since = self._since if self._since is not None else anyio.current_time()
+        return asked - self._since >= (_LOADING_S if idle else _STARTING_S)

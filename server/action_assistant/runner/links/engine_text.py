@@ -1,0 +1,102 @@
+"""Reads the graphs that an engine writes into feedback and answers.
+
+They come from machines that anybody on the network may own: whatever is not as engines write it is
+refused with the reason, since a proof may rest on it.
+"""
+
+from typing import Literal
+
+import msgspec
+
+from action_assistant.runner.seen import Snapshot
+
+
+class NotAGraph(ValueError):
+    """The text is nothing that an engine writes; the message says why."""
+
+
+class _Runtime(msgspec.Struct, frozen=True):
+    messages: msgspec.Raw = msgspec.Raw(b"[]")
+
+
+class _Action(msgspec.Struct, frozen=True):
+    name: str
+    state: str
+    instance_id: int = 0
+    gui_attributes: msgspec.Raw = msgspec.Raw(b"{}")
+    runtime: msgspec.Raw = msgspec.Raw(b"{}")
+
+
+class _Graph(msgspec.Struct, frozen=True):
+    graph_name: str
+    graph_state: str
+    actions: tuple[_Action, ...] = ()
+
+
+class _Named(msgspec.Struct, frozen=True):
+    graph_name: str
+
+
+class _Ours(msgspec.Struct, frozen=True):
+    run: str | None = None
+
+
+class _Attributes(msgspec.Struct, frozen=True):
+    action_assistant: _Ours = _Ours()
+
+
+_GRAPH = msgspec.json.Decoder(_Graph)
+_NAMED = msgspec.json.Decoder(_Named)
+_ATTRIBUTES = msgspec.json.Decoder(_Attributes)
+_RUNTIME = msgspec.json.Decoder(_Runtime)
+_MESSAGES = msgspec.json.Decoder(tuple[str, ...])
+
+
+def snapshot(
+    text: str, *, at: int, source: Literal["get", "feedback"], asked_at: int | None = None
+) -> Snapshot:
+    """One graph as an engine shows it, seen at `at` (microseconds UTC). Raises NotAGraph."""
+    try:
+        graph = _GRAPH.decode(text)
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise NotAGraph(f"This is no graph as engines write them: {error}") from error
+    nodes = {f"{each.name}_{each.instance_id}": each for each in graph.actions}
+    messages = {name: _messages(each) for name, each in nodes.items()}
+    return Snapshot(
+        at=at,
+        graph=graph.graph_name,
+        state=graph.graph_state,
+        nodes={name: each.state for name, each in nodes.items()},
+        source=source,
+        asked_at=asked_at,
+        run=_run(graph.actions),
+        messages={name: said for name, said in messages.items() if said},
+    )
+
+
+def name_of(text: str) -> str:
+    """The name inside a graph's text; empty where there is none."""
+    try:
+        return _NAMED.decode(text).graph_name
+    except (msgspec.DecodeError, RecursionError):
+        return ""
+
+
+def _run(actions: tuple[_Action, ...]) -> str | None:
+    """The run whose mark every action carries; a graph that was put together from others has none."""
+    marks = {_mark(each) for each in actions}
+    return marks.pop() if len(marks) == 1 else None
+
+
+def _mark(action: _Action) -> str | None:
+    try:
+        return _ATTRIBUTES.decode(action.gui_attributes).action_assistant.run
+    except msgspec.DecodeError:  # others may keep there what they like
+        return None
+
+
+def _messages(action: _Action) -> tuple[str, ...]:
+    try:
+        return _MESSAGES.decode(_RUNTIME.decode(action.runtime).messages)
+    except msgspec.DecodeError:
+        return ()

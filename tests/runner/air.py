@@ -1,0 +1,527 @@
+"""A domain of ROS 2 in virtual time: stand-in robots, messages that take time and get lost, and a
+discovery that lags behind, as the links over rclpy see one."""
+
+import asyncio
+import random
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import anyio
+import msgspec
+
+from action_assistant.runner.links.engine_text import name_of, snapshot
+from action_assistant.runner.links.port import Answer as Answered
+from action_assistant.runner.links.port import (
+    Command,
+    EngineChanged,
+    EngineLog,
+    ForeignCommand,
+    NoAnswer,
+    NotSent,
+    Order,
+    Report,
+    Standing,
+)
+from action_assistant.runner.links.port import Feedback as Shown
+from action_assistant.runner.seen import Snapshot
+from action_assistant.runner.standin_engine import StandIn
+from action_assistant.runner.standin_wire import (
+    NODE,
+    Answer,
+    Feedback,
+    Gone,
+    Line,
+    Message,
+    Modify,
+    Pause,
+    Resume,
+    Start,
+    Stop,
+)
+from runner.world import wall
+
+Sound = object
+
+
+class Endpoint(msgspec.Struct, frozen=True):
+    """An end of a node, as discovery shows it."""
+
+    gid: str
+    process: str
+    logger: str
+    type_hash: str
+
+
+class Heard(msgspec.Struct, frozen=True, kw_only=True):
+    """A command of somebody else."""
+
+    command: Command
+    graph: str
+    umrf: str
+    targets: tuple[str, ...]
+    sender: str
+
+
+class LogLine(msgspec.Struct, frozen=True):
+    """A line of a log."""
+
+    logger: str
+    text: str
+
+
+class Got(msgspec.Struct, frozen=True, kw_only=True):
+    """What a server answered."""
+
+    graphs: tuple[Snapshot, ...]
+    texts: dict[str, str]
+    known_actions: tuple[str, ...]
+    known_graphs: tuple[str, ...]
+
+
+class Kinds(msgspec.Struct, frozen=True):
+    """What the air talks in; the link over rclpy has its own."""
+
+    endpoint: Callable[..., Any] = Endpoint
+    heard: Callable[..., Any] = Heard
+    line: Callable[..., Any] = LogLine
+    got: Callable[..., Any] = Got
+
+
+LEASE_S = 10.0  # until discovery knows of a death that nobody announced
+GRAIN_MS = 0.01  # clocks are not finer: what is due so soon is due now
+GAP_S = 0.05  # between two messages on one topic
+OURS = "ours"
+HASH = "RIHS01_current"
+
+
+def now_ms() -> float:
+    """Virtual milliseconds, as robots count them."""
+    return now() * 1000
+
+
+def now() -> float:
+    """Virtual seconds, also where no task runs: messages come in by callbacks of the loop."""
+    return asyncio.get_running_loop().time()
+
+
+class Node:
+    """An engine node in the air: a stand-in and what discovery knows of it."""
+
+    def __init__(self, air: "Air", robot: StandIn, path: str, lag_s: float) -> None:
+        air.born += 1
+        self.air = air
+        self.robot = robot
+        self.path = path
+        self.process = f"process{air.born}"
+        self.type_hash = HASH
+        self.matched_at = now() + 0.02  # hears from then on
+        self.seen_at = self.matched_at + lag_s  # and is known to be there a little later
+        self.unseen_at = float("inf")
+        self.call: asyncio.TimerHandle | None = None  # when it has something to say again
+
+    @property
+    def hears(self) -> bool:
+        """Whether messages reach it."""
+        return not self.robot.gone and now() >= self.matched_at
+
+    @property
+    def seen(self) -> bool:
+        """Whether discovery shows it, rightly or not."""
+        return self.seen_at <= now() < self.unseen_at
+
+    def end(self, of: str) -> Any:
+        """One of its ends."""
+        return self.air.kinds.endpoint(
+            gid=f"{self.process}/{of}",
+            process=self.process,
+            logger=NODE,
+            type_hash=self.type_hash,
+        )
+
+
+class Outlet:
+    """One command topic of ours: messages leave one by one, `GAP_S` apart."""
+
+    def __init__(self, air: "Air") -> None:
+        self._air = air
+        self._turn = anyio.Lock()
+
+    async def send(self, make: Callable[[], Any]) -> None:
+        """Publish what `make` gives when it is its turn; None is nothing."""
+        async with self._turn:
+            message = make()
+            if message is not None:
+                self._air.carry(wire(message))
+                await anyio.sleep(GAP_S)
+
+
+class Outlets:
+    """Everything that our commands leave by."""
+
+    def __init__(self, air: "Air") -> None:
+        self.start, self.stop, self.pause = Outlet(air), Outlet(air), Outlet(air)
+        self.resume, self.modify = Outlet(air), Outlet(air)
+        self._stopping: dict[str, set[str]] = {}
+
+    async def send_stop(self, graph: str, target: str) -> None:
+        """Publish a stop; those of one graph that wait leave together."""
+        self._stopping.setdefault(graph, set()).add(target)
+
+        def gathered() -> Stop | None:
+            targets = self._stopping.pop(graph, None)
+            return targets and Stop(graph_name=graph, targets=tuple(sorted(targets)))
+
+        await self.stop.send(gathered)
+
+
+def wire(message: Any) -> Message:
+    """A message as stand-ins take it, also when it is one of ROS."""
+    if isinstance(message, Message):
+        return message
+    kind = {
+        "UmrfGraphStart": Start, "UmrfGraphPause": Pause, "UmrfGraphResume": Resume,
+        "UmrfGraphModify": Modify,
+    }[type(message).__name__]  # fmt: skip
+    fields = {
+        "graph_name": message.umrf_graph_name,
+        "targets": tuple(message.targets),
+    }
+    if kind is Start:
+        fields["graph_json"] = message.umrf_graph_json
+    if kind is Modify:
+        fields["modified_graph"] = message.modified_graph
+        fields["continue_from"] = message.continue_from
+    return kind(**fields)
+
+
+class Air:
+    """One domain. `loss` is the chance that a message of that topic, or `get`, gets lost on its way
+    to one node; `late_s` how long starts take."""
+
+    def __init__(self, chance: random.Random | None = None, kinds: Kinds = Kinds()) -> None:  # noqa: B008 - frozen
+        self.number = 7
+        self.kinds = kinds
+        self.own_hash = HASH
+        self.joined_at = now()
+        self.actors: set[str] = set()
+        self.outlets = Outlets(self)
+        self.chance = chance or random.Random(0)
+        self.loss: dict[str, float] = {}
+        self.late_s = 0.0
+        self.old_s = 0.0
+        self.strangers = 0
+        self.born = 0
+        self.nodes: list[Node] = []
+        self.sent: list[tuple[float, Message]] = []
+        self.delivered: list[tuple[float, Message]] = []
+        self._ears: list[Callable[[Sound], None]] = []
+        self._asked: dict[int, tuple[anyio.Event, list[Answer]]] = {}
+        self._tickets = 0
+        self._handles: set[asyncio.TimerHandle] = set()
+
+    # --- nodes --------------------------------------------------------------------------------
+
+    def join(self, robot: StandIn, path: str = "/umrf_graph_get", lag_s: float = 0.0) -> Node:
+        """A node comes up."""
+        node = Node(self, robot, path, lag_s)
+        self.nodes.append(node)
+        self.stir(node)
+        return node
+
+    def kill(self, node: Node) -> None:
+        """It dies, and discovery learns it much later."""
+        node.robot.kill()
+        node.unseen_at = min(node.unseen_at, now() + LEASE_S)
+
+    async def blow(self) -> None:
+        """The messages that are under way when this is cancelled never arrive."""
+        try:
+            await anyio.sleep_forever()
+        finally:
+            for handle in self._handles:
+                handle.cancel()
+
+    def stir(self, node: Node) -> None:
+        """Hear what a node says by now, and come back when it has more to say."""
+        if node.call is not None:
+            node.call.cancel()
+            self._handles.discard(node.call)
+        for said in node.robot.advance(now_ms() + GRAIN_MS):
+            self._hear(node, said)
+        due = node.robot.due
+        node.call = None if due is None else self._at(max(due / 1000, now()), self.stir, node)
+
+    def _at(self, when: float, work: Callable[..., Any], *given: Any) -> asyncio.TimerHandle:
+        def done() -> None:
+            self._handles.discard(handle)
+            work(*given)
+
+        handle = asyncio.get_running_loop().call_at(when, done)
+        self._handles.add(handle)
+        return handle
+
+    def _hear(self, node: Node, said: object) -> None:
+        match said:
+            case Answer(ticket=ticket):
+                if ticket in self._asked:
+                    event, got = self._asked[ticket]
+                    self._later(self.chance.random() * self.old_s, lambda: _put(event, got, said))
+            case Feedback(actor=actor, history=history):
+                self.show(actor, history)
+            case Line(text=text):
+                self.tell(self.kinds.line(NODE, text))
+            case Gone():
+                node.unseen_at = min(node.unseen_at, now())
+
+    # --- messages -----------------------------------------------------------------------------
+
+    def carry(self, message: Message, stranger: str = "") -> None:
+        """A command on its way to every node; the one of a stranger is overheard by us."""
+        self.sent.append((now(), message))
+        late = self.late_s if isinstance(message, Start) and not stranger else 0.0
+        for node in self.nodes:
+            if self.chance.random() >= self.loss.get(message.topic, 0.0):
+                takes = late + 0.001 * (1 + self.chance.random())
+                self._later(takes, lambda node=node: self._deliver(node, message))
+        if stranger:
+            self._overhear(message, stranger)
+
+    def _ask(self, node: Node, ticket: int) -> None:
+        if node.hears:
+            node.robot.ask(ticket, now_ms())
+            self.stir(node)
+
+    def _deliver(self, node: Node, message: Message) -> None:
+        if node.hears:
+            self.delivered.append((now(), message))
+            node.robot.hear(message, now_ms())
+            self.stir(node)
+
+    def _overhear(self, message: Message, sender: str) -> None:
+        command: Command = message.topic  # type: ignore[assignment]
+        text = getattr(message, "graph_json", "") or getattr(message, "modified_graph", "")
+        self.tell(
+            self.kinds.heard(
+                command=command,
+                graph=name_of(text) or message.graph_name,
+                umrf=text,
+                targets=message.targets,
+                sender=sender,
+            )
+        )
+
+    def show(self, actor: str, history: Sequence[str]) -> None:
+        """Feedback, of a node or of somebody who only says so."""
+        at = wall()
+        self.actors.add(actor)
+        seen = tuple(snapshot(text, at=at, source="feedback") for text in reversed(history))
+        self.tell(Shown(actor=actor, snapshots=seen))
+
+    def tell(self, sound: Sound) -> None:
+        """Everybody who listens hears it."""
+        for ear in tuple(self._ears):
+            ear(sound)
+
+    def _later(self, wait_s: float, work: Callable[[], None]) -> None:
+        self._at(now() + wait_s, work)
+
+    # --- what a link asks of a domain ---------------------------------------------------------
+
+    async def ask(self, path: str) -> Any:
+        """The first answer of whoever serves a path."""
+        asked_at = wall()
+        self._tickets += 1
+        ticket, event, got = self._tickets, anyio.Event(), list[Answer]()
+        self._asked[ticket] = event, got
+        for node in self.nodes:
+            if node.path == path and self.chance.random() >= self.loss.get("get", 0.0):
+                takes = 0.0005 * (1 + self.chance.random())
+                self._later(takes, lambda node=node: self._ask(node, ticket))
+        try:
+            await event.wait()
+        finally:
+            del self._asked[ticket]
+        at, texts, graphs = wall(), {}, []
+        for text in got[0].running:
+            shown = snapshot(text, at=at, source="get", asked_at=asked_at)
+            graphs.append(shown)
+            texts[shown.graph] = text
+        return self.kinds.got(
+            graphs=tuple(graphs),
+            texts=texts,
+            known_actions=got[0].umrfs,
+            known_graphs=got[0].indexed,
+        )
+
+    def client(self, path: str) -> None:
+        """Nothing has to be made."""
+
+    def servers(self, path: str) -> tuple[Any, ...]:
+        """Who answers on a path, as far as discovery knows."""
+        return tuple(each.end("get") for each in self.nodes if each.seen and each.path == path)
+
+    def listeners(self, topic: str) -> tuple[Any, ...]:
+        """Who listens, as far as discovery knows."""
+        return tuple(each.end(topic) for each in self.nodes if each.seen)
+
+    def publishers(self, topic: str) -> tuple[Any, ...]:
+        """Who publishes feedback, or commands beside us."""
+        if topic.endswith("feedback"):
+            return tuple(each.end(topic) for each in self.nodes if each.seen)
+        return tuple(
+            self.kinds.endpoint(f"s{i}", f"s{i}", "cli", HASH) for i in range(self.strangers)
+        )
+
+    def paths(self) -> tuple[str, ...]:
+        """Every path that somebody serves."""
+        return tuple(sorted({each.path for each in self.nodes if each.seen}))
+
+    @contextmanager
+    def hearing(self, ear: Callable[[Sound], None]) -> Iterator[None]:
+        """Be told what comes by itself."""
+        self._ears.append(ear)
+        try:
+            yield
+        finally:
+            self._ears.remove(ear)
+
+
+def _put(event: anyio.Event, got: list[Answer], answer: Any) -> None:
+    got.append(answer)
+    event.set()
+
+
+class AirLink:
+    """A link to one robot through the air, by the rules of the one over rclpy: an answer counts only
+    while the same one server stands on the path before and after."""
+
+    simulated = False
+    pauses = False
+
+    def __init__(self, air: Air, name: str, path: str = "/umrf_graph_get") -> None:
+        self._air = air
+        self._name = name
+        self._path = path
+        self._known = ""
+        self._ears: list[Callable[[Report], None]] = []
+        self._told: tuple[str, str] = ("", "")
+
+    @property
+    def standing(self) -> Standing:
+        """As discovery shows it now."""
+        servers = self._air.servers(self._path)
+        if len(servers) == 1:
+            self._known = servers[0].gid
+        return Standing(
+            state="answering" if len(servers) == 1 else "busy" if servers else "gone",
+            why="" if len(servers) == 1 else f"{len(servers)} engines answer on its path.",
+            incarnation=self._known,
+            generation="older" if any(e.type_hash != HASH for e in servers) else "current",
+            servers=len(servers),
+            listeners=dict.fromkeys(("start", "stop"), len(servers)),
+            others=len(self._air.publishers("start")),
+        )
+
+    async def start(self, order: Order) -> None:
+        """Publish one start."""
+        if self.standing.generation == "older":
+            raise NotSent("its messages are another generation")
+        if not self._air.servers(self._path):
+            raise NotSent("nobody listens")
+        message = Start(graph_name=order.graph.name, targets=(self._name,), graph_json=order.umrf)
+        await self._air.outlets.start.send(lambda: message)
+
+    async def stop(self, graph_name: str) -> None:
+        """Publish one stop, also when nobody seems to listen."""
+        await self._air.outlets.send_stop(graph_name, self._name)
+        if not self._air.servers(self._path):
+            raise NotSent("nobody listens")
+
+    async def pause(self, graph_name: str) -> None:
+        """Publish one pause."""
+        message = Pause(graph_name=graph_name, targets=(self._name,))
+        await self._air.outlets.pause.send(lambda: message)
+
+    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+        """Publish one resume."""
+        message = Resume(graph_name=graph_name, targets=(self._name,))
+        await self._air.outlets.resume.send(lambda: message)
+
+    async def modify(self, order: Order, continue_from: str = "") -> None:
+        """Publish one modify."""
+        message = Modify(
+            graph_name=order.graph.name,
+            targets=(self._name,),
+            modified_graph=order.umrf,
+            continue_from=continue_from,
+        )
+        await self._air.outlets.modify.send(lambda: message)
+
+    async def get(self) -> Answered:
+        """Ask the one server."""
+        before, asked_at = self._air.servers(self._path), wall()
+        if len(before) != 1:
+            raise NoAnswer(self.standing.why)
+        got = await self._air.ask(self._path)
+        if self._air.servers(self._path) != before:
+            raise NoAnswer("while it was asked, another engine came or went")
+        return Answered(
+            asked_at=asked_at,
+            at=wall(),
+            incarnation=before[0].gid,
+            graphs=got.graphs,
+            texts=got.texts,
+            known_actions=got.known_actions,
+            known_graphs=got.known_graphs,
+        )
+
+    async def run(self) -> None:
+        """Look every second who is there."""
+        with self._air.hearing(self._hear):
+            while True:
+                now = self.standing
+                if self._told != (now.state, now.incarnation):
+                    self._told = now.state, now.incarnation
+                    self._tell(
+                        EngineChanged(
+                            at=wall(), state=now.state, incarnation=now.incarnation, why=now.why
+                        )
+                    )
+                await anyio.sleep(1)
+
+    def _hear(self, sound: object) -> None:
+        match sound:
+            case Shown():
+                self._tell(sound)
+            case Heard() if self._name in sound.targets:
+                self._tell(
+                    ForeignCommand(
+                        at=wall(),
+                        command=sound.command,
+                        graph=sound.graph,
+                        umrf=sound.umrf,
+                        targets=sound.targets,
+                        sender=sound.sender,
+                    )
+                )
+            case LogLine(text=text):
+                self._tell(EngineLog(at=wall(), text=text))
+            case _:
+                pass
+
+    def _tell(self, report: Report) -> None:
+        for hear in tuple(self._ears):
+            hear(report)
+
+    @contextmanager
+    def listen(self, hear: Callable[[Report], None]) -> Iterator[None]:
+        """Everything that concerns this robot."""
+        self._ears.append(hear)
+        try:
+            yield
+        finally:
+            self._ears.remove(hear)
+
+    async def aclose(self) -> None:
+        """Nothing of its own."""
