@@ -1,0 +1,1 @@
+# The part of rcl_interfaces that this project uses.

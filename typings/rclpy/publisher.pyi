@@ -1,0 +1,9 @@
+from typing import Generic, TypeVar
+
+M = TypeVar("M")
+
+class Publisher(Generic[M]):
+    @property
+    def topic_name(self) -> str: ...
+    def publish(self, msg: M) -> None: ...
+    def get_subscription_count(self) -> int: ...

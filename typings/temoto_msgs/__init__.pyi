@@ -1,0 +1,1 @@
+# ros/temoto_msgs, as its generated classes look.
