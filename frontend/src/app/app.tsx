@@ -10,6 +10,7 @@ import { Refusal } from "../api/http";
 import { usePerson } from "../api/person";
 import { LiveProvider } from "../api/use-live";
 import { StopNotice } from "../runs/stop-notice";
+import { LiveRegion } from "../ui/announcer";
 import { actionCarrier } from "../ui/carry";
 import { CarriedGhost } from "../ui/placing";
 import { theme, variables } from "../ui/theme";
@@ -57,6 +58,7 @@ export function App() {
               <ReviewDialog />
               <StopNotice />
               <CarriedGhost carrier={actionCarrier} />
+              <LiveRegion />
             </DropFiles>
           </Live>
         </Gate>

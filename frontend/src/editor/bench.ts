@@ -29,7 +29,7 @@ export interface AddRequest {
   readonly into?: string;
 }
 
-export type Panel = "details" | "json" | "problems";
+export type Panel = "details" | "outline" | "json" | "comments" | "problems";
 export type Tool = "pan" | "select";
 
 /** What opens over the editor, one at a time. */
@@ -90,6 +90,7 @@ export interface Bench {
   setPanel(panel: Panel): void;
   openAdd(request?: AddRequest): void;
   open(surface: Surface | null): void;
+  openFind(): void;
   /** Where everything stands, also what has no place of its own. */
   places(): ReadonlyMap<Key, Position>;
   sizes(): ReadonlyMap<Key, { readonly width: number; readonly height: number }>;

@@ -1,6 +1,6 @@
 /** The editor of one graph: list, canvas, details and run strip, arranged for the screen at hand. */
 import { ActionIcon, SegmentedControl } from "@mantine/core";
-import { useLocalStorage, useMediaQuery } from "@mantine/hooks";
+import { useLocalStorage } from "@mantine/hooks";
 import { IconLayoutSidebar, IconLayoutSidebarRight } from "@tabler/icons-react";
 import { type ReactNode, useCallback, useMemo, useState, useSyncExternalStore } from "react";
 import { type Problems, useProblems } from "../api/graphs";
@@ -10,19 +10,23 @@ import type { Graph, Key } from "../graph/model";
 import { useLink } from "../room/use-room";
 import { marksOf } from "../ui/canvas/marks";
 import { actionCarrier } from "../ui/carry";
+import { useIsPhone, useIsWide } from "../ui/screen";
 import type { Crumb } from "../ui/top-bar";
 import { type Bench, BenchContext, freePlace, type Panel, placeAction } from "./bench";
 import { useShortcuts } from "./deeds/keys";
 import { Details } from "./details/details";
 import style from "./editor.module.css";
-import { Outline } from "./outline";
+import { FindBar } from "./find/find-bar";
+import { Outline } from "./outline/outline";
 import { People } from "./people";
 import { ProblemWord } from "./problem-word";
 import { QuickAdd } from "./quick-add";
 import { SavedWord } from "./saved-word";
 import { Stage } from "./stage";
 import { Surfaces } from "./surfaces";
+import { useTalkOnCards, useThreads } from "./talk/use-threads";
 import { useEditor } from "./use-bench";
+import { useRemoteNews, useRunNews } from "./use-news";
 
 /** What the page around the editor may want to know. */
 export interface Shown {
@@ -62,6 +66,17 @@ interface Props {
 
 type Pane = "canvas" | "outline" | "details" | "run";
 
+type Side = "library" | "outline";
+
+const SIDES = [
+  { value: "library", label: "Library" },
+  { value: "outline", label: "Outline" },
+];
+
+function focusOutline(): void {
+  document.querySelector<HTMLElement>('[role="treegrid"] [role="row"][tabindex="0"]')?.focus();
+}
+
 const PANES = [
   { value: "canvas", label: "Canvas" },
   { value: "outline", label: "Outline" },
@@ -86,8 +101,8 @@ function obstacleOf(
 
 export function Editor(props: Props) {
   const { id, known, progress } = props;
-  const wide = useMediaQuery("(min-width: 1101px)", true, { getInitialValueInEffect: false });
-  const phone = useMediaQuery("(max-width: 600px)", false, { getInitialValueInEffect: false });
+  const wide = useIsWide();
+  const phone = useIsPhone();
   const [left, setLeft] = useState(false);
   const [right, setRight] = useState(false);
   const [pane, setPane] = useState<Pane>("canvas");
@@ -97,15 +112,26 @@ export function Editor(props: Props) {
     getInitialValueInEffect: false,
   });
   const carrying = useSyncExternalStore(actionCarrier.subscribe, actionCarrier.now) !== null;
-  const onPanel = useCallback((_: Panel) => {
-    setRight(true);
-    setLeft(false);
-    setPane((now) => (now === "outline" ? "details" : now));
+  const [side, setSide] = useState<Side>("library");
+  const onPanel = useCallback((next: Panel) => {
+    const outline = next === "outline";
+    if (outline) setSide("outline");
+    setRight(!outline);
+    setLeft(outline);
+    setPane((now) => (outline ? "outline" : now === "outline" ? "details" : now));
+    if (outline) requestAnimationFrame(focusOutline);
   }, []);
-  const { bench, panel, adding, surface, sight, closeAdd, close } = useEditor(id, onPanel);
+  const { bench, panel, adding, finding, surface, sight, closeAdd, closeFind, close } = useEditor(
+    id,
+    onPanel,
+  );
   const link = useLink();
   const problems = useProblems(id, link.seq).data;
   const marks = useMemo(() => marksOf(problems?.problems ?? []), [problems]);
+  const threads = useThreads();
+  useTalkOnCards(threads);
+  useRemoteNews(bench.graph, link.seq > 0);
+  useRunNews(bench.graph, progress);
   useShortcuts(bench);
 
   const place = (template: NewAction) => {
@@ -144,9 +170,12 @@ export function Editor(props: Props) {
       corner={phone ? null : props.corner}
     />
   );
-  const details = <Details id={id} seq={link.seq} panel={panel} problems={problems} />;
   // A dry-run is told apart from runs: while it is open none of them is shown below it.
   const strip = bench.dryRun ? null : props.strip(shown);
+  const details = (
+    <Details id={id} seq={link.seq} panel={panel} problems={problems} threads={threads} />
+  );
+  const find = finding && <FindBar problems={problems?.problems ?? []} onClose={closeFind} />;
   return (
     <BenchContext value={bench}>
       {props.bar({
@@ -171,6 +200,7 @@ export function Editor(props: Props) {
             onChange={(next) => setPane(next as Pane)}
           />
           <div className={style.pane}>
+            {find}
             {pane === "canvas" && stage}
             {pane === "outline" && <Outline progress={progress} />}
             {pane === "details" && <div className={style.sheet}>{details}</div>}
@@ -190,10 +220,21 @@ export function Editor(props: Props) {
             data-open={wide || (left && !carrying) || undefined}
             aria-label="Library"
           >
-            {props.list(place)}
+            <SegmentedControl
+              className={style.sides ?? ""}
+              fullWidth
+              size="xs"
+              data={SIDES}
+              value={side}
+              onChange={(next) => setSide(next as Side)}
+            />
+            <div className={style.side}>
+              {side === "outline" ? <Outline progress={progress} /> : props.list(place)}
+            </div>
           </aside>
           <section className={style.canvas} aria-label="Graph">
             {stage}
+            {find}
             {!wide && (
               <>
                 <ActionIcon

@@ -11,6 +11,7 @@ import { Empty } from "../ui/empty";
 import { type Bench, useBench } from "./bench";
 import { Canvas } from "./canvas";
 import { DryRunBar } from "./dry-run/dry-run-bar";
+import { Robots } from "./robots";
 import style from "./stage.module.css";
 import { Toolbar } from "./toolbar";
 import type { EditorState } from "./use-bench";
@@ -104,6 +105,11 @@ function Inside({ me, sight, progress, marks, compact, phone, run, writing, corn
               Double-click the canvas, press <b>A</b>, or drag an action from the list. Then drag
               from Entry to it, and from its outcomes to what follows.
             </Empty>
+          </div>
+        )}
+        {!compact && (
+          <div className={style.robots}>
+            <Robots />
           </div>
         )}
         <div className={style.tools}>

@@ -45,8 +45,11 @@ export interface EditorState {
   readonly adding: AddRequest | null;
   readonly surface: Surface | null;
   readonly sight: RefObject<Sight>;
+  /** Whether the search in the graph is open. */
+  readonly finding: boolean;
   closeAdd(): void;
   close(): void;
+  closeFind(): void;
 }
 
 export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorState {
@@ -67,6 +70,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   const { readOnly, seq } = useLink();
   const { dryRun, begin: beginDryRun } = useDryRun(id, graph, seq);
   const mayEdit = role && readOnly === undefined;
+  const [finding, setFinding] = useState(false);
   const sight = useRef<Sight>({ view: BLIND, places: () => new Map(), sizes: () => new Map() });
 
   const select = useCallback(
@@ -79,7 +83,8 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   );
   const setPanel = useCallback(
     (next: Panel) => {
-      setPanelNow(next);
+      // The outline stands beside the panel of details, which stays as it is.
+      if (next !== "outline") setPanelNow(next);
       onPanel(next);
     },
     [onPanel],
@@ -100,6 +105,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   const download = useCallback((format: Format = "umrf") => {
     if (latest.current) void takeAway(latest.current, format);
   }, []);
+  const closeFind = useCallback(() => setFinding(false), []);
 
   const bench = useMemo<Bench>(
     () => ({
@@ -121,6 +127,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
       setPanel,
       openAdd,
       open: setSurface,
+      openFind: () => setFinding(true),
       view: {
         fit: () => sight.current.view.fit(),
         zoomIn: () => sight.current.view.zoomIn(),
@@ -157,5 +164,5 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
     ],
   );
   latest.current = bench;
-  return { bench, panel, adding, surface, sight, closeAdd, close };
+  return { bench, panel, adding, finding, surface, sight, closeAdd, closeFind, close };
 }

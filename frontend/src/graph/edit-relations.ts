@@ -211,6 +211,18 @@ export function retarget(
   });
 }
 
+/** Changes the places of two of a parent's relations, in the order in which their ends are started. */
+export function swapOrder(doc: Y.Doc, ids: readonly string[], one: number, other: number): void {
+  together(doc, () => {
+    settleGhosts(doc);
+    const next = [...ids];
+    [next[one], next[other]] = [ids[other] ?? "", ids[one] ?? ""];
+    for (const [i, id] of next.entries()) {
+      if (hasRelation(doc, id)) put(doc, "relations", `${id}|po`, i);
+    }
+  });
+}
+
 /** Puts an action into an arrow: it takes over what the arrow said, and its success leads on. */
 export function insertInto(doc: Y.Doc, id: string, key: Key): boolean {
   return together(doc, () => {

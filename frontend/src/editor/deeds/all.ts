@@ -6,6 +6,7 @@ import { DRY_RUN } from "./dry-run";
 import * as graph from "./graph";
 import * as look from "./look";
 import * as notes from "./notes";
+import { PANELS } from "./panels";
 
 export * from "./arrange";
 export * from "./draw";
@@ -51,6 +52,7 @@ export const DEEDS: readonly Deed[] = [
   notes.details,
   look.menu,
   look.showJson,
+  ...PANELS,
   look.keys,
   ...DRY_RUN,
   graph.exportUmrf,

@@ -1,9 +1,12 @@
 /** The panel on the right: properties of what is selected, JSON, problems. */
 import { Tabs } from "@mantine/core";
+import { IconMessageCircle } from "@tabler/icons-react";
 import type { Problems } from "../../api/graphs";
+import type { Thread } from "../../graph/comments";
 import { relationId } from "../../graph/layout";
 import { EXIT } from "../../graph/model";
 import { type Bench, type Panel, selectedActions, selectedRelations, useBench } from "../bench";
+import { Comments } from "../talk/comments";
 import { ActionForm } from "./action-form";
 import style from "./details.module.css";
 import { GraphForm } from "./graph-form";
@@ -17,6 +20,7 @@ interface Props {
   seq: number;
   panel: Panel;
   problems: Problems | undefined;
+  threads: readonly Thread[];
 }
 
 function title(bench: Bench): string {
@@ -49,8 +53,9 @@ function Properties() {
   return <GraphForm />;
 }
 
-export function Details({ id, seq, panel, problems }: Props) {
+export function Details({ id, seq, panel, problems, threads }: Props) {
   const bench = useBench();
+  const open = threads.filter((thread) => !thread.resolved).length;
   const count = problems?.problems.length ?? 0;
   const errors = problems?.problems.some((problem) => problem.severity === "error") ?? false;
   return (
@@ -65,6 +70,12 @@ export function Details({ id, seq, panel, problems }: Props) {
           {title(bench)}
         </Tabs.Tab>
         <Tabs.Tab value="json">JSON</Tabs.Tab>
+        <Tabs.Tab value="comments" aria-label={open === 0 ? "Comments" : `Comments, ${open} open`}>
+          <span className={style.tabWords}>
+            <IconMessageCircle size={15} aria-hidden />
+            {open > 0 && <span className={style.count}>{open}</span>}
+          </span>
+        </Tabs.Tab>
         <Tabs.Tab value="problems">
           Problems{" "}
           {count > 0 && (
@@ -83,6 +94,9 @@ export function Details({ id, seq, panel, problems }: Props) {
       </Tabs.Panel>
       <Tabs.Panel value="json" className={style.panel ?? ""} data-fill>
         <JsonView graph={id} seq={seq} />
+      </Tabs.Panel>
+      <Tabs.Panel value="comments" className={style.panel ?? ""}>
+        <Comments threads={threads} />
       </Tabs.Panel>
       <Tabs.Panel value="problems" className={style.panel ?? ""}>
         <ProblemList problems={problems} seq={seq} />

@@ -173,7 +173,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
       <Suspense fallback={<Skeleton height="100%" />}>
         <JsonEditor
           text={text}
-          readOnly={false}
+          readOnly={!bench.mayEdit}
           faults={faults}
           marked={marked}
           onChange={json.edit}

@@ -1,5 +1,5 @@
 /** An action on the canvas: robot, name, state, two parameters; input above, four outcomes below. */
-import { IconGhost2 } from "@tabler/icons-react";
+import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo } from "react";
 import type { Progress } from "../../api/progress";
@@ -10,6 +10,7 @@ import { duration, stopwatch, useNow } from "../when";
 import style from "./action-card.module.css";
 import type { CardNode } from "./elements";
 import { ProblemBadge } from "./problem-badge";
+import { useIsDim, useTalk } from "./spotlight";
 import { cardLines, lineText } from "./value-text";
 
 function ProgressLine({ progress }: { progress: Progress | null }) {
@@ -32,6 +33,8 @@ export const ActionCard = memo(function ActionCard({
   const { action, progress, mark, other } = data;
   const lines = cardLines(action.inputs, 2);
   const color = robotColor(action.actor);
+  const dim = useIsDim(action.actor);
+  const talk = useTalk(action.key);
   return (
     <div
       className={style.card}
@@ -40,6 +43,7 @@ export const ActionCard = memo(function ActionCard({
       data-selected={selected || undefined}
       data-tone={progress?.tone}
       data-ghost={action.missing || undefined}
+      data-dim={dim || undefined}
     >
       <Handle
         type="target"
@@ -51,6 +55,12 @@ export const ActionCard = memo(function ActionCard({
       />
       {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
       {mark && <ProblemBadge mark={mark} on="card" />}
+      {talk > 0 && (
+        <span className={style.talk} data-beside={mark ? true : undefined} title="Open comments">
+          <IconMessageCircle size={11} aria-hidden /> {talk}
+          <span className="visually-hidden"> open comments</span>
+        </span>
+      )}
       <div className={style.head}>
         <b className={style.name} title={action.name}>
           {action.missing && <IconGhost2 size={13} aria-hidden />}

@@ -1,0 +1,36 @@
+/** Deeds that look for something in the graph, or at another side of it. */
+import { IconListTree, IconMessageCircle, IconSearch } from "@tabler/icons-react";
+import type { Deed } from "./deed";
+
+const look = { group: "Look", changes: false, enabled: () => true } as const;
+
+export const PANELS: readonly Deed[] = [
+  {
+    ...look,
+    name: "find",
+    label: "Find in graph",
+    shortcuts: ["Mod+f"],
+    icon: IconSearch,
+    also: "search robot parameter value problem",
+    enabled: (bench) => bench.graph.actions.length > 0,
+    run: (bench) => bench.openFind(),
+  },
+  {
+    ...look,
+    name: "outline",
+    label: "Show the outline",
+    shortcuts: ["o"],
+    icon: IconListTree,
+    also: "tree list rows",
+    run: (bench) => bench.setPanel("outline"),
+  },
+  {
+    ...look,
+    name: "comments",
+    label: "Show the comments",
+    shortcuts: ["m"],
+    icon: IconMessageCircle,
+    also: "talk threads",
+    run: (bench) => bench.setPanel("comments"),
+  },
+];

@@ -1,0 +1,202 @@
+/** One row of the outline. */
+import { ActionIcon, Menu } from "@mantine/core";
+import { IconChevronRight, IconDots, IconMessageCircle, IconPlayerPlay } from "@tabler/icons-react";
+import { memo, useState } from "react";
+import type { Progress } from "../../api/progress";
+import { useTalk } from "../../ui/canvas/spotlight";
+import { cardLines, lineText } from "../../ui/canvas/value-text";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
+import { robotColor } from "../../ui/robot";
+import { StateWord } from "../../ui/state-word";
+import { duration } from "../../ui/when";
+import { endName, useBench } from "../bench";
+import style from "./outline.module.css";
+import { deedsOf, type RowDeed } from "./row-deeds";
+import { type Change, RowEdit } from "./row-edit";
+import type { Row } from "./rows";
+
+interface Props {
+  row: Row;
+  active: boolean;
+  selected: boolean;
+  progress: Progress | null;
+  change: Change | null;
+  onFlip: (id: string) => void;
+  onFocus: (id: string) => void;
+  onChoose: (row: Row) => void;
+  onDeed: (deed: RowDeed, row: Row) => void;
+  onDone: (said: string | null) => void;
+}
+
+function Talk({ of }: { of: string }) {
+  const count = useTalk(of);
+  if (count === 0) return null;
+  return (
+    <span className={style.talk} title={`${count} open comments`}>
+      <IconMessageCircle size={13} aria-hidden /> {count}
+      <span className="visually-hidden"> open comments</span>
+    </span>
+  );
+}
+
+function Words({ row, progress }: { row: Row; progress: Progress | null }) {
+  const { graph } = useBench();
+  switch (row.kind) {
+    case "entry":
+      return (
+        <span className={style.end}>
+          <IconPlayerPlay size={13} aria-hidden /> Entry
+        </span>
+      );
+    case "action": {
+      const { action } = row;
+      const [line] = cardLines(action.inputs, 1);
+      return (
+        <>
+          <span className={style.head}>
+            <b>
+              {action.name} {action.instanceId}
+            </b>
+            <Talk of={action.key} />
+            {progress && (
+              <StateWord
+                tone={progress.tone}
+                word={progress.word}
+                {...(progress.took === null ? {} : { more: duration(progress.took) })}
+              />
+            )}
+          </span>
+          <span className={style.sub}>
+            {action.missing ? "named by an arrow, but not there" : action.actor || "any robot"}
+            {line && ` · ${lineText(line)}`}
+            {row.follows === 0 && " · nothing follows"}
+          </span>
+        </>
+      );
+    }
+    case "outcome":
+      return (
+        <span className={style.outcome} style={{ color: outcomeColor[row.outcome] }}>
+          <OutcomeSign outcome={row.outcome} /> {outcomeWord[row.outcome]}
+        </span>
+      );
+    case "target":
+      return (
+        <span className={style.target}>
+          <span className={style.response}>{row.response}</span>{" "}
+          <b>{endName(graph, row.relation.child)}</b>
+          {!row.relation.required && <span className={style.sub}>optional</span>}
+        </span>
+      );
+  }
+}
+
+interface DeedsProps {
+  row: Row;
+  active: boolean;
+  label: string;
+  onDeed: Props["onDeed"];
+}
+
+/** The menu itself is made when it is first opened: there may be thousands of rows. */
+function Deeds({ row, active, label, onDeed }: DeedsProps) {
+  const { mayEdit } = useBench();
+  const [opened, setOpened] = useState<boolean | null>(null);
+  const button = (
+    <ActionIcon
+      size={32}
+      className={style.more ?? ""}
+      tabIndex={active ? 0 : -1}
+      aria-label={`What to do with ${label}`}
+      onClick={() => setOpened(!opened)}
+    >
+      <IconDots size={16} aria-hidden />
+    </ActionIcon>
+  );
+  if (opened === null) return button;
+  return (
+    <Menu opened={opened} onChange={setOpened} trapFocus returnFocus={false}>
+      <Menu.Target>{button}</Menu.Target>
+      <Menu.Dropdown>
+        {deedsOf(row).map((deed) => (
+          <Menu.Item
+            key={deed.name}
+            disabled={deed.changes && !mayEdit}
+            rightSection={<kbd className={style.key}>{keyWords(deed.key)}</kbd>}
+            onClick={() => onDeed(deed, row)}
+          >
+            {deed.label}
+          </Menu.Item>
+        ))}
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
+
+const keyWords = (key: string): string =>
+  key.replace("Arrow", "").replace("Alt+Up", "Alt ↑").replace("Alt+Down", "Alt ↓").toUpperCase();
+
+function labelOf(row: Row, name: (key: string) => string): string {
+  switch (row.kind) {
+    case "entry":
+      return "Entry";
+    case "action":
+      return name(row.action.key);
+    case "outcome":
+      return `${name(row.action.key)}, ${outcomeWord[row.outcome]}`;
+    case "target":
+      return `the arrow to ${name(row.relation.child)}`;
+  }
+}
+
+export const OutlineRow = memo(function OutlineRow(props: Props) {
+  const { row, active, selected, progress, change, onFlip, onFocus, onChoose, onDeed } = props;
+  const { graph } = useBench();
+  const label = labelOf(row, (key) => endName(graph, key));
+  const color = row.kind === "action" ? robotColor(row.action.actor) : "transparent";
+  return (
+    <tr
+      className={style.row}
+      data-row={row.id}
+      data-level={row.level}
+      aria-level={row.level}
+      aria-posinset={row.at}
+      aria-setsize={row.of}
+      aria-selected={selected}
+      {...(row.open === null ? {} : { "aria-expanded": row.open })}
+      tabIndex={active ? 0 : -1}
+      style={{ "--c": color } as React.CSSProperties}
+      onFocus={(event) => {
+        if (event.target === event.currentTarget) onFocus(row.id);
+      }}
+    >
+      <td className={style.words}>
+        {row.open === null ? (
+          <span className={style.none} />
+        ) : (
+          <span className={style.flip} data-down={row.open || undefined}>
+            <ActionIcon
+              size={32}
+              tabIndex={-1}
+              aria-label={row.open ? "Close" : "Open"}
+              onClick={() => onFlip(row.id)}
+            >
+              <IconChevronRight size={15} aria-hidden />
+            </ActionIcon>
+          </span>
+        )}
+        <button type="button" tabIndex={-1} onClick={() => onChoose(row)}>
+          <Words row={row} progress={progress} />
+        </button>
+      </td>
+      <td className={style.deeds}>
+        <Deeds row={row} active={active} label={label} onDeed={onDeed} />
+      </td>
+      {change !== null && (
+        <td className={style.edit}>
+          <RowEdit row={row} change={change} onDone={props.onDone} />
+        </td>
+      )}
+    </tr>
+  );
+});

@@ -1,0 +1,233 @@
+/**
+ * The graph as a tree grid: the twin of the canvas for keyboards, fingers and ears.
+ *
+ * Rows are walked with the arrow keys (right opens, left closes or goes up) and each has its deeds
+ * by key and in a menu. What is selected here is selected on the canvas, and the other way round.
+ */
+import { Button, Kbd } from "@mantine/core";
+import { IconListTree, IconPlus } from "@tabler/icons-react";
+import { useCallback, useEffect, useMemo, useRef, useState } from "react";
+import type { Progress } from "../../api/progress";
+import { ENTRY, type Key } from "../../graph/model";
+import { announcer } from "../../ui/announcer";
+import { useRobotInLight } from "../../ui/canvas/spotlight";
+import { Empty } from "../../ui/empty";
+import { useIsPhone } from "../../ui/screen";
+import { useBench } from "../bench";
+import { Robots } from "../robots";
+import style from "./outline.module.css";
+import { OutlineRow } from "./outline-row";
+import { deedFor, move, type RowDeed, remove } from "./row-deeds";
+import type { Change } from "./row-edit";
+import { type Row, rowsOf, subjectOf } from "./rows";
+
+const MANY = 40; // actions; above that the rows begin closed
+
+interface Edited {
+  readonly id: string;
+  readonly change: Change;
+}
+
+/** Which rows are open: those that a person opened or closed, else by how many there are. */
+function useOpen(actions: number) {
+  const [flipped, setFlipped] = useState<ReadonlySet<string>>(new Set());
+  const byDefault = actions <= MANY;
+  const isOpen = useCallback(
+    (id: string) => (id.includes("|") ? true : byDefault) !== flipped.has(id),
+    [byDefault, flipped],
+  );
+  const flip = (id: string) =>
+    setFlipped((before) => {
+      const next = new Set(before);
+      if (!next.delete(id)) next.add(id);
+      return next;
+    });
+  return { isOpen, flip };
+}
+
+/** The row to which an arrow key leads from the one at `at`; null where it opens or closes. */
+function stepFrom(rows: readonly Row[], at: number, key: string): number | null {
+  const row = rows[at];
+  switch (key) {
+    case "ArrowDown":
+      return Math.min(at + 1, rows.length - 1);
+    case "ArrowUp":
+      return Math.max(at - 1, 0);
+    case "Home":
+      return 0;
+    case "End":
+      return rows.length - 1;
+    case "ArrowRight":
+      return row?.open ? at + 1 : null;
+    case "ArrowLeft":
+      return row?.open ? null : rows.findIndex(({ id }) => id === row?.parent);
+    default:
+      return null;
+  }
+}
+
+export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) {
+  const bench = useBench();
+  const { graph, selection, select, setPanel, mayEdit } = bench;
+  const phone = useIsPhone();
+  const robot = useRobotInLight();
+  const { isOpen, flip } = useOpen(graph.actions.length);
+  const rows = useMemo(() => {
+    const all = rowsOf(graph, isOpen);
+    if (robot === null) return all;
+    const lit = new Set(graph.actions.filter(({ actor }) => actor === robot).map(({ key }) => key));
+    return all.filter((row) => row.kind === "entry" || lit.has(ownerOf(row)));
+  }, [graph, isOpen, robot]);
+  const [active, setActive] = useState<string>(ENTRY);
+  const [edited, setEdited] = useState<Edited | null>(null);
+  const tree = useRef<HTMLTableElement>(null);
+  const at = Math.max(
+    0,
+    rows.findIndex(({ id }) => id === active),
+  );
+
+  const focus = (index: number) => {
+    const row = rows[index];
+    if (row === undefined) return;
+    setActive(row.id);
+    tree.current
+      ?.querySelector<HTMLElement>(`[data-row="${CSS.escape(row.id)}"]`)
+      ?.focus({ preventScroll: false });
+  };
+  const choose = (row: Row) => {
+    setActive(row.id);
+    const subject = subjectOf(row);
+    select([subject]);
+    if (!phone) bench.view.show(subject.split(">").map((end) => end.split(";")[0] ?? end));
+  };
+  // What is selected elsewhere is found here too.
+  const [only] = selection.size === 1 ? selection : [];
+  useEffect(() => {
+    if (only === undefined || tree.current?.contains(document.activeElement)) return;
+    const row = rows.find((candidate) => subjectOf(candidate) === only);
+    if (row === undefined || row.id === active) return;
+    setActive(row.id);
+    const found = tree.current?.querySelector(`[data-row="${CSS.escape(row.id)}"]`);
+    found?.scrollIntoView({ block: "nearest" });
+  }, [only, rows, active]);
+
+  const run = (deed: RowDeed, row: Row) => {
+    if (deed.changes && !mayEdit) return;
+    switch (deed.name) {
+      case "details":
+        choose(row);
+        setPanel("details");
+        break;
+      case "comments":
+        choose(row);
+        setPanel("comments");
+        break;
+      case "delete":
+        announcer.say(remove(bench, row));
+        focus(Math.max(0, at - 1));
+        break;
+      case "up":
+      case "down":
+        announcer.say(move(bench, row, deed.name === "up" ? -1 : 1));
+        break;
+      default:
+        setActive(row.id);
+        setEdited({ id: row.id, change: deed.name });
+    }
+  };
+  const onKey = (event: React.KeyboardEvent) => {
+    const row = rows[at];
+    const target = event.target as HTMLElement;
+    if (row === undefined || target.dataset.row === undefined || event.ctrlKey || event.metaKey)
+      return;
+    const deed = deedFor(row, event);
+    const next = event.altKey ? null : stepFrom(rows, at, event.key);
+    const opens = event.key === "ArrowRight" && row.open === false;
+    const closes = event.key === "ArrowLeft" && row.open === true;
+    if (opens || closes) flip(row.id);
+    else if (next !== null && next >= 0) focus(next);
+    else if (event.key === " ") choose(row);
+    else if (deed) run(deed, row);
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  const done = (said: string | null) => {
+    setEdited(null);
+    if (said !== null) announcer.say(said);
+    focus(at);
+  };
+  const add = () => {
+    const middle: [number, number] = [window.innerWidth / 2, 120];
+    if (!phone) return bench.openAdd();
+    bench.openAdd({ screen: middle, at: [0, 140 * graph.actions.length], from: null });
+  };
+  return (
+    <div className={style.outline}>
+      <div className={style.robots}>
+        <Robots />
+      </div>
+      {graph.actions.length === 0 && (
+        <Empty icon={<IconListTree size={22} />} title="Nothing here yet">
+          The actions of the graph stand here as a list, in the order in which they run.
+        </Empty>
+      )}
+      {graph.actions.length > 0 && (
+        <table
+          ref={tree}
+          className={style.tree}
+          // biome-ignore lint/a11y/noNoninteractiveElementToInteractiveRole: WAI-ARIA names table as its element
+          role="treegrid"
+          aria-label={`Outline of ${graph.name || "the graph"}`}
+          aria-rowcount={rows.length}
+          tabIndex={-1}
+          onKeyDown={onKey}
+        >
+          <tbody>
+            {rows.map((row, i) => (
+              <OutlineRow
+                key={row.id}
+                row={row}
+                active={i === at}
+                selected={selection.has(subjectOf(row))}
+                progress={row.kind === "action" ? (progress.get(row.action.key) ?? null) : null}
+                change={edited?.id === row.id ? edited.change : null}
+                onFlip={flip}
+                onFocus={setActive}
+                onChoose={phone ? (chosen) => run(DETAILS, chosen) : choose}
+                onDeed={run}
+                onDone={done}
+              />
+            ))}
+          </tbody>
+        </table>
+      )}
+      {mayEdit && (
+        <Button className={style.add ?? ""} leftSection={<IconPlus size={16} />} onClick={add}>
+          Add an action
+        </Button>
+      )}
+      {!phone && graph.actions.length > 0 && (
+        <p className={style.keys}>
+          <Kbd>↑</Kbd> <Kbd>↓</Kbd> walk, <Kbd>←</Kbd> <Kbd>→</Kbd> close and open, <Kbd>Enter</Kbd>{" "}
+          details, <Kbd>F2</Kbd> rename, <Kbd>C</Kbd> connect, <Kbd>Alt ↑</Kbd> move, <Kbd>Del</Kbd>{" "}
+          delete
+        </p>
+      )}
+    </div>
+  );
+}
+
+const DETAILS: RowDeed = { name: "details", label: "Details", key: "Enter", changes: false };
+
+function ownerOf(row: Row): Key {
+  switch (row.kind) {
+    case "entry":
+      return ENTRY;
+    case "action":
+    case "outcome":
+      return row.action.key;
+    case "target":
+      return row.relation.parent;
+  }
+}

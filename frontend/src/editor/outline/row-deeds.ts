@@ -1,0 +1,90 @@
+/** What can be done to a row of the outline, with its key. */
+import { removeActions, removeRelation, setResponse, swapOrder } from "../../graph/edit";
+import { relationId } from "../../graph/layout";
+import { ENTRY, type Key, spoken } from "../../graph/model";
+import { type Bench, endName } from "../bench";
+import type { Change } from "./row-edit";
+import type { Row } from "./rows";
+
+export interface RowDeed {
+  readonly name: Change | "delete" | "up" | "down" | "details" | "comments";
+  readonly label: string;
+  /** As in `KeyboardEvent.key`, with `Alt+` before it where needed. */
+  readonly key: string;
+  readonly changes: boolean;
+}
+
+const RENAME: RowDeed = { name: "rename", label: "Rename", key: "F2", changes: true };
+const CONNECT: RowDeed = { name: "connect", label: "Connect …", key: "c", changes: true };
+const DETAILS: RowDeed = { name: "details", label: "Details", key: "Enter", changes: false };
+const TALK: RowDeed = { name: "comments", label: "Comment", key: "m", changes: false };
+const UP: RowDeed = { name: "up", label: "Move up", key: "Alt+ArrowUp", changes: true };
+const DOWN: RowDeed = { name: "down", label: "Move down", key: "Alt+ArrowDown", changes: true };
+const DELETE: RowDeed = { name: "delete", label: "Delete", key: "Delete", changes: true };
+const RESPONSE: RowDeed = {
+  name: "response",
+  label: "Another response …",
+  key: "r",
+  changes: true,
+};
+const TARGET: RowDeed = { name: "target", label: "Lead it elsewhere …", key: "t", changes: true };
+
+export function deedsOf(row: Row): readonly RowDeed[] {
+  switch (row.kind) {
+    case "entry":
+      return [{ ...CONNECT, label: "Start with …" }];
+    case "action":
+      return [DETAILS, RENAME, CONNECT, TALK, UP, DOWN, DELETE];
+    case "outcome":
+      return [CONNECT, DETAILS];
+    case "target":
+      return row.relation.parent === ENTRY
+        ? [DETAILS, TARGET, UP, DOWN, DELETE]
+        : [DETAILS, RESPONSE, TARGET, UP, DOWN, DELETE];
+  }
+}
+
+export function deedFor(row: Row, event: { key: string; altKey: boolean }): RowDeed | null {
+  const pressed = event.altKey ? `Alt+${event.key}` : event.key;
+  const key = pressed === "Backspace" ? "Delete" : pressed;
+  return deedsOf(row).find((deed) => deed.key === key) ?? null;
+}
+
+/** Takes a row away: an action with its arrows, or what one outcome says to one target. */
+export function remove(bench: Bench, row: Row): string {
+  if (row.kind === "action") {
+    const name = endName(bench.graph, row.action.key);
+    removeActions(bench.doc, [row.action.key]);
+    return `${name} is deleted`;
+  }
+  if (row.kind !== "target") return "";
+  const id = relationId(row.relation);
+  const others = spoken(row.relation.conditions).filter((outcome) => outcome !== row.outcome);
+  if (others.length > 0 && row.relation.parent !== ENTRY) {
+    setResponse(bench.doc, id, row.outcome, "ignore");
+  } else removeRelation(bench.doc, id);
+  return `The arrow to ${endName(bench.graph, row.relation.child)} is deleted`;
+}
+
+/** The relation through which a row stands where it stands. */
+function way(bench: Bench, row: Row): { parent: Key; child: Key } | null {
+  if (row.kind === "target") return row.relation;
+  if (row.kind !== "action") return null;
+  const into = bench.graph.relations.filter(({ child }) => child === row.action.key);
+  return into.find(({ parent }) => parent === ENTRY) ?? into[0] ?? null;
+}
+
+/** Changes places with the sibling before or after it, in the order in which they are started. */
+export function move(bench: Bench, row: Row, step: -1 | 1): string {
+  const here = way(bench, row);
+  const siblings = bench.graph.relations
+    .filter(({ parent }) => parent === here?.parent)
+    .sort((a, b) => a.parentOrder - b.parentOrder);
+  const at = siblings.findIndex(({ child }) => child === here?.child);
+  const one = siblings[at];
+  const other = siblings[at + step];
+  if (one === undefined || other === undefined) return "There is nothing to change places with";
+  swapOrder(bench.doc, siblings.map(relationId), at, at + step);
+  const before = step < 0 ? "before" : "after";
+  return `${endName(bench.graph, one.child)} stands ${before} ${endName(bench.graph, other.child)}`;
+}

@@ -1,0 +1,139 @@
+/** What opens under a row of the outline: a new name, another target, another response, an arrow. */
+import { Select, TextInput } from "@mantine/core";
+import { useState } from "react";
+import { connect, rename, retarget, setEntry, setResponse } from "../../graph/edit";
+import { relationId } from "../../graph/layout";
+import { ENTRY, EXIT, type Precondition, RESPONSES, type Response } from "../../graph/model";
+import { OUTCOMES, outcomeWord } from "../../ui/outcome";
+import { type Bench, endName, useBench } from "../bench";
+import style from "./outline.module.css";
+import type { Row } from "./rows";
+
+export type Change = "rename" | "connect" | "response" | "target";
+
+interface Props {
+  row: Row;
+  change: Change;
+  /** With the id of what is selected next, if that is something new. */
+  onDone: (said: string | null) => void;
+}
+
+function ends(bench: Bench, exit: boolean) {
+  return [
+    ...(exit ? [{ value: EXIT, label: "Exit: the graph ends" }] : []),
+    ...bench.graph.actions.map(({ key }) => ({ value: key, label: endName(bench.graph, key) })),
+  ];
+}
+
+function Rename({ row, onDone }: Props) {
+  const { doc } = useBench();
+  const old = row.kind === "action" ? row.action.name : "";
+  const [name, setName] = useState(old);
+  const save = () => {
+    const next = name.trim();
+    if (row.kind !== "action" || next === "" || next === old) return onDone(null);
+    rename(doc, row.action.key, next);
+    onDone(`${old} is called ${next}`);
+  };
+  return (
+    <TextInput
+      aria-label={`New name of ${old}`}
+      autoFocus
+      value={name}
+      error={name.trim() === "" ? "An action has a name." : undefined}
+      onFocus={(event) => event.currentTarget.select()}
+      onChange={(event) => setName(event.currentTarget.value)}
+      onKeyDown={(event) => {
+        if (event.key === "Enter") save();
+        if (event.key === "Escape") onDone(null);
+      }}
+      onBlur={save}
+    />
+  );
+}
+
+function Connect({ row, onDone }: Props) {
+  const bench = useBench();
+  const fixed = row.kind === "outcome" ? row.outcome : null;
+  const [outcome, setOutcome] = useState<Precondition>(fixed ?? "on_true");
+  const entry = row.kind === "entry";
+  const from = entry ? ENTRY : row.kind === "target" ? null : row.action.key;
+  const to = (target: string | null) => {
+    if (target === null || from === null) return onDone(null);
+    if (entry) setEntry(bench.doc, target);
+    else connect(bench.doc, from, target, outcome);
+    const when = entry ? "" : ` when ${outcomeWord[outcome]}`;
+    onDone(`Connected ${endName(bench.graph, from)} to ${endName(bench.graph, target)}${when}`);
+  };
+  return (
+    <div className={style.pair}>
+      {!entry && (
+        <Select
+          aria-label="When it is"
+          data={OUTCOMES.map((value) => ({ value, label: outcomeWord[value] }))}
+          value={outcome}
+          onChange={(next) => setOutcome((next ?? "on_true") as Precondition)}
+          w={116}
+        />
+      )}
+      <Select
+        aria-label="Run"
+        placeholder="run …"
+        searchable
+        autoFocus
+        data={ends(bench, !entry)}
+        value={null}
+        onChange={to}
+        onKeyDown={(event) => {
+          if (event.key === "Escape") onDone(null);
+        }}
+        flex={1}
+      />
+    </div>
+  );
+}
+
+function Pick({ row, change, onDone }: Props) {
+  const bench = useBench();
+  if (row.kind !== "target") return null;
+  const id = relationId(row.relation);
+  const name = endName(bench.graph, row.relation.child);
+  const response = change === "response";
+  const pick = (next: string | null) => {
+    if (next === null) return onDone(null);
+    if (response) {
+      setResponse(bench.doc, id, row.outcome, next as Response);
+      return onDone(`When ${outcomeWord[row.outcome]}: ${next} ${name}`);
+    }
+    if (retarget(bench.doc, id, row.outcome, { child: next }) === null) {
+      return onDone("It cannot lead there");
+    }
+    onDone(`The arrow leads to ${endName(bench.graph, next)}`);
+  };
+  return (
+    <Select
+      aria-label={response ? `What ${name} does` : "Leads to"}
+      searchable={!response}
+      autoFocus
+      defaultDropdownOpened
+      data={response ? [...RESPONSES] : ends(bench, row.relation.parent !== ENTRY)}
+      value={response ? row.response : row.relation.child}
+      onChange={pick}
+      onKeyDown={(event) => {
+        if (event.key === "Escape") onDone(null);
+      }}
+    />
+  );
+}
+
+export function RowEdit(props: Props) {
+  switch (props.change) {
+    case "rename":
+      return <Rename {...props} />;
+    case "connect":
+      return <Connect {...props} />;
+    case "response":
+    case "target":
+      return <Pick {...props} />;
+  }
+}

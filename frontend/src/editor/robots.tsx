@@ -1,0 +1,43 @@
+/** The robots of a graph: what each is called, its colour, and putting one in the light. */
+import { useMemo } from "react";
+import { spotlight, useRobotInLight } from "../ui/canvas/spotlight";
+import { robotColor } from "../ui/robot";
+import { useBench } from "./bench";
+import style from "./robots.module.css";
+
+/** How many actions each robot has, by name; those for any robot last. */
+export function robotsOf(actors: readonly string[]): [name: string, actions: number][] {
+  const counts = new Map<string, number>();
+  for (const actor of actors) counts.set(actor, (counts.get(actor) ?? 0) + 1);
+  return [...counts].sort(([a], [b]) => (a === "" ? 1 : b === "" ? -1 : a.localeCompare(b)));
+}
+
+/** Nothing where there is only one robot. */
+export function Robots() {
+  const { graph } = useBench();
+  const robots = useMemo(() => robotsOf(graph.actions.map(({ actor }) => actor)), [graph.actions]);
+  const lit = useRobotInLight();
+  if (robots.length < 2 && lit === null) return null;
+  return (
+    <fieldset className={style.robots}>
+      <legend className="visually-hidden">Show the actions of one robot</legend>
+      {robots.map(([name, actions]) => (
+        <button
+          key={name}
+          type="button"
+          className={style.robot}
+          aria-pressed={lit === name}
+          data-dim={(lit !== null && lit !== name) || undefined}
+          onClick={() => spotlight.set({ robot: lit === name ? null : name })}
+        >
+          <i style={{ background: robotColor(name) }} aria-hidden />
+          <span>{name || "any robot"}</span>
+          <span className={style.count}>
+            {actions}
+            <span className="visually-hidden"> {actions === 1 ? "action" : "actions"}</span>
+          </span>
+        </button>
+      ))}
+    </fieldset>
+  );
+}

@@ -1,0 +1,35 @@
+/** The threads of the open graph, kept in step with the document. */
+import { useEffect, useMemo, useRef, useSyncExternalStore } from "react";
+import { openTalk, readThreads, type Thread } from "../../graph/comments";
+import { rootOf } from "../../graph/layout";
+import { useRoom } from "../../room/use-room";
+import { spotlight } from "../../ui/canvas/spotlight";
+
+const NONE: readonly Thread[] = [];
+
+export function useThreads(): readonly Thread[] {
+  const { doc } = useRoom();
+  const read = useRef<readonly Thread[]>(NONE);
+  const source = useMemo(() => {
+    const map = rootOf(doc, "comments");
+    read.current = readThreads(map.entries());
+    return {
+      now: () => read.current,
+      subscribe(listener: () => void) {
+        const onChange = () => {
+          read.current = readThreads(map.entries());
+          listener();
+        };
+        map.observe(onChange);
+        return () => map.unobserve(onChange);
+      },
+    };
+  }, [doc]);
+  return useSyncExternalStore(source.subscribe, source.now);
+}
+
+/** Cards show how many open threads there are about them. */
+export function useTalkOnCards(threads: readonly Thread[]): void {
+  useEffect(() => spotlight.set({ talk: openTalk(threads) }), [threads]);
+  useEffect(() => spotlight.reset, []);
+}

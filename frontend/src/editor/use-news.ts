@@ -1,0 +1,63 @@
+/** Says what others change and how the run goes, for those who do not see the canvas. */
+import { useEffect, useRef } from "react";
+import type * as Y from "yjs";
+import type { Progress } from "../api/progress";
+import { endsOf, rootOf, splitKey } from "../graph/layout";
+import type { Graph, Key } from "../graph/model";
+import { useRoom } from "../room/use-room";
+import { announcer } from "../ui/announcer";
+import { endName } from "./bench";
+
+/** The names of what a transaction touched: actions, and the ends of arrows. */
+function touched(graph: Graph, doc: Y.Doc, transaction: Y.Transaction): string[] {
+  const names = new Set<string>();
+  for (const [type, keys] of transaction.changed) {
+    const relations = (type as unknown) === rootOf(doc, "relations");
+    if (!relations && (type as unknown) !== rootOf(doc, "actions")) continue;
+    for (const key of keys) {
+      const { head } = splitKey(key ?? "");
+      const ends = relations ? endsOf(head) : null;
+      if (relations && ends === null) continue;
+      names.add(
+        ends
+          ? `${endName(graph, ends.parent)} to ${endName(graph, ends.child)}`
+          : endName(graph, head),
+      );
+    }
+  }
+  return [...names];
+}
+
+/** `begun`: the graph has arrived; what came before is no news. */
+export function useRemoteNews(graph: Graph, begun: boolean): void {
+  const { doc, presence } = useRoom();
+  const latest = useRef(graph);
+  latest.current = graph;
+  useEffect(() => {
+    if (!begun) return;
+    const onEnd = (transaction: Y.Transaction) => {
+      if (transaction.local) return;
+      const names = touched(latest.current, doc, transaction);
+      if (names.length === 0) return;
+      const people = new Set(presence.people().map(({ name }) => name || "a guest"));
+      const [only = "Somebody"] = people;
+      const who = people.size === 1 ? only : "Somebody";
+      const what = names.length > 3 ? `${names.length} things` : names.join(", ");
+      announcer.say(`${who} changed ${what}`);
+    };
+    doc.on("afterTransaction", onEnd);
+    return () => doc.off("afterTransaction", onEnd);
+  }, [doc, presence, begun]);
+}
+
+export function useRunNews(graph: Graph, progress: ReadonlyMap<Key, Progress>): void {
+  const before = useRef(progress);
+  useEffect(() => {
+    const old = before.current;
+    before.current = progress;
+    if (old === progress) return;
+    for (const [key, { word }] of progress) {
+      if (old.get(key)?.word !== word) announcer.say(`${endName(graph, key)}: ${word}`);
+    }
+  }, [graph, progress]);
+}
