@@ -10,6 +10,9 @@ unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
+# Tests never speak to other machines.
+unit e2e ros-test soak pictures bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+
 BIN := .venv/bin
 ROS := .venv-ros/bin
 NODE := scripts/with-node
@@ -127,7 +130,7 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@$(ROS)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@echo "» messages of TeMoto into .venv-ros"
 	@scripts/build-messages .venv-ros ros/temoto_msgs
-	@touch $@
+	@sha256sum requirements/ros.txt | cut -d " " -f 1 >$@
 
 frontend/node_modules/.done: frontend/package-lock.json scripts/with-node
 	@echo "» Node packages into frontend/node_modules"

@@ -2,6 +2,9 @@
 
 import { defineConfig, devices } from "@playwright/test";
 
+// No test speaks to another machine, whatever robots it registers.
+process.env.ROS_AUTOMATIC_DISCOVERY_RANGE = "LOCALHOST";
+
 export default defineConfig({
   testDir: "e2e",
   outputDir: "test-results",

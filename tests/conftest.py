@@ -6,6 +6,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+# No test speaks to another machine, whatever robots it registers.
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
 # Machines are slow at times; a test that is too slow is found by its time limit, not by chance.
 settings.register_profile("default", deadline=None)
 settings.load_profile("default")

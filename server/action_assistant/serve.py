@@ -15,6 +15,7 @@ from typing import Final
 
 import msgspec
 
+from action_assistant.interpreter import Interpreter, for_runner
 from action_assistant.settings import EVERYWHERE, more_hosts
 from action_assistant.sharing import invitations_as_text
 from action_assistant.web.addresses import addresses_of
@@ -44,9 +45,12 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 class Child:
     """One of the two processes, as often as it takes."""
 
-    def __init__(self, name: str, arguments: list[str], port: int) -> None:
+    def __init__(
+        self, name: str, arguments: list[str], port: int, interpreter: Interpreter
+    ) -> None:
         self.name = name
         self.port = port
+        self._interpreter = interpreter
         self._arguments = arguments
         self._process: subprocess.Popen[bytes] | None = None
         self._deaths = 0
@@ -55,10 +59,11 @@ class Child:
 
     def start(self, parent: int) -> None:
         """Start it. `parent` is the reading end of a pipe that closes when we die."""
-        environment = {**os.environ, "_ACTION_ASSISTANT_PARENT": str(parent)}
+        environment = self._interpreter.environment(os.environ)
+        environment["_ACTION_ASSISTANT_PARENT"] = str(parent)
         self._born = time.monotonic()
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "action_assistant", *self._arguments],
+            [self._interpreter.path, "-m", "action_assistant", *self._arguments],
             env=environment,
             pass_fds=[parent],
             stdin=subprocess.DEVNULL,
@@ -135,16 +140,22 @@ def _children(plan: Plan) -> list[Child]:
     address += [flag for flag, on in (("--share", plan.share), ("--tls", plan.tls)) if on]
     database = ["--database", plan.database] if plan.database else []
     ports = str(plan.port), str(plan.port + 1)
+    this = Interpreter(path=Path(sys.executable), origin="this")
+    speaking = for_runner()
+    if speaking.remark:
+        _say(speaking.remark)
     return [
         Child(
             "editor",
             ["editor", *address, "--port", ports[0], "--runner-port", ports[1], *database],
             plan.port,
+            this,
         ),
         Child(
             "runner",
             ["runner", *address, "--port", ports[1], "--page-port", ports[0]],
             plan.port + 1,
+            speaking,
         ),
     ]
 

@@ -14,6 +14,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_TOKEN": "the token programs present; instead of the file in the data folder",
     "ACTION_ASSISTANT_URL": "where the command line finds the editor (http://127.0.0.1:8000)",
     "ACTION_ASSISTANT_HOSTS": "more host names that may stand in the address bar, comma separated",
+    "ACTION_ASSISTANT_RUNNER_PYTHON": "the Python that has rclpy; `serve` runs the runner under it",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
 }
 #: The host that stands for every address of this computer, of both families.

@@ -1,0 +1,85 @@
+"""Which Python the runner runs under: rclpy works only for the one that it was built for."""
+
+import hashlib
+import importlib.machinery
+import importlib.util
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant import places
+from action_assistant.errors import CannotStart
+
+VARIABLE: Final = "ACTION_ASSISTANT_RUNNER_PYTHON"
+#: What a sourced ROS 2 puts into the environment. The wheels of `make ros` must not see it.
+_SOURCED: Final = ("PYTHONPATH", "AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH", "LD_LIBRARY_PATH")
+#: Says that this interpreter has been started anew for the wheels; meant for no other one.
+_ANEW: Final = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
+
+Origin: TypeAlias = Literal["named", "this", "wheels"]
+
+
+class Interpreter(msgspec.Struct, frozen=True, kw_only=True):
+    """A Python and where it comes from: named in the environment, the one that runs already, or the
+    one that `make ros` made. `remark` is for people: what could be better."""
+
+    path: Path
+    origin: Origin
+    remark: str = ""
+
+    def environment(self, environ: Mapping[str, str]) -> dict[str, str]:
+        """The environment for its processes."""
+        drop = {
+            "this": (),
+            "named": (_ANEW,),
+            "wheels": (_ANEW, *(_SOURCED if "AMENT_PREFIX_PATH" in environ else ())),
+        }[self.origin]
+        return {name: value for name, value in environ.items() if name not in drop}
+
+
+def for_runner(environ: Mapping[str, str] = os.environ) -> Interpreter:
+    """The one to take: whoever is named, else this one where it can speak ROS 2, else the one of
+    `make ros`, else this one. Raises CannotStart."""
+    named = environ.get(VARIABLE)
+    if named:
+        path = Path(named)
+        if not os.access(path, os.X_OK) or path.is_dir():
+            raise CannotStart(f"{VARIABLE} is {named!r}, which is no program.")
+        return Interpreter(path=path, origin="named")
+    this = Interpreter(path=Path(sys.executable), origin="this")
+    wheels = places.wheels()
+    if rclpy_fits() or wheels is None or not (wheels / "bin" / "python").exists():
+        return this
+    if not is_current(wheels):
+        return Interpreter(
+            path=this.path,
+            origin="this",
+            remark=f"{wheels} was made for another version of this program; `make ros` renews it.",
+        )
+    return Interpreter(path=wheels / "bin" / "python", origin="wheels")
+
+
+def rclpy_fits() -> bool:
+    """Whether this interpreter finds an rclpy that was built for it, without importing it."""
+    spec = importlib.util.find_spec("rclpy")
+    folders = spec.submodule_search_locations if spec else None
+    return any(
+        (Path(folder) / f"_rclpy_pybind11{suffix}").exists()
+        for folder in folders or ()
+        for suffix in importlib.machinery.EXTENSION_SUFFIXES
+    )
+
+
+def is_current(wheels: Path) -> bool:
+    """Whether an environment of `make ros` has what this checkout asks for; a stale one may lack a
+    package and would not even start."""
+    try:
+        made_for = (wheels / ".done").read_text().strip()
+        asked = (wheels.parent / "requirements" / "ros.txt").read_bytes()
+    except OSError:
+        return False
+    return made_for == hashlib.sha256(asked).hexdigest()
