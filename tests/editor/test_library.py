@@ -72,3 +72,11 @@ async def test_a_graph_that_has_not_changed_is_not_read_again(settings: EditorSe
         assert await house.library.all() is first
         await house.catalogue.describe(made.id, "ada", name="other", description=None)
         assert await house.library.all() is not first
+
+
+async def test_a_new_use_begins_with_the_signature_and_no_value(settings: EditorSettings) -> None:
+    async with open_house(settings) as house:
+        speed = {"pvf_type": "number", "pvf_value": 1.5, "pvf_allowed_values": [1.5, 2.0]}
+        await house.catalogue.bring(file("one", speed=speed), "ada")
+        (taking,) = only(await house.library.all(), "Go").inputs
+        assert taking.text == '{"pvf_type":"number","pvf_allowed_values":[1.5,2.0]}'

@@ -18,6 +18,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.umrf import codec
 from action_assistant.umrf.check import check
 from action_assistant.umrf.model import Graph, Problem
+from action_assistant.web.keys import Author
 
 NAME_LIMIT: Final = 200  # characters
 DESCRIPTION_LIMIT: Final = 10_000
@@ -27,7 +28,7 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     """A graph as lists and pages show it. `seq` counts the changes of its document.
 
     `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
-    change it.
+    change it. `people`: who is in it now.
     """
 
     id: str
@@ -38,6 +39,9 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     made_at: datetime
     actions: int | None = None
     problems: Counts | None = None
+    robots: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+    people: tuple[Author, ...] = ()
     deleted_at: datetime | None = None
     damaged: int | None = None
 
@@ -172,6 +176,7 @@ class Catalogue:
             await self._journal.append(
                 h.about_stream(row.id), [h.draft(h.DESCRIBED, h.SERVER, now)]
             )
+        room = self._rooms.open_room(h.graph_stream(row.id))
         return GraphView(
             id=row.id,
             name=summary.name,
@@ -181,6 +186,9 @@ class Catalogue:
             made_at=h.when(row.made_at),
             actions=summary.actions,
             problems=summary.problems,
+            robots=summary.robots,
+            labels=summary.labels,
+            people=() if room is None else room.attendance.people(),
             deleted_at=None if row.deleted_at is None else h.when(row.deleted_at),
             damaged=summary.damaged,
         )

@@ -11,16 +11,20 @@ from action_assistant.editor import happenings as h
 from action_assistant.editor.sights import Sights
 from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
-from action_assistant.umrf.jsontext import parse_small
-from action_assistant.umrf.model import Action, Graph, Parameter
+from action_assistant.umrf.jsontext import dump, parse_small
+from action_assistant.umrf.model import Action, Graph, JsonText, Parameter
 
 
 class Taking(msgspec.Struct, frozen=True):
-    """One parameter. `path` joins keys with `/` as in UMRF; no `pvf_type`: the file names none."""
+    """One parameter. `path` joins keys with `/` as in UMRF; no `pvf_type`: the file names none.
+
+    `text` is its JSON as a new use begins with it: without a value.
+    """
 
     path: str
     pvf_type: str | None
     required: bool
+    text: JsonText
 
 
 class Known(msgspec.Struct, frozen=True):
@@ -117,12 +121,13 @@ def _together(lists: Iterable[tuple[Parameter, ...]]) -> tuple[Taking, ...]:
 def _taking(parameter: Parameter) -> Taking:
     leaf = parse_small(parameter.text)
     if not isinstance(leaf, dict):
-        return Taking(parameter.path, None, required=True)
+        return Taking(parameter.path, None, required=True, text=parameter.text)
     kind = leaf.get("pvf_type")
     return Taking(
         parameter.path,
         kind if isinstance(kind, str) else None,
         required=leaf.get("pvf_required") is not False,
+        text=dump({name: value for name, value in leaf.items() if name != "pvf_value"}),
     )
 
 

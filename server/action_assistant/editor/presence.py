@@ -98,6 +98,14 @@ class Attendance:
         seat = self._seats.get(client)
         return None if seat is None else seat.person.id
 
+    def people(self) -> tuple[Author, ...]:
+        """Who is there now, each once, by name."""
+        there = {seat.person.id: seat.person for seat in self._seats.values()}
+        return tuple(
+            Author(person.id, person.name)
+            for person in sorted(there.values(), key=lambda person: (person.name, person.id))
+        )
+
     def everyone(self) -> tuple[Entry, ...]:
         """Who is there now."""
         return tuple(self._entries.values())

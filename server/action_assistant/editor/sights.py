@@ -13,12 +13,15 @@ from action_assistant.editor.rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf.check import check
+from action_assistant.umrf.jsontext import parse_small
 from action_assistant.umrf.model import Graph, Problem
 
 T = TypeVar("T")
 
 _REMEMBERED: Final = 32  # moments of graphs
 _COUNTED: Final = 5000
+_LABELS: Final = 20  # of one graph
+_LABEL: Final = 60  # characters
 
 
 class Moment(msgspec.Struct, frozen=True):
@@ -44,6 +47,8 @@ class Summary(msgspec.Struct, frozen=True):
     description: str
     actions: int
     problems: Counts
+    robots: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
     damaged: int | None = None
 
 
@@ -133,6 +138,8 @@ class Sights:
                 moment.graph.description,
                 sum(not action.missing for action in moment.graph.actions),
                 Counts(errors, len(problems) - errors),
+                tuple(sorted({action.actor for action in moment.graph.actions} - {""})),
+                labels_of(moment.graph),
                 moment.seq + 1 if moment.seq < newest else None,
             ),
         )
@@ -142,6 +149,14 @@ class Sights:
         if newest == 0:
             raise NotFound(f"There is no graph {graph}.")
         return newest
+
+
+def labels_of(graph: Graph) -> tuple[str, ...]:
+    """What people sort the graph under: `labels` in its `gui_attributes`, which no engine reads."""
+    attributes = parse_small(dict(graph.extra).get("gui_attributes", "null"))
+    labels = attributes.get("labels") if isinstance(attributes, dict) else None
+    texts = [text for text in labels if isinstance(text, str)] if isinstance(labels, list) else []
+    return tuple(dict.fromkeys(text.strip()[:_LABEL] for text in texts if text.strip()))[:_LABELS]
 
 
 def _moment(seq: int, maps: Maps) -> Moment:

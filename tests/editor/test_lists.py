@@ -1,0 +1,62 @@
+"""What the list of graphs says of each: robots, labels, and who is in it now."""
+
+import asyncio
+import json
+from pathlib import Path
+
+import httpx
+from hypothesis import given
+from hypothesis import strategies as st
+
+from action_assistant.editor import wire
+from action_assistant.editor.app import open_house
+from action_assistant.editor.happenings import graph_stream
+from action_assistant.editor.sights import labels_of
+from action_assistant.settings import EditorSettings
+from action_assistant.umrf.model import Graph
+from editor.client import Client
+from editor.test_api import NAV
+
+texts = st.one_of(st.text(max_size=8), st.none(), st.integers())
+
+
+def test_robots_and_labels_are_those_of_the_file(http: httpx.Client) -> None:
+    actions = [
+        {**action, "actor": robot} for action, robot in zip(NAV["actions"], "ba", strict=True)
+    ]
+    attributes = {"labels": ["night", "night", " demo "], "zoom": 1.50}
+    body = {**NAV, "actions": actions, "gui_attributes": attributes}
+    made = http.post("/api/graphs", json=body).json()
+    assert (made["robots"], made["labels"]) == (["a", "b"], ["night", "demo"])
+    (listed,) = [each for each in http.get("/api/graphs").json() if each["id"] == made["id"]]
+    assert (listed["robots"], listed["labels"]) == (["a", "b"], ["night", "demo"])
+    again = http.get(f"/api/graphs/{made['id']}/umrf").json()
+    assert again["gui_attributes"]["labels"] == attributes["labels"]
+
+
+@given(st.one_of(st.lists(texts), texts, st.dictionaries(st.text(max_size=3), texts)))
+def test_labels_that_are_none_are_left_out(value: object) -> None:
+    attributes = json.dumps({"labels": value})
+    labels = labels_of(Graph(name="g", extra=(("gui_attributes", attributes),)))
+    assert all(label.strip() == label and label for label in labels)
+    assert len(set(labels)) == len(labels) <= 20
+
+
+async def test_the_list_says_who_is_in_a_graph_now(tmp_path: Path) -> None:
+    settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
+    async with open_house(settings) as house:
+        made, _ = await house.catalogue.bring(json.dumps(NAV).encode(), "ada")
+        async with house.rooms.enter(graph_stream(made.id)) as room:
+            here = [Client("mari"), Client("ada"), Client("ada")]
+            for number, client in enumerate(here, start=1):
+                client.join(room)
+                client.deliver(wire.presence([wire.Entry(number, 1, b"{}")]))
+            await asyncio.sleep(0)
+            view = await house.catalogue.get(made.id)
+            assert [person.name for person in view.people] == ["Ada", "Mari"]
+            here[0].leave()
+            view = await house.catalogue.get(made.id)
+            assert [person.name for person in view.people] == ["Ada"]
+            for client in here[1:]:
+                client.leave()
+        assert (await house.catalogue.get(made.id)).people == ()
