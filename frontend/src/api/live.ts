@@ -1,5 +1,7 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
 import { newAid } from "../graph/ids";
+import { Refusal, sentence } from "./http";
+import type { Robot } from "./robots";
 import { getRun, postStop, type Run } from "./runs";
 
 export type LiveLink = "connecting" | "live" | "down";
@@ -9,7 +11,10 @@ export interface StopAsked {
   id: string;
   run: string | "all";
   at: number;
-  /** `asked`: nobody has answered yet; `heard`: the runner is stopping; else why it will not. */
+  /**
+   * `asked`: nobody has answered yet; `unheard`: it could not be sent, and is sent again;
+   * `heard`: the runner is stopping; `refused`: it will not.
+   */
   state: "asked" | "heard" | "refused" | "unheard";
   detail: string;
 }
@@ -18,24 +23,36 @@ export interface LiveNow {
   link: LiveLink;
   /** When the link became what it is, ms. */
   since: number;
-  engines: readonly unknown[];
+  engines: readonly Robot[];
   runs: ReadonlyMap<string, Run>;
+  /** When each open run was last shown by its engine, ms. */
+  seen: ReadonlyMap<string, number>;
   stops: readonly StopAsked[];
 }
 
 type Message =
-  | { type: "hello"; engines: unknown[]; runs: Run[] }
+  | { type: "hello"; engines: Robot[]; runs: Run[] }
+  | { type: "engines"; engines: Robot[] }
   | { type: "run"; run: Run }
-  | { type: "beat"; at: string }
+  | { type: "beat"; at: string; seen: Record<string, string> }
   | { type: "stopping"; stop_id: string; runs: string[] }
   | { type: "refused"; stop_id: string; detail: string };
 
 const SILENCE = 3_500; // ms; the runner beats each second
 const STOPS_KEPT = 5;
+const AGAIN = 1_000; // ms between two tries to send a Stop
+const ALL_HOLDS = 5_000; // ms; later, "all" would mean runs that nobody had seen when it was asked
 
 /** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
 export class Live {
-  now: LiveNow = { link: "connecting", since: Date.now(), engines: [], runs: new Map(), stops: [] };
+  now: LiveNow = {
+    link: "connecting",
+    since: Date.now(),
+    engines: [],
+    runs: new Map(),
+    seen: new Map(),
+    stops: [],
+  };
   readonly #runner: string;
   readonly #listeners = new Set<() => void>();
   #socket: WebSocket | null = null;
@@ -75,17 +92,40 @@ export class Live {
     return () => this.#listeners.delete(listener);
   };
 
-  /** Sends Stop over the socket and by POST at once: whichever arrives first counts. */
+  /**
+   * Sends Stop over the socket and by POST at once: whichever arrives first counts. While nobody
+   * hears it, it is sent again for as long as the page is open.
+   */
   stop(run: string | "all"): void {
     const id = newAid();
-    this.#putStop({ id, run, at: Date.now(), state: "asked", detail: "" });
+    const at = Date.now();
+    const open = [...this.now.runs.values()].filter((each) => each.ended_at === null);
+    const meant = open.map((each) => each.id);
+    this.#putStop({ id, run, at, state: "asked", detail: "" });
+    void this.#keepStopping(id, run, at, meant);
+  }
+
+  async #keepStopping(id: string, run: string, at: number, meant: string[]): Promise<void> {
+    for (;;) {
+      const late = run === "all" && Date.now() - at > ALL_HOLDS;
+      try {
+        for (const each of late ? meant : [run]) await this.#sendStop(each, id);
+        this.#answerStop(id, "heard", "");
+      } catch (error) {
+        const final = error instanceof Refusal && error.details.status < 500;
+        this.#answerStop(id, final ? "refused" : "unheard", sentence(error));
+      }
+      const now = this.now.stops.find((stop) => stop.id === id);
+      if (this.#closed || now?.state !== "unheard") return;
+      await new Promise((done) => setTimeout(done, AGAIN));
+    }
+  }
+
+  #sendStop(run: string, id: string): Promise<unknown> {
     if (this.#socket?.readyState === WebSocket.OPEN) {
       this.#socket.send(JSON.stringify({ type: "stop", run, stop_id: id }));
     }
-    postStop(this.#runner, run, id).then(
-      () => this.#answerStop(id, "heard", ""),
-      (error: Error) => this.#answerStop(id, "unheard", error.message),
-    );
+    return postStop(this.#runner, run, id);
   }
 
   /** Takes in a run that this page has just started, before the socket tells of it. */
@@ -153,8 +193,16 @@ export class Live {
       case "refused":
         this.#answerStop(message.stop_id, "refused", message.detail);
         break;
-      case "beat":
+      case "engines":
+        this.#set({ engines: message.engines });
         break;
+      case "beat": {
+        const seen = Object.entries(message.seen).map(
+          ([run, at]) => [run, Date.parse(at)] as const,
+        );
+        this.#set({ seen: new Map(seen) });
+        break;
+      }
     }
   }
 

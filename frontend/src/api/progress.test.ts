@@ -24,6 +24,7 @@ const run: Run = {
   detail: "",
   alarms: [],
   recorded: true,
+  group: null,
 };
 
 const visit = {

@@ -61,6 +61,8 @@ export interface Run {
   /** Why it was refused, lost or ended so. */
   detail: string;
   alarms: { code: string; at: string; text: string }[];
+  /** Shared by runs that were started together. */
+  group: string | null;
   /** Whether the journal has all of it. */
   recorded: boolean;
   actions?: Record<string, ActionRun>;
@@ -87,23 +89,34 @@ export interface StartOrder {
   /** JSON text, sent exactly as the editor gave it. */
   umrf: string;
   graph: string;
-  engine: string;
+  /** One engine, or several robots that start together. */
+  engines: readonly string[];
   request: string;
+  override?: { codes: readonly string[]; reason: string };
+}
+
+export interface Started {
+  runs: Run[];
+  /** Robots that nothing was sent to, and why. */
+  failed: Record<string, string>;
 }
 
 /** Starts a version by value. The same `request` never starts twice. */
-export function startRun(order: StartOrder): Promise<Run> {
+export async function startRun(order: StartOrder): Promise<Started> {
+  const [engine, ...others] = order.engines;
+  const alone = others.length === 0;
   const head = JSON.stringify({
     version: order.version,
     digest: order.digest,
     graph: order.graph,
-    engine: order.engine,
+    ...(alone ? { engine } : { engines: order.engines }),
     request_id: order.request,
+    ...(order.override === undefined ? {} : { override: order.override }),
   });
-  return ask(`${order.runner}/api/runs`, {
-    method: "POST",
-    body: `${head.slice(0, -1)},"umrf":${order.umrf}}`,
-  });
+  const body = `${head.slice(0, -1)},"umrf":${order.umrf}}`;
+  if (!alone) return ask(`${order.runner}/api/groups`, { method: "POST", body });
+  const run = await ask<Run>(`${order.runner}/api/runs`, { method: "POST", body });
+  return { runs: [run], failed: {} };
 }
 
 /** Asks to stop one run, or all of them. */
@@ -112,7 +125,7 @@ export function postStop(runner: string, run: string | "all", stop: string): Pro
   return ask(`${runner}${path}`, {
     method: "POST",
     body: { stop_id: stop },
-    patience: 6_000,
+    patience: 3_000,
   });
 }
 

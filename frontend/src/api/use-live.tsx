@@ -10,6 +10,7 @@ import {
 } from "react";
 import { useConfig } from "./graphs";
 import { Live, type LiveNow } from "./live";
+import type { Held, Robot } from "./robots";
 import type { Run } from "./runs";
 
 interface LiveHold {
@@ -39,7 +40,14 @@ export function LiveProvider({ who, children }: { who: string; children: ReactNo
   return <Context value={{ live, runner }}>{children}</Context>;
 }
 
-const NOTHING: LiveNow = { link: "connecting", since: 0, engines: [], runs: new Map(), stops: [] };
+const NOTHING: LiveNow = {
+  link: "connecting",
+  since: 0,
+  engines: [],
+  runs: new Map(),
+  seen: new Map(),
+  stops: [],
+};
 const never = () => () => {};
 
 export function useLive(): LiveHold & { now: LiveNow } {
@@ -63,4 +71,24 @@ export function newestRun(now: LiveNow, graph: string): Run | null {
     if (run.graph === graph && (newest === null || run.number > newest.number)) newest = run;
   }
   return newest;
+}
+
+/** What robots run that nobody started from here, as `robot: graph`. Sub-graphs belong to theirs. */
+export function foreignGraphs(now: LiveNow): { robot: Robot; held: Held }[] {
+  return now.engines.flatMap((robot) => {
+    const moving = robot.holds.filter((held) => held.active);
+    const tops = moving.filter((held) => !moving.some((top) => isPart(held.graph, top.graph)));
+    return tops.filter((held) => !isOurs(now, robot, held)).map((held) => ({ robot, held }));
+  });
+}
+
+function isPart(graph: string, top: string): boolean {
+  return graph !== top && graph.startsWith(`${top}__`);
+}
+
+function isOurs(now: LiveNow, robot: Robot, held: Held): boolean {
+  return openRuns(now).some(
+    (run) =>
+      run.engine === robot.name && (run.id === held.run || isPart(held.graph, run.graph_name)),
+  );
 }

@@ -18,7 +18,7 @@ import { DropFiles } from "./drop-files";
 import { GraphScreen } from "./graph-screen";
 import { Lost } from "./lost";
 import { ReviewDialog } from "./review-dialog";
-import { HomeScreen, RunScreen, RunsScreen } from "./screens";
+import { HomeScreen, RobotsScreen, RunScreen, RunsScreen } from "./screens";
 
 const client = new QueryClient({
   defaultOptions: {
@@ -50,6 +50,7 @@ export function App() {
               <Switch>
                 <Route path="/" component={HomeScreen} />
                 <Route path="/graphs/:id">{({ id }) => <GraphScreen key={id} id={id} />}</Route>
+                <Route path="/robots" component={RobotsScreen} />
                 <Route path="/runs" component={RunsScreen} />
                 <Route path="/runs/:id">{({ id }) => <RunScreen key={id} id={id} />}</Route>
                 <Route component={Lost} />

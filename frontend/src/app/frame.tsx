@@ -1,6 +1,6 @@
 /** What every screen has: the bar with STOP on top, the screen below. */
 import { Button } from "@mantine/core";
-import { IconHistory } from "@tabler/icons-react";
+import { IconHistory, IconRobot } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
@@ -15,11 +15,37 @@ interface Props {
   start?: ReactNode;
   /** The graph on screen. */
   graph?: string;
-  /** The screen is the history itself. */
-  history?: boolean;
+  /** The screen is one of those that the bar leads to. */
+  at?: "runs" | "robots";
 }
 
-export function Bar({ crumbs, status, actions, start, graph, history = false }: Props) {
+interface WayProps {
+  to: string;
+  icon: typeof IconHistory;
+  name: string;
+  /** Something else needs the room on a narrow screen. */
+  tight: ReactNode;
+}
+
+function Way({ to, icon: Icon, name, tight }: WayProps) {
+  return (
+    <Button
+      component={Link}
+      to={to}
+      variant="subtle"
+      color="gray"
+      px="sm"
+      aria-label={name}
+      leftSection={<Icon size={16} aria-hidden />}
+      className={style.way ?? ""}
+      data-tight={tight ? true : undefined}
+    >
+      {name}
+    </Button>
+  );
+}
+
+export function Bar({ crumbs, status, actions, start, graph, at }: Props) {
   return (
     <TopBar
       crumbs={crumbs}
@@ -27,20 +53,8 @@ export function Bar({ crumbs, status, actions, start, graph, history = false }: 
       actions={
         <>
           {actions}
-          {!history && (
-            <Button
-              component={Link}
-              to="/runs"
-              variant="subtle"
-              color="gray"
-              px="sm"
-              leftSection={<IconHistory size={16} aria-hidden />}
-              className={style.history ?? ""}
-              data-tight={start ? true : undefined}
-            >
-              Runs
-            </Button>
-          )}
+          {at !== "robots" && <Way to="/robots" icon={IconRobot} name="Robots" tight={start} />}
+          {at !== "runs" && <Way to="/runs" icon={IconHistory} name="Runs" tight={start} />}
         </>
       }
       account={<AccountMenu />}

@@ -75,6 +75,7 @@ function Inside({ id }: { id: string }) {
         mayStart && (
           <StartControl
             graph={id}
+            name={shown.graph.name || "untitled"}
             seq={shown.seq}
             obstacle={shown.obstacle}
             compact={shown.compact}
@@ -92,7 +93,7 @@ function Inside({ id }: { id: string }) {
           onFold={shown.fold}
         />
       )}
-      corner={<LiveWord />}
+      corner={<LiveWord run={live} />}
     />
   );
 }

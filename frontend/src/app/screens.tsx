@@ -2,6 +2,7 @@
 import { RunPage } from "../history/run-page";
 import { RunsPage } from "../history/runs-page";
 import { Home } from "../library/home";
+import { RobotsPage } from "../robots/robots-page";
 import { useNewGraphs } from "./files";
 import { Bar, Frame } from "./frame";
 import { useTitle } from "./title";
@@ -21,7 +22,7 @@ export function RunsScreen() {
   useTitle("Runs");
   return (
     <Frame>
-      <Bar history crumbs={[{ label: "Graphs", to: "/" }, { label: "Runs" }]} />
+      <Bar at="runs" crumbs={[{ label: "Graphs", to: "/" }, { label: "Runs" }]} />
       <RunsPage />
     </Frame>
   );
@@ -31,7 +32,21 @@ export function RunScreen({ id }: { id: string }) {
   useTitle("Run");
   return (
     <Frame>
-      <RunPage id={id} bar={(parts) => <Bar history {...parts} />} />
+      <RunPage id={id} bar={(parts) => <Bar at="runs" {...parts} />} />
+    </Frame>
+  );
+}
+
+export function RobotsScreen() {
+  const { take } = useNewGraphs();
+  useTitle("Robots");
+  const onImport = (text: string, name: string) => {
+    void take([new File([text], `${name}.umrf.graph.json`, { type: "application/json" })]);
+  };
+  return (
+    <Frame>
+      <Bar at="robots" crumbs={[{ label: "Graphs", to: "/" }, { label: "Robots" }]} />
+      <RobotsPage onImport={onImport} />
     </Frame>
   );
 }

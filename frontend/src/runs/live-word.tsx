@@ -1,15 +1,41 @@
-/** Whether the page hears the runner, in words. */
-import { IconPlugConnectedX } from "@tabler/icons-react";
+/** Whether the page hears the runner, and how old what it shows of a run is, in words. */
+import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
+import type { Run } from "../api/runs";
 import { useLive } from "../api/use-live";
-import { clock } from "../ui/when";
+import { clock, duration, useNow } from "../ui/when";
 import style from "./live-word.module.css";
 
-export function LiveWord() {
+const OLD = 2_500; // ms; a run is looked at each second
+
+/** "proof 0.4 s ago": when the engine itself last showed this run. */
+export function Proof({ run }: { run: Run }) {
+  const { now } = useLive();
+  const seen = now.seen.get(run.id);
+  const goes = run.ended_at === null;
+  const present = useNow(500, goes);
+  if (!goes) return null;
+  if (seen === undefined) return <span className={style.word}>no proof yet</span>;
+  const old = Math.max(0, present - seen);
+  return (
+    <span
+      className={style.word}
+      data-old={old > OLD || undefined}
+      title="When the engine itself last showed this run"
+    >
+      <IconEye size={13} aria-hidden /> proof {duration(old)} ago
+    </span>
+  );
+}
+
+export function LiveWord({ run }: { run?: Run | null }) {
   const { now } = useLive();
   if (now.link === "live") {
     return (
-      <span className={style.word} data-link="live">
-        <i aria-hidden /> Live
+      <span className={style.both}>
+        {run && run.ended_at === null && !run.simulated && <Proof run={run} />}
+        <span className={style.word} data-link="live">
+          <i aria-hidden /> Live
+        </span>
       </span>
     );
   }

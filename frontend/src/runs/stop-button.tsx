@@ -1,11 +1,32 @@
-/** STOP: one, always at the same place, never disabled. */
+/** STOP: one, always at the same place, never disabled; STOP ALL by keys from anywhere. */
 import { IconSquareFilled } from "@tabler/icons-react";
-import { openRuns, useLive } from "../api/use-live";
+import { useEffect } from "react";
+import type { Live } from "../api/live";
+import { foreignGraphs, openRuns, useLive } from "../api/use-live";
 import style from "./stop-button.module.css";
 
 interface Props {
   /** The graph on screen: its run is the one that Stop means, if it goes. */
   graph?: string;
+}
+
+/** Ctrl+. or ⌘. : not taken by browsers, and reachable without looking. */
+export function isStopAll(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey">): boolean {
+  return event.key === "." && (event.ctrlKey || event.metaKey);
+}
+
+/** Also while somebody types, in dialogs and menus: nothing is asked before a Stop. */
+function useStopKey(live: Live | null): void {
+  useEffect(() => {
+    const onKey = (event: KeyboardEvent) => {
+      if (!isStopAll(event) || event.repeat) return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      live?.stop("all");
+    };
+    window.addEventListener("keydown", onKey, { capture: true });
+    return () => window.removeEventListener("keydown", onKey, { capture: true });
+  }, [live]);
 }
 
 function words(link: string, count: number): string {
@@ -14,25 +35,43 @@ function words(link: string, count: number): string {
   return count === 1 ? "1 run" : `${count} runs`;
 }
 
+const SOFT = "A software stop: no replacement for the emergency stop.";
+
 export function StopButton({ graph }: Props) {
   const { live, now } = useLive();
+  useStopKey(live);
   const open = openRuns(now);
   const here = open.filter((run) => run.graph === graph);
   const [only] = here.length === 1 ? here : [];
-  const calm = now.link === "live" && open.length === 0;
+  const all = open.length + foreignGraphs(now).length;
+  const calm = now.link === "live" && all === 0;
   const target = only ? `run ${only.number} of ${only.graph_name}` : "everything that runs";
+  const beside = only !== undefined && all > 1;
   return (
-    <button
-      type="button"
-      className={style.stop}
-      data-calm={calm || undefined}
-      onClick={() => live?.stop(only?.id ?? "all")}
-      aria-label={`Stop ${target}. Software stop, no emergency stop`}
-      title={`Stop ${target}.\nA software stop: no replacement for the emergency stop.`}
-    >
-      <IconSquareFilled size={13} aria-hidden style={{ flex: "none" }} />
-      <span className={style.word}>STOP</span>
-      <span className={style.count}>{words(now.link, only ? 1 : open.length)}</span>
-    </button>
+    <span className={style.both} data-beside={beside || undefined}>
+      <button
+        type="button"
+        className={style.stop}
+        data-calm={calm || undefined}
+        onClick={() => live?.stop(only?.id ?? "all")}
+        aria-label={`Stop ${target}. Software stop, no emergency stop`}
+        title={`Stop ${target}.\n${SOFT}`}
+      >
+        <IconSquareFilled size={13} aria-hidden style={{ flex: "none" }} />
+        <span className={style.word}>{only || all === 0 ? "STOP" : "STOP ALL"}</span>
+        <span className={style.count}>{words(now.link, only ? 1 : all)}</span>
+      </button>
+      {beside && (
+        <button
+          type="button"
+          className={style.all}
+          onClick={() => live?.stop("all")}
+          aria-label="Stop everything that runs, everywhere. Software stop, no emergency stop"
+          title={`Stop everything that runs (Ctrl+.).\n${SOFT}`}
+        >
+          ALL {all}
+        </button>
+      )}
+    </span>
   );
 }

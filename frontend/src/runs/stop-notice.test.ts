@@ -1,13 +1,22 @@
 import { expect, test } from "vitest";
 import type { LiveNow, StopAsked } from "../api/live";
 import type { Run } from "../api/runs";
-import { noticeOf } from "./stop-notice";
+import { noticeOf, othersNotice } from "./stop-notice";
 
 const stop: StopAsked = { id: "s", run: "r", at: 1000, state: "heard", detail: "" };
 
 function now(part: Partial<Run> | null, link: LiveNow["link"] = "live"): LiveNow {
-  const run = { id: "r", number: 7, state: "running", ended_at: null, ...part } as Run;
-  return { link, since: 0, engines: [], stops: [stop], runs: new Map(part ? [["r", run]] : []) };
+  const run = {
+    id: "r",
+    number: 7,
+    state: "running",
+    ended_at: null,
+    alarms: [],
+    engine: "David",
+    ...part,
+  } as Run;
+  const runs = new Map(part ? [["r", run]] : []);
+  return { link, since: 0, engines: [], stops: [stop], runs, seen: new Map() };
 }
 
 test("a Stop that nothing proves becomes loud", () => {
@@ -26,12 +35,32 @@ test("stopped is said when the run's state says so", () => {
 test("without the runner nothing is claimed", () => {
   expect(noticeOf(stop, now({}, "down"), 1200)?.text).toContain("UNCONFIRMED");
   const unheard = { ...stop, state: "unheard", detail: "The runner does not answer." } as const;
-  expect(noticeOf(unheard, now({}, "down"), 1200)?.text).toContain("did not reach");
+  expect(noticeOf(unheard, now({}, "down"), 1200)?.text).toContain(
+    "NOT SENT: use the hardware stop",
+  );
+  const unanswered = { ...stop, state: "asked" } as const;
+  expect(noticeOf(unanswered, now({}), 1500)?.tone).toBe("quiet");
+  expect(noticeOf(unanswered, now({}), 9000)?.text).toContain("NOT SENT");
 });
 
 test("a refused Stop says why", () => {
   expect(noticeOf({ ...stop, state: "refused", detail: "no such run" }, now(null), 1200)).toEqual({
     tone: "loud",
-    text: "Stop refused: no such run",
+    text: "Stop refused: no such run Use the hardware stop.",
   });
+});
+
+test("an engine that was restarted has not stopped", () => {
+  const detail = "The engine was restarted while the run went on.";
+  const lost = now({ state: "lost", ended_at: "1970-01-01T00:00:02Z", detail });
+  const notice = noticeOf(stop, lost, 2500);
+  expect(notice?.tone).toBe("loud");
+  expect(notice?.text).toContain("restarted");
+});
+
+test("a Stop of somebody else that nothing proves is shouted here, too, with the reason", () => {
+  const alarm = { code: "stop_unconfirmed", at: "", text: "STOP UNCONFIRMED: it is deaf." };
+  const stopping = now({ state: "stopping", desired: "stopped", alarms: [alarm] });
+  expect(othersNotice(stopping)?.text).toBe("STOP UNCONFIRMED: run 7 on David: it is deaf.");
+  expect(othersNotice(now({ desired: "running", alarms: [alarm] }))).toBeNull();
 });

@@ -3,14 +3,15 @@ import { CloseButton } from "@mantine/core";
 import { useState } from "react";
 import type { LiveNow, StopAsked } from "../api/live";
 import type { Run } from "../api/runs";
-import { openRuns, useLive } from "../api/use-live";
+import { foreignGraphs, openRuns, useLive } from "../api/use-live";
 import { duration, useNow } from "../ui/when";
 import style from "./stop-notice.module.css";
 
 const LOUD = 2_500; // ms without proof until the notice shouts
+const HEARD = 1_200; // ms within which the runner answers a Stop, if it does
 const GONE = 6_000; // ms that a proven stop stays to be read
 
-type Notice = { tone: "quiet" | "loud" | "done"; text: string } | null;
+export type Notice = { tone: "quiet" | "loud" | "done"; text: string; stays?: true } | null;
 
 function targets(stop: StopAsked, now: LiveNow): Run[] {
   if (stop.run !== "all") {
@@ -22,26 +23,52 @@ function targets(stop: StopAsked, now: LiveNow): Run[] {
   );
 }
 
+/** Why it is not proven, as the runner says; "" when it has not said so yet. */
+function reasonOf(run: Run): string {
+  const alarm = run.alarms.findLast((each) => each.code === "stop_unconfirmed");
+  return alarm ? alarm.text.replace(/^STOP UNCONFIRMED: /, "") : "";
+}
+
+function unconfirmed(runs: readonly Run[], since: string): Notice {
+  const each = runs.map((run) => `run ${run.number} on ${run.engine}`).join(", ");
+  const why = runs.map(reasonOf).find((reason) => reason !== "") ?? "no proof has come.";
+  return { tone: "loud", stays: true, text: `STOP UNCONFIRMED${since}: ${each}: ${why}` };
+}
+
 /** Never says "stopped" without the runs' own state saying so. */
 export function noticeOf(stop: StopAsked, now: LiveNow, at: number): Notice {
   const waited = at - stop.at;
   const since = `asked ${duration(waited)} ago`;
-  if (stop.state === "refused") return { tone: "loud", text: `Stop refused: ${stop.detail}` };
-  if (stop.state === "unheard" && now.link !== "live") {
-    return { tone: "loud", text: `Stop did not reach the runner: ${stop.detail} Press it again.` };
+  if (stop.state === "refused") {
+    return { tone: "loud", text: `Stop refused: ${stop.detail} Use the hardware stop.` };
+  }
+  const unsent = stop.state === "unheard" || (stop.state === "asked" && waited > HEARD);
+  if (unsent) {
+    const why = stop.detail || "The runner does not answer.";
+    return {
+      tone: "loud",
+      stays: true,
+      text: `NOT SENT: use the hardware stop. ${why} Trying again, ${since}.`,
+    };
   }
   if (now.link === "down") {
-    return { tone: "loud", text: `STOP UNCONFIRMED, ${since}: no word from the runner.` };
+    return {
+      tone: "loud",
+      stays: true,
+      text: `STOP UNCONFIRMED, ${since}: sent, but no word from the runner since.`,
+    };
   }
   const runs = targets(stop, now);
   const open = runs.filter((run) => run.ended_at === null);
   if (open.length > 0) {
+    if (waited >= LOUD) return unconfirmed(open, `, ${since}`);
     const names = open.map((run) => `run ${run.number}`).join(", ");
-    if (waited < LOUD) return { tone: "quiet", text: `Stopping ${names} … ${since}` };
-    return {
-      tone: "loud",
-      text: `STOP UNCONFIRMED: ${names} not proven to have stopped, ${since}.`,
-    };
+    return { tone: "quiet", text: `Stopping ${names} … ${since}` };
+  }
+  const lost = runs.filter((run) => run.state === "lost");
+  if (lost.length > 0) {
+    const ends = lost.map((run) => `run ${run.number} on ${run.engine}: ${run.detail}`).join(" ");
+    return { tone: "loud", text: `STOP UNCONFIRMED: ${ends} Look at the robot.` };
   }
   if (waited > GONE) return null;
   if (stop.state === "asked") return { tone: "quiet", text: `Stop ${since}` };
@@ -50,15 +77,28 @@ export function noticeOf(stop: StopAsked, now: LiveNow, at: number): Notice {
   return { tone: "done", text: `${ends}.` };
 }
 
+/** What somebody else has asked for and what is not proven either: everybody is told. */
+export function othersNotice(now: LiveNow): Notice {
+  if (now.link === "down") return null;
+  const shouting = openRuns(now).filter((run) => run.desired === "stopped" && reasonOf(run) !== "");
+  if (shouting.length > 0) return unconfirmed(shouting, "");
+  const held = foreignGraphs(now).find((each) => each.held.stopping);
+  if (held === undefined) return null;
+  const { robot, held: graph } = held;
+  const text = `STOP UNCONFIRMED: ${graph.graph} on ${robot.name}: ${graph.stopping}.`;
+  return { tone: "loud", stays: true, text };
+}
+
 export function StopNotice() {
   const { now } = useLive();
   const [dismissed, setDismissed] = useState("");
   const last = now.stops.at(-1);
   const watching = last !== undefined && last.id !== dismissed;
   const open = openRuns(now).length;
-  const at = useNow(200, watching && (open > 0 || Date.now() - last.at < GONE + 1000));
-  if (!watching) return null;
-  const notice = noticeOf(last, now, at);
+  const busy =
+    watching && (open > 0 || last.state !== "heard" || Date.now() - last.at < GONE + 1000);
+  const at = useNow(200, busy);
+  const notice = (watching ? noticeOf(last, now, at) : null) ?? othersNotice(now);
   if (notice === null) return null;
   return (
     <div
@@ -67,7 +107,9 @@ export function StopNotice() {
       role={notice.tone === "loud" ? "alert" : "status"}
     >
       <span>{notice.text}</span>
-      <CloseButton size="sm" aria-label="Hide" onClick={() => setDismissed(last.id)} />
+      {!notice.stays && (
+        <CloseButton size="sm" aria-label="Hide" onClick={() => setDismissed(last?.id ?? "")} />
+      )}
     </div>
   );
 }

@@ -55,7 +55,7 @@ def _group(*, look: bool) -> RequestBody:
     fields = {k: v for k, v in (one.properties or {}).items() if k not in {"engine", "script"}}
     needed = [each for each in one.required or () if each != "engine"]
     if look:
-        needed.remove("request_id")
+        needed = ["umrf"]
     whole = Schema(
         type=OpenAPIType.OBJECT,
         properties={**fields, "engines": names},

@@ -39,9 +39,11 @@ class Item(msgspec.Struct, frozen=True, kw_only=True):
 
 class Preflight(msgspec.Struct, frozen=True, kw_only=True):
     """What stands between a graph and its start on one engine. `override`: the codes that a person
-    would have to answer for; `never`: something cannot be overridden."""
+    would have to answer for; `never`: something cannot be overridden; `digest`: of the graph that
+    was looked at."""
 
     engine: str
+    digest: str
     items: tuple[Item, ...]
     override: tuple[str, ...]
     never: bool
@@ -59,12 +61,14 @@ class Sight(msgspec.Struct, frozen=True, kw_only=True):
     open_runs: frozenset[str] = frozenset()
 
 
-def summed(engine: str, items: Sequence[Item]) -> Preflight:
+def summed(engine: str, items: Sequence[Item], digest: str = "") -> Preflight:
     """The items of one engine with what follows from them."""
     blocked = [item for item in items if item.verdict == "blocked"]
     codes = sorted({code for item in blocked if item.overridable for code in item.codes})
     never = any(not item.overridable for item in blocked)
-    return Preflight(engine=engine, items=tuple(items), override=tuple(codes), never=never)
+    return Preflight(
+        engine=engine, digest=digest, items=tuple(items), override=tuple(codes), never=never
+    )
 
 
 def of_refusal(code: str, refused: Refused) -> Item:

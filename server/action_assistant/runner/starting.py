@@ -28,11 +28,12 @@ _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 
 
 class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One version for several robots at once. Without a `request_id` it can only be looked at."""
+    """One version for several robots at once. Without version, digest and `request_id` it can only
+    be looked at."""
 
-    version: str
-    digest: str
     umrf: msgspec.Raw
+    version: str = ""
+    digest: str = ""
     engines: Annotated[tuple[_Name, ...], msgspec.Meta(min_length=1, max_length=_MOST)]
     request_id: Annotated[str, msgspec.Meta(max_length=200)] = ""
     graph: str | None = None
@@ -158,14 +159,15 @@ class Starting:
         except Refused as refused:
             return preflight.summed(asked.engine, [preflight.of_refusal("link", refused)])
         try:
-            admitted = await self._aside(lambda: admit(asked, facts))
+            admitted = await self._aside(lambda: admit(asked, facts, approved=False))
             items.append(preflight.of_graph(admitted))
         except Refused as refused:
             items.append(preflight.of_refusal("graph", refused))
         if robot is not None:
             items.append(preflight.of_taken(asked.engine, self._taken(asked.engine)))
             items += await self._look_at(robot, admitted)
-        return preflight.summed(asked.engine, items)
+        digest = admitted.digest if admitted is not None else ""
+        return preflight.summed(asked.engine, items, digest)
 
     async def _look_at(self, robot: KnownEngine, admitted: Admitted | None) -> list[Item]:
         try:

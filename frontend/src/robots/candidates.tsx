@@ -1,0 +1,46 @@
+/** Engines in sight that nobody registered: one tap takes them in. */
+import { Button } from "@mantine/core";
+import { IconRadar2 } from "@tabler/icons-react";
+import { type Candidate, useCandidates } from "../api/robots";
+import { useLive } from "../api/use-live";
+import style from "./candidates.module.css";
+
+interface Props {
+  may: boolean;
+  on: boolean;
+  onTake: (candidate: Candidate) => void;
+}
+
+function words(candidate: Candidate): string {
+  if (candidate.problem !== "") return candidate.problem;
+  if (candidate.generation === "older") return "speaks an older generation of messages";
+  if (candidate.actor === "") return "an idle engine does not say its name: you have to know it";
+  return "heard by its feedback";
+}
+
+export function Candidates({ may, on, onTake }: Props) {
+  const { runner } = useLive();
+  const found = useCandidates(runner, on).data ?? [];
+  if (found.length === 0) return null;
+  return (
+    <section className={style.section} aria-label="In sight, not registered">
+      <h3 className={style.title}>
+        <IconRadar2 size={16} aria-hidden /> In sight, not registered
+      </h3>
+      <ul className={style.list}>
+        {found.map((each) => (
+          <li key={`${each.domain} ${each.get_service}`} className={style.line}>
+            <b>{each.actor || "An engine"}</b>
+            <span className={style.quiet}>
+              domain {each.domain} · {each.get_service} · {words(each)}
+            </span>
+            <span className={style.gap} />
+            <Button size="compact-sm" disabled={!may} onClick={() => onTake(each)}>
+              Register{each.actor === "" ? " …" : ""}
+            </Button>
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}

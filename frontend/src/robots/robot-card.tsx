@@ -1,0 +1,175 @@
+/** One robot: its engine in words, what makes answers a proof, what runs there. */
+import { ActionIcon, Button, Menu, Tabs } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconAlertTriangle, IconCheck, IconDots, IconPencil, IconTrash } from "@tabler/icons-react";
+import { useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import { sentence } from "../api/http";
+import { useMay } from "../api/person";
+import { forgetRobot, type Registration, type Robot } from "../api/robots";
+import { useLive } from "../api/use-live";
+import { EngineWord } from "../ui/engine-word";
+import { robotColor } from "../ui/robot";
+import { ago, clock, instant, useNow } from "../ui/when";
+import { FlightRecord } from "./flight-record";
+import { KnownHere } from "./known-here";
+import style from "./robot-card.module.css";
+import { RunsHere } from "./runs-here";
+
+interface Props {
+  robot: Robot;
+  onEdit: (robot: Registration) => void;
+  onImport: (text: string, name: string) => void;
+}
+
+type Sign = { good: boolean; text: string };
+
+/** What a person should know before trusting an answer or starting something. */
+export function signsOf(robot: Robot): Sign[] {
+  if (robot.state === "no_link") return [];
+  const signs: Sign[] = [];
+  if (robot.servers === 1)
+    signs.push({ good: true, text: "A stop can be proven: one engine answers on its path" });
+  if (robot.servers > 1) {
+    const text = `${robot.servers} engines answer on one path: nothing they say proves a stop`;
+    signs.push({ good: false, text });
+  }
+  if (robot.generation === "current")
+    signs.push({ good: true, text: "Speaks the current messages" });
+  if (robot.generation === "older") {
+    signs.push({ good: false, text: "Speaks an older generation of messages: it cannot be used" });
+  }
+  if (robot.others > 0) {
+    const who = robot.others === 1 ? "1 other program" : `${robot.others} other programs`;
+    signs.push({ good: false, text: `${who} can start things there` });
+  }
+  if (robot.actor !== "" && robot.actor !== robot.name) {
+    signs.push({ good: false, text: `Its feedback calls itself ${robot.actor}` });
+  }
+  return signs;
+}
+
+function Facts({ robot }: { robot: Robot }) {
+  const now = useNow(1000);
+  const heard = instant(robot.heard_at);
+  const restarted = instant(robot.restarted_at);
+  const took = robot.took_ms === null ? "" : ` within ${Math.max(1, Math.round(robot.took_ms))} ms`;
+  return (
+    <p className={style.facts}>
+      domain {robot.domain} · <code>{robot.get_service}</code>
+      {robot.rmw !== "" && ` · ${robot.rmw}`} ·{" "}
+      {heard === null ? "never answered" : `answered ${ago(heard, now)}${took}`}
+      {restarted !== null && ` · restarted ${clock(restarted)}`}
+    </p>
+  );
+}
+
+function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
+  const { runner } = useLive();
+  const client = useQueryClient();
+  const may = useMay("register");
+  const forget = async () => {
+    try {
+      await forgetRobot(runner ?? "", robot.name);
+      await client.invalidateQueries({ queryKey: ["robots"] });
+    } catch (error) {
+      const title = `${robot.name} was not forgotten`;
+      notifications.show({ color: "red", title, message: sentence(error) });
+    }
+  };
+  return (
+    <Menu>
+      <Menu.Target>
+        <ActionIcon size={32} aria-label={`More about ${robot.name}`}>
+          <IconDots size={17} aria-hidden />
+        </ActionIcon>
+      </Menu.Target>
+      <Menu.Dropdown>
+        {!may && <Menu.Label>Operators register robots</Menu.Label>}
+        <Menu.Item
+          leftSection={<IconPencil size={15} />}
+          disabled={!may}
+          onClick={() =>
+            onEdit({
+              name: robot.name,
+              domain: robot.domain ?? 0,
+              rmw: robot.rmw,
+              get_service: robot.get_service,
+              profile: robot.profile,
+            })
+          }
+        >
+          Change …
+        </Menu.Item>
+        <Menu.Item
+          color="red"
+          leftSection={<IconTrash size={15} />}
+          disabled={!may}
+          onClick={() => void forget()}
+        >
+          Forget
+        </Menu.Item>
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
+
+export function RobotCard({ robot, onEdit, onImport }: Props) {
+  const [open, setOpen] = useState<string | null>(null);
+  const linked = robot.state !== "no_link";
+  const count = (n: number | null, what: string) =>
+    n === null ? `${what}s` : `${n} ${what}${n === 1 ? "" : "s"}`;
+  return (
+    <article className={style.card} aria-label={robot.name}>
+      <i className={style.stripe} style={{ background: robotColor(robot.name) }} aria-hidden />
+      <header className={style.head}>
+        <h3 className={style.name}>{robot.name}</h3>
+        <EngineWord robot={robot} />
+        <span className={style.gap} />
+        <More robot={robot} onEdit={onEdit} />
+      </header>
+      <Facts robot={robot} />
+      {robot.why !== "" && <p className={style.why}>{robot.why}</p>}
+      <ul className={style.signs}>
+        {signsOf(robot).map(({ good, text }) => (
+          <li key={text} data-good={good || undefined}>
+            {good ? (
+              <IconCheck size={14} aria-hidden />
+            ) : (
+              <IconAlertTriangle size={14} aria-hidden />
+            )}{" "}
+            {text}
+          </li>
+        ))}
+      </ul>
+      <RunsHere robot={robot} onImport={onImport} />
+      {linked && (
+        <Tabs value={open} onChange={setOpen} className={style.tabs ?? ""} keepMounted={false}>
+          <Tabs.List>
+            <Tabs.Tab value="known">
+              {count(robot.actions, "action")}, {count(robot.graphs, "graph")}
+            </Tabs.Tab>
+            <Tabs.Tab value="flight">What others told it</Tabs.Tab>
+            {open !== null && (
+              <Button
+                size="compact-xs"
+                variant="subtle"
+                ml="auto"
+                my="auto"
+                onClick={() => setOpen(null)}
+              >
+                Close
+              </Button>
+            )}
+          </Tabs.List>
+          <Tabs.Panel value="known" className={style.panel ?? ""}>
+            <KnownHere robot={robot.name} />
+          </Tabs.Panel>
+          <Tabs.Panel value="flight" className={style.panel ?? ""}>
+            <FlightRecord robot={robot.name} onImport={onImport} />
+          </Tabs.Panel>
+        </Tabs>
+      )}
+    </article>
+  );
+}

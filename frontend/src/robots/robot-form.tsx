@@ -1,0 +1,176 @@
+/** Registers a robot, or changes how it is reached. */
+import {
+  Button,
+  Collapse,
+  Group,
+  Modal,
+  NumberInput,
+  Stack,
+  Switch,
+  Text,
+  TextInput,
+} from "@mantine/core";
+import { useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import { Refusal, sentence } from "../api/http";
+import { changeRobot, type Registration, registerRobot } from "../api/robots";
+import { useLive } from "../api/use-live";
+import type { Editing } from "./robots-page";
+
+export const NEW: Registration = {
+  name: "",
+  domain: 0,
+  rmw: "",
+  get_service: "umrf_graph_get",
+  profile: {},
+};
+
+type Field = "name" | "domain" | "get_service" | "rmw" | "profile";
+
+/** The field that a refusal points at; "" when it is about all of it. */
+export function fieldOf(error: unknown): Field | "" {
+  const path = error instanceof Refusal ? (error.details.where?.path ?? "") : "";
+  const found = /^\/(name|domain|get_service|rmw|profile)\b/.exec(path)?.[1];
+  return (found as Field | undefined) ?? "";
+}
+
+function Profile(props: {
+  profile: Registration["profile"];
+  error: string | undefined;
+  onChange: (profile: Registration["profile"]) => void;
+}) {
+  const { profile, error, onChange } = props;
+  const put = (key: string, value: unknown) => {
+    const { [key]: _, ...others } = profile;
+    onChange(value === "" || value === false ? others : { ...others, [key]: value });
+  };
+  const is = (key: string) => profile[key] === true;
+  return (
+    <Stack gap="sm">
+      <TextInput
+        label="Commit of its engine"
+        placeholder="5819055"
+        value={typeof profile.commit === "string" ? profile.commit : ""}
+        error={error}
+        onChange={(event) => put("commit", event.currentTarget.value.trim())}
+      />
+      <Switch
+        label="Stopping a paused graph works there (then Pause is offered)"
+        checked={is("pauses_safely")}
+        onChange={(event) => put("pauses_safely", event.currentTarget.checked)}
+      />
+      <Switch
+        label="Its engine synchronises with others (graphs of several robots)"
+        checked={is("synchronises")}
+        onChange={(event) => put("synchronises", event.currentTarget.checked)}
+      />
+      <Switch
+        label="Passing over an action is fixed there (H3)"
+        checked={is("bypass_fixed")}
+        onChange={(event) => put("bypass_fixed", event.currentTarget.checked)}
+      />
+    </Stack>
+  );
+}
+
+export function RobotForm({ editing, onClose }: { editing: Editing; onClose: () => void }) {
+  const { runner } = useLive();
+  const client = useQueryClient();
+  const [robot, setRobot] = useState(editing.robot);
+  const [more, setMore] = useState(!editing.isNew);
+  const [error, setError] = useState<unknown>(null);
+  const [busy, setBusy] = useState(false);
+  const place = fieldOf(error);
+  const at = (field: Field) => (place === field ? sentence(error) : undefined);
+  const save = async () => {
+    setBusy(true);
+    try {
+      await (editing.isNew ? registerRobot : changeRobot)(runner ?? "", robot);
+      await client.invalidateQueries({ queryKey: ["robots"] });
+      onClose();
+    } catch (problem) {
+      setError(problem);
+      setBusy(false);
+      if (fieldOf(problem) !== "" && fieldOf(problem) !== "name") setMore(true);
+    }
+  };
+  const title = editing.isNew ? "Register a robot" : `Change ${editing.robot.name}`;
+  return (
+    <Modal opened onClose={onClose} title={title} closeButtonProps={{ "aria-label": "Close" }}>
+      <form
+        onSubmit={(event) => {
+          event.preventDefault();
+          void save();
+        }}
+      >
+        <Stack gap="md">
+          <TextInput
+            label="Name"
+            description="The wake word of its engine (--actor-name), letter for letter."
+            value={robot.name}
+            disabled={!editing.isNew}
+            error={at("name")}
+            maxLength={64}
+            data-autofocus
+            onChange={(event) => setRobot({ ...robot, name: event.currentTarget.value.trim() })}
+          />
+          <NumberInput
+            label="ROS domain"
+            description="ROS_DOMAIN_ID of the engine; 0 unless somebody set it."
+            value={robot.domain}
+            min={0}
+            max={232}
+            allowDecimal={false}
+            error={at("domain")}
+            onChange={(value) => setRobot({ ...robot, domain: Number(value) || 0 })}
+          />
+          <Button
+            variant="subtle"
+            size="compact-sm"
+            w="fit-content"
+            aria-expanded={more}
+            onClick={() => setMore(!more)}
+          >
+            {more ? "Less" : "Path, middleware and engine …"}
+          </Button>
+          <Collapse expanded={more}>
+            <Stack gap="md">
+              <TextInput
+                label="Path of its get service"
+                description="Each engine needs one of its own: two on one path prove nothing."
+                value={robot.get_service}
+                error={at("get_service")}
+                onChange={(event) =>
+                  setRobot({ ...robot, get_service: event.currentTarget.value.trim() })
+                }
+              />
+              <TextInput
+                label="Middleware"
+                placeholder="that of the runner"
+                value={robot.rmw}
+                error={at("rmw")}
+                onChange={(event) => setRobot({ ...robot, rmw: event.currentTarget.value.trim() })}
+              />
+              <Profile
+                profile={robot.profile}
+                error={at("profile")}
+                onChange={(profile) => setRobot({ ...robot, profile })}
+              />
+            </Stack>
+          </Collapse>
+          {error !== null && place === "" && (
+            <Text c="var(--error)" role="alert">
+              {sentence(error)}
+            </Text>
+          )}
+          <Group justify="flex-end">
+            <Button onClick={onClose}>Cancel</Button>
+            <Button type="submit" variant="filled" loading={busy} disabled={robot.name === ""}>
+              {editing.isNew ? "Register" : "Save"}
+            </Button>
+          </Group>
+        </Stack>
+      </form>
+    </Modal>
+  );
+}

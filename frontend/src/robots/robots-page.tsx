@@ -1,0 +1,107 @@
+/** Robots: how their engines are, what runs there, who else is at it, and how to add one. */
+import { Button, Code, Skeleton } from "@mantine/core";
+import { IconPlus, IconRobot } from "@tabler/icons-react";
+import { useState } from "react";
+import { useMay } from "../api/person";
+import type { Candidate, Registration } from "../api/robots";
+import { useReach } from "../api/robots";
+import { useLive } from "../api/use-live";
+import { Empty } from "../ui/empty";
+import { Candidates } from "./candidates";
+import { RobotCard } from "./robot-card";
+import { NEW, RobotForm } from "./robot-form";
+import style from "./robots-page.module.css";
+
+interface Props {
+  /** Makes a graph of what a robot runs or was told. */
+  onImport: (text: string, name: string) => void;
+}
+
+export interface Editing {
+  robot: Registration;
+  isNew: boolean;
+}
+
+function Practise() {
+  return (
+    <p>
+      Without one, practise with a stand-in: it behaves like a real engine.
+      <Code block className={style.code ?? ""}>
+        action-assistant simulate-robot David
+      </Code>
+    </p>
+  );
+}
+
+function NoReach({ why }: { why: string }) {
+  return (
+    <p className={style.reach} role="status">
+      <b>No robot can be reached from here.</b> {why} <Code>action-assistant doctor</Code> says what
+      is missing.
+    </p>
+  );
+}
+
+export function RobotsPage({ onImport }: Props) {
+  const { runner, now } = useLive();
+  const may = useMay("register");
+  const reach = useReach(runner).data;
+  const [editing, setEditing] = useState<Editing | null>(null);
+  const known = now.link !== "connecting" || reach !== undefined;
+  const engines = now.engines.length > 0 ? now.engines : (reach?.engines ?? []);
+  const robots = engines.filter((robot) => !robot.simulated);
+  const add = (robot: Registration = NEW) => setEditing({ robot, isNew: true });
+  const take = (candidate: Candidate) =>
+    add({
+      ...NEW,
+      name: candidate.actor,
+      domain: candidate.domain,
+      get_service: candidate.get_service,
+    });
+  const button = (
+    <Button
+      variant="filled"
+      leftSection={<IconPlus size={16} aria-hidden />}
+      disabled={!may}
+      title={may ? undefined : "Operators register robots"}
+      onClick={() => add()}
+    >
+      Register a robot
+    </Button>
+  );
+  return (
+    <main className={style.page}>
+      <div className={style.inner}>
+        <div className={style.head}>
+          <h2 className={style.title}>Robots</h2>
+          {robots.length > 0 && button}
+        </div>
+        {reach?.no_reach && <NoReach why={reach.no_reach} />}
+        {!known && (
+          <div aria-hidden>
+            {[0, 1].map((i) => (
+              <Skeleton key={i} height={120} mb={12} radius="lg" />
+            ))}
+          </div>
+        )}
+        {known && robots.length === 0 && (
+          <Empty icon={<IconRobot size={22} />} title="No robot yet" action={button}>
+            Register the name that its TeMoto engine answers to, and everybody here sees how it is,
+            what runs on it, and can stop it.
+            <Practise />
+          </Empty>
+        )}
+        {robots.map((robot) => (
+          <RobotCard
+            key={robot.name}
+            robot={robot}
+            onEdit={(robot) => setEditing({ robot, isNew: false })}
+            onImport={onImport}
+          />
+        ))}
+        <Candidates may={may} onTake={take} on={reach?.no_reach === ""} />
+      </div>
+      {editing && <RobotForm editing={editing} onClose={() => setEditing(null)} />}
+    </main>
+  );
+}

@@ -1,0 +1,86 @@
+/** A start: publishes what is on screen and sends exactly that to the runner, once. */
+import { notifications } from "@mantine/notifications";
+import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { keys, publish, type Version, versionName } from "../api/graphs";
+import { place, sentence } from "../api/http";
+import { memberText } from "../api/member";
+import { startRun } from "../api/runs";
+import { useLive } from "../api/use-live";
+import { newAid } from "../graph/ids";
+
+export interface Order {
+  seq: number;
+  engines: readonly string[];
+  /** Of the graph that was looked at; null when nobody looked. */
+  digest: string | null;
+  override?: { codes: readonly string[]; reason: string };
+}
+
+/** The name that a start of this moment will have. */
+export function nextLabel(versions: readonly Version[], seq: number): string {
+  const same = versions.find((version) => version.seq === seq);
+  return same ? versionName(versions, same.id) : `v${versions.length + 1}`;
+}
+
+function complain(title: string, message: string): void {
+  notifications.show({ color: "red", title, message, autoClose: 15_000 });
+}
+
+export function useStart(graph: string) {
+  const { live, runner } = useLive();
+  const client = useQueryClient();
+  return useMutation({
+    mutationFn: async ({ seq, engines, digest, override }: Order) => {
+      if (runner === undefined) throw new Error("The runner is not known yet.");
+      const text = await publish(graph, seq);
+      const version = JSON.parse(text) as Version;
+      void client.invalidateQueries({ queryKey: keys.versions(graph) });
+      const umrf = memberText(text, "umrf");
+      if (umrf === null) throw new Error("The editor gave no graph with the version.");
+      if (digest !== null && digest !== version.digest) {
+        throw new Error("The graph is not the one that was looked at. Nothing was sent.");
+      }
+      const started = await startRun({
+        runner,
+        version: version.id,
+        digest: version.digest,
+        umrf,
+        graph,
+        engines,
+        request: newAid(),
+        ...(override === undefined ? {} : { override }),
+      });
+      for (const run of started.runs) live?.learn(run);
+      return started;
+    },
+    onSuccess: ({ failed }) => {
+      for (const [robot, why] of Object.entries(failed)) complain(`Not started on ${robot}`, why);
+    },
+    onError: (error) => {
+      const where = place(error);
+      complain("Not started", where === "" ? sentence(error) : `${sentence(error)} (${where})`);
+    },
+  });
+}
+
+const CHOICE = "aa.engines";
+
+/** Where a graph was started last from this browser. */
+export function lastEngines(graph: string): string[] {
+  try {
+    const all = JSON.parse(localStorage.getItem(CHOICE) ?? "{}") as Record<string, string[]>;
+    const found = all[graph];
+    return Array.isArray(found) && found.length > 0 ? found : ["simulator"];
+  } catch {
+    return ["simulator"];
+  }
+}
+
+export function rememberEngines(graph: string, engines: readonly string[]): void {
+  try {
+    const all = JSON.parse(localStorage.getItem(CHOICE) ?? "{}") as Record<string, string[]>;
+    localStorage.setItem(CHOICE, JSON.stringify({ ...all, [graph]: engines }));
+  } catch {
+    // A browser that stores nothing asks again next time.
+  }
+}
