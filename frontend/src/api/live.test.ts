@@ -91,6 +91,44 @@ test("Stop goes by socket and by POST at once", async () => {
   live.close();
 });
 
+test("a Stop that nobody hears is sent again until somebody does", async () => {
+  const live = new Live("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  newest().close();
+  let dead = true;
+  vi.stubGlobal("fetch", async (url: string) => {
+    posted("POST", url);
+    if (dead) throw new TypeError("no network");
+    return new Response("{}", { status: 202 });
+  });
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(20_000);
+  expect(live.now.stops.at(-1)?.state).toBe("unheard");
+  const tries = posted.mock.calls.length;
+  expect(tries).toBeGreaterThan(10);
+  // After a while "all" means the runs that could be seen, none that somebody starts later.
+  expect(posted).toHaveBeenLastCalledWith("POST", "http://h:1/api/runs/r/stop");
+  dead = false;
+  await vi.advanceTimersByTimeAsync(2_000);
+  expect(live.now.stops.at(-1)?.state).toBe("heard");
+  const heard = posted.mock.calls.length;
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(posted.mock.calls.length).toBe(heard);
+  live.close();
+});
+
+test("when the runner has nothing to stop it with, a Stop is refused and not repeated", async () => {
+  const live = new Live("http://h:1");
+  live.open();
+  const problem = { title: "Forbidden", status: 403, detail: "not you" };
+  vi.stubGlobal("fetch", async () => new Response(JSON.stringify(problem), { status: 403 }));
+  live.stop("r");
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(live.now.stops.at(-1)).toMatchObject({ state: "refused", detail: "not you" });
+  live.close();
+});
+
 test("a run that ended while the link was down is asked for", async () => {
   const live = new Live("http://h:1");
   live.open();

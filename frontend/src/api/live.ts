@@ -34,7 +34,7 @@ type Message =
   | { type: "hello"; engines: Robot[]; runs: Run[] }
   | { type: "engines"; engines: Robot[] }
   | { type: "run"; run: Run }
-  | { type: "beat"; at: string; seen: Record<string, string> }
+  | { type: "beat"; at: string; seen?: Record<string, string> }
   | { type: "stopping"; stop_id: string; runs: string[] }
   | { type: "refused"; stop_id: string; detail: string };
 
@@ -197,7 +197,7 @@ export class Live {
         this.#set({ engines: message.engines });
         break;
       case "beat": {
-        const seen = Object.entries(message.seen).map(
+        const seen = Object.entries(message.seen ?? {}).map(
           ([run, at]) => [run, Date.parse(at)] as const,
         );
         this.#set({ seen: new Map(seen) });
