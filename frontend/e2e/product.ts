@@ -1,10 +1,11 @@
 /** The real product for browser tests: `action-assistant serve` on free ports, killable at any moment. */
 
-import { type ChildProcess, spawn } from "node:child_process";
+import { type ChildProcess, execFile, spawn } from "node:child_process";
 import { mkdtempSync, openSync, readFileSync, rmSync } from "node:fs";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
+import { promisify } from "node:util";
 import type { Browser, BrowserContext, Page } from "@playwright/test";
 
 const COMMAND = resolve(import.meta.dirname, "../../.venv/bin/action-assistant");
@@ -50,6 +51,12 @@ export class Product {
         await pause(50);
       }
     }
+  }
+
+  /** Runs a command of the product on its data folder; what it prints. */
+  async command(...words: string[]): Promise<string> {
+    const all = [...words, "--data", this.data];
+    return (await promisify(execFile)(COMMAND, all)).stdout;
   }
 
   /** kill -9 of everything at once. */

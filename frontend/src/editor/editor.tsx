@@ -17,6 +17,7 @@ import { useShortcuts } from "./deeds/keys";
 import { Details } from "./details/details";
 import style from "./editor.module.css";
 import { FindBar } from "./find/find-bar";
+import { Notices } from "./notices";
 import { Outline } from "./outline/outline";
 import { People } from "./people";
 import { ProblemWord } from "./problem-word";
@@ -279,6 +280,7 @@ export function Editor(props: Props) {
           </aside>
         </main>
       )}
+      <Notices />
       <Surfaces bench={bench} surface={surface} onClose={close} />
       {adding && <QuickAdd bench={bench} request={adding} known={known} onClose={closeAdd} />}
     </BenchContext>

@@ -1,4 +1,5 @@
 /** Whether what is on screen is safe, in words. */
+import { Tooltip } from "@mantine/core";
 import {
   IconAlertTriangle,
   IconCheck,
@@ -8,6 +9,7 @@ import {
 } from "@tabler/icons-react";
 import type { Link, Why } from "../room/connect";
 import { useLink, useRoom } from "../room/use-room";
+import { whyNot } from "../room/words";
 import { useBench } from "./bench";
 import style from "./saved-word.module.css";
 
@@ -65,14 +67,29 @@ export function SavedWord() {
   const { mayEdit } = useBench();
   const { tone, words } = savedWords(link, mayEdit);
   const Sign = signs[tone];
+  const why = whyNot(link);
   return (
-    <span className={style.saved} data-tone={tone} role="status" title={`Moment ${link.seq}`}>
-      <Sign size={13} stroke={2.6} aria-hidden /> {words}
-      {link.state === "refused" && (
-        <button type="button" className={style.again} onClick={() => room.reconnect()}>
-          Try again
-        </button>
-      )}
-    </span>
+    <Tooltip
+      label={why ?? ""}
+      disabled={why === null}
+      multiline
+      w={300}
+      events={{ hover: true, focus: true, touch: true }}
+    >
+      <span
+        className={style.saved}
+        data-tone={tone}
+        role="status"
+        tabIndex={why === null ? undefined : 0}
+        title={why === null ? `Moment ${link.seq}` : undefined}
+      >
+        <Sign size={13} stroke={2.6} aria-hidden /> {words}
+        {link.state === "refused" && (
+          <button type="button" className={style.again} onClick={() => room.reconnect()}>
+            Try again
+          </button>
+        )}
+      </span>
+    </Tooltip>
   );
 }

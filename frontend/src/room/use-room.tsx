@@ -112,6 +112,11 @@ export function useRoom(): OpenRoom {
   return useHeld().stay.open;
 }
 
+/** The name of the person at this page; empty in a room that keeps nothing. */
+export function useMyName(): string {
+  return useHeld().keep?.person.name ?? "";
+}
+
 /** The graph now. Actions and relations that did not change are the same objects as before. */
 export function useGraph(): Graph {
   const { source } = useRoom();

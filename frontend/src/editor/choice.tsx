@@ -1,0 +1,211 @@
+/** What to do about edits that wait on a history which the server has left: take, drop, or save. */
+import { Button, Checkbox, Group, Modal, Text } from "@mantine/core";
+import { useCallback, useEffect, useMemo, useState } from "react";
+import { type Change, changesOf, chosen, type Line } from "../graph/changes";
+import { mapsOf } from "../graph/layout";
+import { type Choice, useChoice, useGraph, useLink, useRoom } from "../room/use-room";
+import style from "./choice.module.css";
+import { saveChanges, sentenceOf } from "./choice-file";
+
+const signs = { added: "+", removed: "−", changed: "~" } as const;
+
+function changes(n: number): string {
+  return n === 1 ? "1 change" : `${n} changes`;
+}
+
+function Value({ text }: { text: string | null }) {
+  return text ?? <i>nothing</i>;
+}
+
+function Lines({ lines }: { lines: readonly Line[] }) {
+  return (
+    <ul className={style.lines}>
+      {lines.map((line) => (
+        <li key={line.field}>
+          <span className={style.field}>{line.field}</span>{" "}
+          <del>
+            <Value text={line.before} />
+          </del>{" "}
+          <span aria-hidden>→</span>
+          <span className="visually-hidden">becomes</span>{" "}
+          <ins>
+            <Value text={line.after} />
+          </ins>
+          {line.now !== undefined && (
+            <span className={style.now}>
+              {" "}
+              now <Value text={line.now} />
+            </span>
+          )}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+interface ItemProps {
+  change: Change;
+  taken: boolean;
+  onTake: (taken: boolean) => void;
+}
+
+function Item({ change, taken, onTake }: ItemProps) {
+  return (
+    <li className={style.item} data-kind={change.kind}>
+      <Checkbox
+        checked={taken}
+        onChange={(event) => onTake(event.currentTarget.checked)}
+        label={
+          <>
+            <span className={style.sign} aria-hidden>
+              {signs[change.kind]}
+            </span>
+            <span className="visually-hidden">{sentenceOf(change)}</span>
+            <b aria-hidden>{change.title}</b>{" "}
+            <span className={style.thing} aria-hidden>
+              {change.thing === "graph" ? "" : `${change.thing} `}
+              {change.kind}
+            </span>
+          </>
+        }
+      />
+      <Lines lines={change.lines} />
+    </li>
+  );
+}
+
+interface BodyProps {
+  choice: Choice;
+  by: string;
+  onLater: () => void;
+}
+
+function Body({ choice, by, onLater }: BodyProps) {
+  const { stranded } = choice;
+  const { doc } = useRoom();
+  const graph = useGraph();
+  const { state } = useLink();
+  // biome-ignore lint/correctness/useExhaustiveDependencies: the document changes with the graph
+  const all = useMemo(() => changesOf(stranded, mapsOf(doc)), [stranded, doc, graph]);
+  const [left, setLeft] = useState<ReadonlySet<string>>(new Set());
+  const [busy, setBusy] = useState(false);
+  const [dropping, setDropping] = useState(false);
+  const [trouble, setTrouble] = useState<string | null>(null);
+  const taken = all.filter(({ id }) => !left.has(id));
+  const take = (id: string, on: boolean) => {
+    const next = new Set(left);
+    if (on) next.delete(id);
+    else next.add(id);
+    setLeft(next);
+  };
+  const work = async (deed: () => Promise<unknown>) => {
+    setBusy(true);
+    setTrouble(null);
+    try {
+      await deed();
+    } catch (error) {
+      setBusy(false);
+      setTrouble(error instanceof Error ? error.message : String(error));
+    }
+  };
+  const when = new Date(stranded.at).toLocaleString([], {
+    dateStyle: "medium",
+    timeStyle: "short",
+  });
+  const some = taken.length < all.length ? `${taken.length} of ${all.length}` : "all";
+  return (
+    <>
+      <Text>
+        A backup was restored on the server. {changes(all.length)} that you made here (the last at{" "}
+        {when}) were not stored before that. Behind this dialog is the graph as it is now. Which of
+        them shall be made in it?
+      </Text>
+      <Group mt="xs" gap="xs">
+        <Button size="compact-sm" onClick={() => setLeft(new Set())}>
+          Mark all
+        </Button>
+        <Button size="compact-sm" onClick={() => setLeft(new Set(all.map(({ id }) => id)))}>
+          Mark none
+        </Button>
+      </Group>
+      <ul className={style.list} aria-label="Your changes">
+        {all.map((change) => (
+          <Item
+            key={change.id}
+            change={change}
+            taken={!left.has(change.id)}
+            onTake={(on) => take(change.id, on)}
+          />
+        ))}
+      </ul>
+      {trouble !== null && (
+        <p className={style.trouble} role="alert">
+          That did not work: {trouble}. Your changes are still here.
+        </p>
+      )}
+      <div className={style.answers}>
+        <Button onClick={() => saveChanges(graph.name, by, [stranded])}>Save as a file</Button>
+        <span className={style.space} />
+        <Button onClick={onLater}>Decide later</Button>
+        {dropping ? (
+          <Button color="red" disabled={busy} onClick={() => work(() => choice.drop())}>
+            Discard for good
+          </Button>
+        ) : (
+          <Button disabled={busy} onClick={() => setDropping(true)}>
+            Discard
+          </Button>
+        )}
+        <Button
+          variant="filled"
+          data-autofocus
+          loading={busy}
+          disabled={taken.length === 0 || state !== "live"}
+          onClick={() => work(() => choice.apply(chosen(stranded.difference, taken)))}
+        >
+          Apply {some}
+        </Button>
+      </div>
+    </>
+  );
+}
+
+/** The dialog; `onLater` leaves a word on the page that leads back to it. */
+export function ChoiceDialog({
+  by,
+  open,
+  onLater,
+}: {
+  by: string;
+  open: boolean;
+  onLater(): void;
+}) {
+  const choice = useChoice();
+  return (
+    <Modal
+      opened={choice !== null && open}
+      onClose={onLater}
+      title="Your changes and a restored backup"
+      closeButtonProps={{ "aria-label": "Decide later" }}
+      size="lg"
+      centered
+    >
+      {choice && <Body key={choice.stranded.at} choice={choice} by={by} onLater={onLater} />}
+    </Modal>
+  );
+}
+
+/** Whether the dialog is open: for each choice at first, until the person puts it off. */
+export function useChoosing() {
+  const choice = useChoice();
+  const [later, setLater] = useState(false);
+  // biome-ignore lint/correctness/useExhaustiveDependencies: another choice is asked about anew
+  useEffect(() => setLater(false), [choice?.stranded]);
+  return {
+    edits: choice?.stranded.edits ?? 0,
+    waits: choice !== null && later,
+    open: !later,
+    putOff: useCallback(() => setLater(true), []),
+    takeUp: useCallback(() => setLater(false), []),
+  };
+}

@@ -1,0 +1,223 @@
+/**
+ * Changed keys of the document as changes that a person knows: an action, an arrow, the graph.
+ *
+ * Pure. Each change keeps the keys it is made of, so that some of them can be taken and others not.
+ */
+
+import { endsOf, type Maps, ROOTS, type Root, segmentsOf, splitKey } from "./layout";
+import { ENTRY, EXIT, type Key, PRECONDITIONS } from "./model";
+import { same } from "./same";
+
+/** Values by key; `undefined` where there is none. */
+export type Values = { readonly [R in Root]: ReadonlyMap<string, unknown> };
+
+export interface Line {
+  readonly field: string;
+  /** In words; null where there was nothing. */
+  readonly before: string | null;
+  readonly after: string | null;
+  /** What is there now, if that is neither. */
+  readonly now?: string | null;
+}
+
+export interface Change {
+  readonly id: string;
+  readonly kind: "added" | "removed" | "changed";
+  readonly thing: "graph" | "action" | "arrow" | "drawing" | "comment";
+  readonly title: string;
+  readonly lines: readonly Line[];
+  readonly keys: readonly (readonly [Root, string])[];
+}
+
+interface Given {
+  readonly difference: Values;
+  readonly before: Values;
+  /** The graph with these changes: names are looked up in it. */
+  readonly here: Maps;
+}
+
+const FIELDS: ReadonlyMap<string, string> = new Map([
+  ["", "Name"],
+  ["type", "Type"],
+  ["actor", "Robot"],
+  ["instance_id", "Number"],
+  ["description", "Description"],
+  ["name", "Name"],
+  ["on_true", "When true"],
+  ["on_false", "When false"],
+  ["on_error", "When error"],
+  ["on_stopped", "When stopped"],
+  ["required", "Waits for it"],
+]);
+/** Order of things and how a file listed them: changed along with what people change. */
+const SILENT = new Set(["order", "po", "co", "only", "in", "out", "missing", "twin", "schema"]);
+const ORDER = ["graph", "action", "arrow", "drawing", "comment"] as const;
+const LONGEST = 120;
+
+/** The changes, as they stand against the graph as it is `now`. */
+export function changesOf(given: Given, now: Maps): readonly Change[] {
+  const groups = new Map<string, [Root, string][]>();
+  for (const root of ROOTS) {
+    for (const key of given.difference[root].keys()) {
+      const id = groupOf(root, key);
+      groups.set(id, [...(groups.get(id) ?? []), [root, key]]);
+    }
+  }
+  const changes = [...groups].map(([id, keys]) => changeOf(id, keys, given, now));
+  return changes.sort((a, b) => ORDER.indexOf(a.thing) - ORDER.indexOf(b.thing));
+}
+
+/** Only the keys of these changes. */
+export function chosen(difference: Values, changes: readonly Change[]): Values {
+  const keys = new Set(changes.flatMap((change) => change.keys.map(([r, key]) => `${r}/${key}`)));
+  const part = (root: Root) =>
+    new Map([...difference[root]].filter(([key]) => keys.has(`${root}/${key}`)));
+  return {
+    meta: part("meta"),
+    actions: part("actions"),
+    relations: part("relations"),
+    positions: part("positions"),
+    comments: part("comments"),
+  };
+}
+
+function groupOf(root: Root, key: string): string {
+  const { head } = splitKey(key);
+  if (root === "meta") return "meta";
+  if (root === "positions" && !key.startsWith("g/") && key !== ENTRY && key !== EXIT)
+    return `actions/${head}`;
+  return `${root}/${root === "comments" ? key : head}`;
+}
+
+function changeOf(id: string, keys: [Root, string][], given: Given, now: Maps): Change {
+  const slash = id.indexOf("/");
+  const [root, head] = slash < 0 ? [id, ""] : [id.slice(0, slash), id.slice(slash + 1)];
+  const thing = thingOf(root);
+  const kind = kindOf(thing, head, keys, given);
+  const lines = keys.flatMap(([r, key]) => lineOf(r, key, given, now) ?? []);
+  return { id, kind, thing, title: titleOf(thing, head, given), lines, keys };
+}
+
+function thingOf(root: string): Change["thing"] {
+  switch (root) {
+    case "meta":
+      return "graph";
+    case "actions":
+      return "action";
+    case "relations":
+      return "arrow";
+    case "comments":
+      return "comment";
+    default:
+      return "drawing";
+  }
+}
+
+function kindOf(
+  thing: Change["thing"],
+  head: string,
+  keys: readonly (readonly [Root, string])[],
+  given: Given,
+): Change["kind"] {
+  const marks = marksOf(thing, head, keys);
+  if (marks.length === 0) return "changed";
+  const was = marks.some(([root, key]) => valueBefore(root, key, given) !== undefined);
+  const is = marks.some(([root, key]) => given.here[root].get(key) !== undefined);
+  if (was === is) return "changed";
+  return is ? "added" : "removed";
+}
+
+/** The keys by which a thing exists. */
+function marksOf(
+  thing: Change["thing"],
+  head: string,
+  keys: readonly (readonly [Root, string])[],
+): readonly (readonly [Root, string])[] {
+  switch (thing) {
+    case "action":
+      return [["actions", head]];
+    case "arrow":
+      return PRECONDITIONS.map((outcome) => ["relations", `${head}|${outcome}`] as const);
+    case "comment":
+    case "drawing":
+      return keys;
+    case "graph":
+      return [];
+  }
+}
+
+function valueBefore(root: Root, key: string, { difference, before, here }: Given): unknown {
+  return difference[root].has(key) ? before[root].get(key) : here[root].get(key);
+}
+
+function titleOf(thing: Change["thing"], head: string, given: Given): string {
+  switch (thing) {
+    case "graph":
+      return "Graph";
+    case "action":
+      return nameOf(head, given);
+    case "arrow": {
+      const ends = endsOf(head);
+      return ends === null ? head : `${nameOf(ends.parent, given)} → ${nameOf(ends.child, given)}`;
+    }
+    case "comment":
+      return "Comment";
+    case "drawing":
+      return head === ENTRY || head === EXIT ? nameOf(head, given) : "Note or frame";
+  }
+}
+
+function nameOf(key: Key, { here, before }: Given): string {
+  if (key === ENTRY) return "Entry";
+  if (key === EXIT) return "Exit";
+  const name = here.actions.get(key) ?? before.actions.get(key);
+  return typeof name === "string" && name !== "" ? name : "an action";
+}
+
+function lineOf(root: Root, key: string, given: Given, now: Maps): Line | null {
+  const rest = root === "meta" ? key : splitKey(key).rest;
+  if (SILENT.has(rest) || (root === "comments" && rest !== "")) return null;
+  const [was, is] = [given.before[root].get(key), given.difference[root].get(key)];
+  const there = now[root].get(key);
+  const line = { field: fieldOf(root, rest), before: words(root, was), after: words(root, is) };
+  const other = !same(there, was) && !same(there, is);
+  return other ? { ...line, now: words(root, there) } : line;
+}
+
+function fieldOf(root: Root, rest: string): string {
+  if (root === "positions") return "Place";
+  if (root === "comments") return "Text";
+  const known = FIELDS.get(rest);
+  if (known !== undefined) return known;
+  const slash = rest.indexOf("/");
+  if (slash < 0) return rest;
+  const [kind, path] = [rest.slice(0, slash), rest.slice(slash + 1)];
+  const name = segmentsOf(path).join(" ");
+  if (kind === "in") return `Input ${name}`;
+  if (kind === "out") return `Output ${name}`;
+  return kind === "remap" ? `Output ${path} as` : path;
+}
+
+/** A value for people. Parameters are JSON text, of which the value itself is shown. */
+function words(root: Root, value: unknown): string | null {
+  if (value === undefined || value === null) return null;
+  if (root === "positions" && Array.isArray(value)) return value.map(Math.round).join(", ");
+  if (typeof value === "boolean") return value ? "yes" : "no";
+  return short(typeof value === "string" ? parameterWords(value) : String(value));
+}
+
+function parameterWords(text: string): string {
+  if (!text.startsWith("{")) return text;
+  try {
+    const { pvf_value: value, text: said } = JSON.parse(text) as Record<string, unknown>;
+    if (typeof said === "string") return said;
+    if (value === undefined) return text;
+    return typeof value === "string" ? value : JSON.stringify(value);
+  } catch {
+    return text;
+  }
+}
+
+function short(text: string): string {
+  return text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text;
+}
