@@ -1,5 +1,6 @@
 """A Yjs client without a network: a real document, and hands that carry its messages."""
 
+import asyncio
 from typing import Any
 
 from pycrdt import Doc, Map
@@ -116,5 +117,6 @@ async def settle(*clients: Client) -> None:
             if client.room is not None:
                 busy = bool(client.out) or busy
                 client.speak()
+                await asyncio.sleep(0)  # the room tells who is where when the window opens
                 await client.room.quiet()
                 busy = await client.listen() or busy

@@ -25,7 +25,7 @@ async def journal(tmp_path: Path) -> AsyncIterator[Journal]:
 @pytest.fixture
 async def rooms(journal: Journal) -> AsyncIterator[Rooms]:
     """Rooms that stay open until the test ends."""
-    rooms = Rooms(journal, linger=60)
+    rooms = Rooms(journal, linger=60, window=0)
     yield rooms
     await rooms.close()
 

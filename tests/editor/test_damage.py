@@ -108,7 +108,7 @@ async def test_each_flipped_byte_of_a_body_is_found(folder: Path, tmp_path: Path
 async def test_the_room_of_a_damaged_graph_can_only_be_read(folder: Path) -> None:
     spoil(folder, SPOILS[0])
     journal = await opened(folder)
-    rooms = Rooms(journal, linger=60)
+    rooms = Rooms(journal, linger=60, window=0)
     ada, eve = Client("ada"), Client("eve")
     async with rooms.enter(STREAM) as room, rooms.enter("graph/other") as other:
         ada.join(room)

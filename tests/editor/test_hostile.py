@@ -54,7 +54,7 @@ async def test_a_forged_client_id_changes_nothing_and_the_victims_edit_survives(
 async def test_ids_are_learned_from_the_log(journal: Journal) -> None:
     ada = Client("ada", client_id=1)
     for kept in (False, True):
-        rooms = Rooms(journal, linger=60)
+        rooms = Rooms(journal, linger=60, window=0)
         async with rooms.enter(STREAM) as room:
             ada.join(room)
             ada.map[f"edit{kept}"] = 1.0
@@ -63,7 +63,7 @@ async def test_ids_are_learned_from_the_log(journal: Journal) -> None:
         await rooms.close()  # keeps a snapshot
         if not kept:
             await journal.keep_snapshot(STREAM, 1, b"no snapshot of ours")
-        rooms = Rooms(journal, linger=60)
+        rooms = Rooms(journal, linger=60, window=0)
         eve = Client("eve")
         async with rooms.enter(STREAM) as room:
             eve.join(room)
@@ -181,7 +181,7 @@ def test_types_may_lie_in_one_another_but_not_deeply() -> None:
 
 
 async def test_depth_is_known_after_a_snapshot(journal: Journal) -> None:
-    rooms = Rooms(journal, linger=60)
+    rooms = Rooms(journal, linger=60, window=0)
     async with rooms.enter(STREAM) as room:
         await room.submit(forge.nested_types(DEEPEST_TYPES), "eve")
         await room.submit(

@@ -420,7 +420,7 @@ async def test_a_visitor_who_gives_up_takes_nobody_along(rooms: Rooms) -> None:
 async def test_an_empty_room_is_let_go_after_a_while_and_its_memory_freed(
     journal: Journal,
 ) -> None:
-    rooms = Rooms(journal, linger=0.05)
+    rooms = Rooms(journal, linger=0.05, window=0)
     ada = Client("ada")
     async with rooms.enter(STREAM) as room:
         ada.join(room)

@@ -172,13 +172,13 @@ class _Connection:
 
 class _Cursor:
     lastrowid = None
-    rowcount = -1
     arraysize = 1
 
     def __init__(self, cursor: apsw.Cursor, synchronous: str) -> None:
         self._cursor = cursor
         self._synchronous = synchronous
         self._rows: list[Any] = []
+        self.rowcount = -1  # rows that the last statement changed
         self.description: Any = None
         cursor.exec_trace = self._describe
 
@@ -193,8 +193,10 @@ class _Cursor:
             sql = f"PRAGMA synchronous={self._synchronous}"
         with translated():
             self.description = None
+            before = self._cursor.connection.total_changes()
             self._cursor.execute(sql, tuple(values))
             self._rows = list(self._cursor)
+            self.rowcount = self._cursor.connection.total_changes() - before
         return self
 
     def executemany(self, sql: str, rows: Iterable[Sequence[Any]]) -> "_Cursor":

@@ -390,6 +390,22 @@ test("settled waits until everything is stored and tells the moment", async () =
   expect(await room.settled()).toBe(1);
 });
 
+test("settled waits for the name of the moment when something has just arrived", async () => {
+  server.accept();
+  const told = vi.spyOn(server, "ack").mockImplementation(() => undefined);
+  server.broadcast((doc) => write("theirs", doc));
+  let moment = -1;
+  void room.settled().then((seq) => {
+    moment = seq;
+  });
+  await vi.advanceTimersByTimeAsync(0);
+  expect(moment).toBe(-1);
+  told.mockRestore();
+  server.ack(server.last);
+  await vi.advanceTimersByTimeAsync(0);
+  expect(moment).toBe(1);
+});
+
 test("settled fails when the room is left or nobody waits any more", async () => {
   const controller = new AbortController();
   const aborted = room.settled(controller.signal);

@@ -61,6 +61,8 @@ class Connection implements Room, Speaker {
   private epoch = "";
   private told = "";
   private closed = false;
+  /** Whether the page shows more than the entry of the log that the server named last. */
+  private isAhead = false;
 
   constructor(options: ConnectOptions) {
     this.doc = options.doc ?? new Y.Doc();
@@ -98,7 +100,8 @@ class Connection implements Room, Speaker {
         const reason = signal?.aborted
           ? signal.reason
           : this.closed && new Error("the room was left");
-        const done = this.current.state === "live" && this.current.unsaved === 0;
+        const { state, unsaved } = this.current;
+        const done = state === "live" && unsaved === 0 && !this.isAhead;
         if (!reason && !done) return;
         stop();
         signal?.removeEventListener("abort", look);
@@ -269,6 +272,7 @@ class Connection implements Room, Speaker {
         const seq = decoding.readVarUint(decoder);
         if (stored.length > 0) this.keeping?.stored(stored);
         this.keeping?.shows(seq, this.copy);
+        this.isAhead = false;
         this.say({ unsaved: this.outbox.unsaved, seq });
         this.watchman.stir();
         break;
@@ -296,9 +300,11 @@ class Connection implements Room, Speaker {
       case sync.messageYjsSyncStep2:
         this.learn(content);
         this.line.arrived();
+        this.isAhead = false;
         this.say({ state: "live", why: undefined });
         break;
       case sync.messageYjsUpdate:
+        this.isAhead = true;
         this.learn(content);
         break;
     }

@@ -170,7 +170,7 @@ export class FakeServer {
     socket.deliver(encoding.toUint8Array(encoder));
   }
 
-  private ack(socket: FakeSocket): void {
+  ack(socket: FakeSocket): void {
     const encoder = encoding.createEncoder();
     encoding.writeVarUint(encoder, 100);
     encoding.writeVarUint(encoder, socket.durable);

@@ -2,13 +2,11 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Iterable
 from enum import Enum
 from typing import Final
 
 from action_assistant.editor import wire
-from action_assistant.editor.presence import Seat
-from action_assistant.editor.wire import Entry
+from action_assistant.editor.presence import News, Seat
 from action_assistant.web.keys import Author
 
 WAITING_FRAMES: Final = 256
@@ -41,8 +39,9 @@ class Member:
         self._frames: deque[bytes] = deque()
         self._bytes = 0
         self._answer = _Answer.NONE
-        self._entries: dict[int, Entry] = {}
+        self._presence: News | None = None
         self._ack: bytes | None = None
+        self._said = -1, -1  # with the last acknowledgement
         self._news = asyncio.Event()
         self._room_again = asyncio.Event()
         self._loop = asyncio.get_running_loop()
@@ -86,15 +85,17 @@ class Member:
         if self.acks:
             self.post(wire.read_only(why))
 
-    def post_presence(self, entries: Iterable[Entry]) -> None:
+    def post_presence(self, news: News) -> None:
         """Tell who is where; only the last word of each client waits."""
-        for entry in entries:
-            self._entries[entry.client] = entry
+        if news.entries:
+            waiting = self._presence
+            self._presence = news if waiting is None else waiting.followed_by(news)
             self._news.set()
 
     def post_ack(self, seq: int) -> None:
         """Say what is durable, and that everything up to `seq` was sent; the last word counts."""
-        if self.acks and self.synced:
+        if self.acks and self.synced and (self.handled, seq) != self._said:
+            self._said = self.handled, seq
             self._ack = wire.acks(self.handled, seq)
             self._news.set()
 
@@ -110,9 +111,9 @@ class Member:
         self._bytes = 0
         if self._answer is _Answer.WAITS:
             self._answer = _Answer.LEFT
-        if self._entries:
-            frames.append(wire.presence(self._entries.values()))
-            self._entries = {}
+        if self._presence is not None:
+            frames.append(self._presence.frame)
+            self._presence = None
         if self._ack is not None:
             frames.append(self._ack)
             self._ack = None
@@ -132,9 +133,14 @@ class Member:
         self.handled += 1
         self._room_again.set()
 
+    @property
+    def far_ahead(self) -> bool:
+        """Whether the socket has said much that the room has not dealt with."""
+        return self._heard - self.handled > _UNHANDLED_EDITS and not self.closed
+
     async def until_heard(self) -> None:
         """Wait while this socket is far ahead of the room."""
-        while self._heard - self.handled > _UNHANDLED_EDITS and not self.closed:
+        while self.far_ahead:
             self._room_again.clear()
             await self._room_again.wait()
 

@@ -1,10 +1,13 @@
 """Who is in a room, as the server vouches for it (rule R6)."""
 
 import hashlib
+from collections.abc import Iterable
+from functools import cached_property
 from typing import Final
 
 import msgspec
 
+from action_assistant.editor import wire
 from action_assistant.editor.wire import Entry
 from action_assistant.web.keys import Author
 
@@ -56,6 +59,22 @@ class Seat:
             return None
         state["user"] = self._stamp
         return Entry(entry.client, entry.clock, msgspec.json.encode(state))
+
+
+class News:
+    """What many are told about who is where: put into bytes once for all of them."""
+
+    def __init__(self, entries: Iterable[Entry]) -> None:
+        self.entries: Final = {entry.client: entry for entry in entries}
+
+    @cached_property
+    def frame(self) -> bytes:
+        """As a message."""
+        return wire.presence(self.entries.values())
+
+    def followed_by(self, later: "News") -> "News":
+        """Both; what is later about the same client counts."""
+        return News((self.entries | later.entries).values())
 
 
 class Attendance:

@@ -23,7 +23,7 @@ from action_assistant.editor.batch import (
 )
 from action_assistant.editor.happenings import DEFERRED, UPDATED
 from action_assistant.editor.member import Member
-from action_assistant.editor.presence import Attendance
+from action_assistant.editor.presence import Attendance, News
 from action_assistant.editor.replica import (
     Brought,
     Foreign,
@@ -35,6 +35,7 @@ from action_assistant.editor.replica import (
     load,
 )
 from action_assistant.editor.sameness import Fingerprint, fingerprint
+from action_assistant.editor.window import Window
 from action_assistant.editor.wire import Entry, Malformed
 from action_assistant.errors import BadInput, Conflict, Refused, TooLarge, Unavailable
 from action_assistant.journal.events import Draft
@@ -52,7 +53,13 @@ class Room:
     """The memory of one graph. `gone` is called when nobody may join any more."""
 
     def __init__(
-        self, stream: str, journal: Journal, loaded: Loaded, gone: Callable[["Room"], None]
+        self,
+        stream: str,
+        journal: Journal,
+        loaded: Loaded,
+        gone: Callable[["Room"], None],
+        window: Window,
+        moments: Window,
     ) -> None:
         self.stream: Final = stream
         self.seq = loaded.seq
@@ -63,6 +70,10 @@ class Room:
         self._kept = loaded.kept
         self.damaged: Final = loaded.damaged
         self._gone = gone
+        self._window = window
+        self._moments = moments
+        self._naming = False
+        self._said: dict[int, tuple[Entry, Member]] = {}  # in this window, about themselves
         self.divergences = 0
         self._fingerprint: tuple[int, Fingerprint] | None = None
         self._waiting: list[Item] = []
@@ -84,7 +95,7 @@ class Room:
         if member.edits:
             # Not from a batch that is being committed: an older state only asks for more.
             member.post(wire.question(self._replica.doc.get_state()))
-        member.post_presence(self.attendance.everyone())
+        member.post_presence(News(self.attendance.everyone()))
 
     def leave(self, member: Member) -> None:
         """A socket is gone, and what it said about itself with it."""
@@ -108,13 +119,24 @@ class Room:
             case wire.Presence(entries):
                 self._tell_presence(self.attendance.hear(member.seat, entries), member)
             case wire.WhoIsThere():
-                member.post_presence(self.attendance.everyone())
+                member.post_presence(News(self.attendance.everyone()))
 
     def _tell_presence(self, entries: Sequence[Entry], speaker: Member) -> None:
-        if entries:
-            for member in self.members:
-                if member is not speaker:
-                    member.post_presence(entries)
+        """Tell the others at the end of this window; of each client only the last word."""
+        if entries and not self._said:
+            self._window.when_open(self._spread)
+        for entry in entries:
+            self._said[entry.client] = entry, speaker
+
+    def _spread(self) -> None:
+        said, self._said = self._said, {}
+        speakers = {speaker for _, speaker in said.values()}
+        everything = News(entry for entry, _ in said.values())
+        for member in self.members:
+            if member not in speakers:
+                member.post_presence(everything)
+            elif others := [entry for entry, speaker in said.values() if speaker is not member]:
+                member.post_presence(News(others))
 
     # --- the door -------------------------------------------------------------------------------
 
@@ -184,6 +206,7 @@ class Room:
         try:
             while True:
                 await self._news.wait()
+                await self._window.open()
                 await self._handle()
                 if not self._waiting:
                     self._news.clear()
@@ -284,15 +307,24 @@ class Room:
             if member.synced and (taken.for_all or own != {member}):
                 for frame in frames:
                     member.post(frame)
-        heard = {offer.member for offer in taken.handled}
         for offer in taken.handled:
             if offer.member is not None:
                 offer.member.edit_handled()
             if offer.done is not None and not offer.done.done():
                 offer.done.set_result(self.seq)
+        for author in {offer.member for offer in taken.handled}:
+            if author is not None:
+                author.post_ack(self.seq)
+        if taken.news and not self._naming:
+            self._naming = True
+            self._moments.when_open(self._name_moment)
+
+    def _name_moment(self) -> None:
+        """Tell those who only listen which moment they show. They hear it less often than what
+        changed: half of all messages of a busy room would say nothing else."""
+        self._naming = False
         for member in self.members:
-            if taken.news or member in heard:
-                member.post_ack(self.seq)
+            member.post_ack(self.seq)
 
     def _answer(self, ask: Ask) -> None:
         """Sync step 2: what the client lacks."""

@@ -8,19 +8,23 @@ from typing import Final
 from action_assistant.editor import wire
 from action_assistant.editor.replica import load
 from action_assistant.editor.room import Room
+from action_assistant.editor.window import LENGTH, Window
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 
 LINGER: Final = 5.0  # seconds that a room stays after the last one left
 _TICK: Final = 2.0  # seconds
+_MOMENTS: Final = 10  # windows after which listeners hear again which moment they show
 _SILENCE: Final = 10.0  # seconds without a word after which a socket hears a beat
 
 
 class Rooms:
     """The rooms of this process, by stream."""
 
-    def __init__(self, journal: Journal, *, linger: float = LINGER) -> None:
+    def __init__(self, journal: Journal, *, linger: float = LINGER, window: float = LENGTH) -> None:
         self._journal = journal
+        self._window = Window(window)
+        self._moments = Window(_MOMENTS * window)
         self._linger = linger
         self._rooms: dict[str, Room] = {}
         self._loading: dict[str, asyncio.Task[Room]] = {}
@@ -93,7 +97,9 @@ class Rooms:
     async def _load(self, stream: str) -> Room:
         try:
             loaded = await load(self._journal, stream)
-            room = self._rooms[stream] = Room(stream, self._journal, loaded, self._forget)
+            room = self._rooms[stream] = Room(
+                stream, self._journal, loaded, self._forget, self._window, self._moments
+            )
             return room
         finally:
             del self._loading[stream]

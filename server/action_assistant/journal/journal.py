@@ -17,7 +17,7 @@ from action_assistant.journal.events import Addition, Draft, Event, Fold, Snapsh
 from action_assistant.journal.follower import Follower
 from action_assistant.journal.migrate import BRANCHES
 from action_assistant.journal.tables import LOG, editor_event, editor_head, editor_snapshot
-from action_assistant.journal.writer import Job, Pen, Writer
+from action_assistant.journal.writer import Job, Outcome, Pen, Writer
 
 T = TypeVar("T")
 
@@ -35,7 +35,8 @@ class Journal:
         self._branch: Final = branch
         self._loop = asyncio.get_running_loop()
         self._database = database
-        self._writer = Writer(database, session, fold)
+        self._writer = Writer(database, session, fold, self._written)
+        self._jobs: list[Job[Any]] = []  # of this turn of the loop, for one transaction
         self._followers: set[Follower] = set()
         self._closed = False
 
@@ -186,6 +187,7 @@ class Journal:
         if self._closed:
             return
         self._closed = True
+        self._submit()
         await asyncio.to_thread(self._writer.close)
         await asyncio.sleep(0)  # let the last outcomes arrive
         for follower in self._followers:
@@ -197,28 +199,30 @@ class Journal:
         if self._closed:
             raise Unavailable("The journal is closed.")
         future: asyncio.Future[T] = self._loop.create_future()
-
-        def done(result: T | None, error: BaseException | None, events: Sequence[Event]) -> None:
-            self._loop.call_soon_threadsafe(self._tell, future, result, error, events)
-
-        self._writer.submit(Job(work, done))
+        if not self._jobs:
+            self._loop.call_soon(self._submit)
+        self._jobs.append(Job(work, future))
         # Whoever waits may be cancelled; the job may not: it is written or it is not.
-        return await asyncio.shield(future)
+        return await future
 
-    def _tell(
-        self,
-        future: "asyncio.Future[Any]",
-        result: object,
-        error: BaseException | None,
-        events: Sequence[Event],
-    ) -> None:
-        if error is None:
-            future.set_result(result)
-        else:
-            future.set_exception(error)
-            future.exception()  # seen: the one who waited may have been cancelled
-        for follower in self._followers:
-            follower.hear(events)
+    def _submit(self) -> None:
+        if self._jobs:
+            jobs, self._jobs = self._jobs, []
+            self._writer.submit(jobs)
+
+    def _written(self, outcomes: Sequence[tuple[Job[Any], Outcome]]) -> None:
+        self._loop.call_soon_threadsafe(self._tell, outcomes)
+
+    def _tell(self, outcomes: Sequence[tuple[Job[Any], Outcome]]) -> None:
+        for job, (result, error, events) in outcomes:
+            if job.future.done():  # whoever waited was cancelled
+                pass
+            elif error is None:
+                job.future.set_result(result)
+            else:
+                job.future.set_exception(error)
+            for follower in self._followers:
+                follower.hear(events)
 
     async def _ask(self, question: Callable[[Connection], T]) -> T:
         if self._closed:

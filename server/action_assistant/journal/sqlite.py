@@ -6,6 +6,7 @@ import os
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -30,11 +31,9 @@ _READERS: Final = 3  # threads, each with a connection
 _WAIT: Final = 5.0  # seconds for a lock that only a foreign process could hold
 _PRAGMAS: Final = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON")
 _PAGE: Final = 500
-_INSERT: Final = (
-    "INSERT INTO event (stream, seq, kind, author, at, body, position, chain)"
-    " VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
-)
-_END: Final = "INSERT OR REPLACE INTO head (stream, seq, chain) VALUES (?, ?, ?)"
+_INSERT: Final = "INSERT INTO event (stream, seq, kind, author, at, body, position, chain) VALUES "
+_END: Final = "INSERT OR REPLACE INTO head (stream, seq, chain) VALUES "
+_ROWS: Final = 50  # of one statement; for each number of rows there is one, which SQLite keeps
 #: In the order of the rows themselves: an index may be what is damaged.
 _SCAN: Final = (
     "SELECT stream, seq, kind, author, at, body, position, chain, rowid FROM event NOT INDEXED"
@@ -87,16 +86,23 @@ class SqliteSession:
         alone = not self._raw.in_transaction
         if alone:
             self.begin()
-        self._raw.executemany(
+        self._insert(
             _INSERT,
             [
-                (e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position, chain)
-                for e, chain in events
+                (e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position, link)
+                for e, link in events
             ],
         )
-        self._raw.executemany(_END, [(name, end.seq, end.chain) for name, end in heads.items()])
+        self._insert(_END, [(name, end.seq, end.chain) for name, end in heads.items()])
         if alone:
             self._raw.execute("COMMIT")
+
+    def _insert(self, command: str, rows: Sequence[tuple[Any, ...]]) -> None:
+        """Many rows by few statements: this thread has to wait for its turn after each."""
+        for start in range(0, len(rows), _ROWS):
+            some = rows[start : start + _ROWS]
+            places = f"({', '.join('?' * len(some[0]))})"
+            self._raw.execute(command + ", ".join([places] * len(some)), list(chain(*some)))
 
     def close(self) -> None:
         """Let go; what is not committed has not happened."""

@@ -1,5 +1,6 @@
 """The thread that writes a journal: one connection, one transaction for all who wait."""
 
+import asyncio
 import logging
 import queue
 import threading
@@ -24,7 +25,7 @@ Clock: TypeAlias = Callable[[], int]
 #: What became of a job: its result, or why there is none; the events it wrote.
 Outcome: TypeAlias = tuple[Any, BaseException | None, list[Event]]
 
-_TOGETHER: Final = 1000  # jobs in one transaction
+_TOGETHER: Final = 1000  # jobs after which no others join a transaction
 _HEAVY: Final = 16 << 20  # bytes in one statement, beyond which no other job joins
 _KNOWN: Final = 10_000  # streams whose ends are kept in memory
 _AGAIN: Final = 0.1  # seconds between attempts to find out about a commit
@@ -37,15 +38,11 @@ def now() -> int:
 
 
 class Job(Generic[T]):
-    """Work for the writer's thread. `done` is called on that thread, after the commit or failure."""
+    """Work for the writer's thread, and who waits for its result."""
 
-    def __init__(
-        self,
-        work: Callable[["Pen"], T],
-        done: Callable[[T | None, BaseException | None, Sequence[Event]], None],
-    ) -> None:
+    def __init__(self, work: Callable[["Pen"], T], future: "asyncio.Future[T]") -> None:
         self.work = work
-        self.done = done
+        self.future = future
 
 
 class Pen:
@@ -175,23 +172,32 @@ class Pen:
 
 
 class Writer:
-    """The only writer of a database. What waits while a commit is under way is the next one."""
+    """The only writer of a database. What waits while a commit is under way is the next one.
+
+    `tell` is called on the writer's thread after each commit or failure, once for all its jobs.
+    """
 
     def __init__(
-        self, database: Database, session: Session | None, fold: Fold, clock: Clock = now
+        self,
+        database: Database,
+        session: Session | None,
+        fold: Fold,
+        tell: Callable[[Sequence[tuple[Job[Any], Outcome]]], None],
+        clock: Clock = now,
     ) -> None:
         self._database = database
         self._session = session
         self._fold = fold
+        self._tell = tell
         self._clock = clock
         self._pen: Pen | None = None
-        self._jobs: queue.SimpleQueue[Job[Any] | None] = queue.SimpleQueue()
+        self._jobs: queue.SimpleQueue[Sequence[Job[Any]] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, name=f"{database.name} pen", daemon=True)
         self._thread.start()
 
-    def submit(self, job: Job[Any]) -> None:
-        """Queue a job; returns at once."""
-        self._jobs.put(job)
+    def submit(self, jobs: Sequence[Job[Any]]) -> None:
+        """Queue jobs, for one transaction if it can hold them; returns at once."""
+        self._jobs.put(jobs)
 
     def close(self) -> None:
         """Finish what was submitted, then end the thread. Blocks."""
@@ -210,13 +216,13 @@ class Writer:
     def _next(self) -> tuple[list[Job[Any]], bool]:
         """Everything that waits, at least one; whether to end after it."""
         found: list[Job[Any]] = []
-        job = self._jobs.get()
-        while job is not None:
-            found.append(job)
-            if len(found) == _TOGETHER:
+        jobs = self._jobs.get()
+        while jobs is not None:
+            found += jobs
+            if len(found) >= _TOGETHER:
                 return found, False
             try:
-                job = self._jobs.get_nowait()
+                jobs = self._jobs.get_nowait()
             except queue.Empty:
                 return found, False
         return found, True
@@ -233,8 +239,7 @@ class Writer:
             log.error("%s was not written: %s", self._database.name, cause_of(error), exc_info=ours)
             self._disconnect()
             done = self._settled(pen, done, len(jobs), error)
-        for job, (result, error_, events) in zip(jobs, done, strict=True):
-            job.done(result, error_, events)
+        self._tell(list(zip(jobs, done, strict=True)))
 
     def _together(self, pen: Pen, jobs: list[Job[Any]], done: list[Outcome]) -> None:
         pen.start()

@@ -6,7 +6,7 @@ import logging
 import re
 from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import anyio
 from litestar.connection import ASGIConnection
@@ -85,6 +85,19 @@ def known_person(connection: ASGIConnection[Any, Any, Any, Any]) -> Person | Non
     return session.person if session is not None else None
 
 
+class Plain(NamedTuple):
+    """A connection as the server below gave it: for sockets whose every message counts."""
+
+    receive: Receive
+    send: Send
+
+
+def plain(connection: ASGIConnection[Any, Any, Any, Any]) -> Plain:
+    """Without what stands around the application; answers to requests need all of that."""
+    found: Plain = connection.scope["state"]["plain"]
+    return found
+
+
 class Access:
     """An ASGI middleware that lets in who may come in.
 
@@ -119,6 +132,7 @@ class Access:
             await self._app(scope, receive, send)
             return
         headers = _headers(scope)
+        scope.setdefault("state", {})["plain"] = Plain(receive, send)
         send = self._dressed(headers, send)
         try:
             preflight = self._admit(scope, headers)

@@ -5,8 +5,7 @@ from typing import Any, Final
 
 import anyio
 from litestar import WebSocket, websocket
-from litestar.exceptions import WebSocketDisconnect
-from litestar.types import ControllerRouterHandler
+from litestar.types import ControllerRouterHandler, Receive, Send
 
 from action_assistant.editor import happenings as h
 from action_assistant.editor import wire
@@ -14,7 +13,7 @@ from action_assistant.editor.house import Door
 from action_assistant.editor.member import Member
 from action_assistant.editor.room import Room
 from action_assistant.errors import Refused
-from action_assistant.web.access import person_of, refuse
+from action_assistant.web.access import person_of, plain, refuse
 from action_assistant.web.roles import allowed
 
 log: Final = logging.getLogger(__name__)
@@ -75,11 +74,12 @@ async def _part(socket: Socket, epoch: str) -> None:
 
 async def _converse(socket: Socket, room: Room, member: Member) -> None:
     """Until one side ends it."""
+    receive, send = plain(socket)
     room.join(member)
     try:
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(_listen, socket, room, member)
-            tasks.start_soon(_speak, socket, member)
+            tasks.start_soon(_listen, receive, room, member)
+            tasks.start_soon(_speak, send, member)
             code = await member.ended()
             tasks.cancel_scope.cancel()
     finally:
@@ -89,10 +89,10 @@ async def _converse(socket: Socket, room: Room, member: Member) -> None:
             await socket.close(code, member.said or wire.REASONS.get(code))
 
 
-async def _listen(socket: Socket, room: Room, member: Member) -> None:
+async def _listen(receive: Receive, room: Room, member: Member) -> None:
     """What the client says. Ends the member when the client goes, or says what cannot be read."""
     while True:
-        event: Any = await socket.receive()
+        event: Any = await receive()
         if event["type"] == "websocket.disconnect":
             member.close(_NORMAL)
             return
@@ -108,16 +108,17 @@ async def _listen(socket: Socket, room: Room, member: Member) -> None:
             return
         if message is not None:
             room.hear(member, message)
-            await member.until_heard()
+            if member.far_ahead:
+                await member.until_heard()
 
 
-async def _speak(socket: Socket, member: Member) -> None:
+async def _speak(send: Send, member: Member) -> None:
     """What the client is told."""
     try:
         while not member.closed:
             for frame in await member.take():
-                await socket.send_bytes(frame)
-    except (WebSocketDisconnect, OSError, RuntimeError):
+                await send({"type": "websocket.send", "bytes": frame, "text": None})
+    except (OSError, RuntimeError):
         member.close(_NORMAL)
 
 
