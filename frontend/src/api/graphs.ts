@@ -17,6 +17,29 @@ export interface GraphSummary {
   updated_at: string;
   actions?: number;
   problems?: { error: number; warning: number };
+  robots?: string[];
+  labels?: string[];
+  /** Who is in it now. */
+  people?: Author[];
+}
+
+/** One parameter of a known action; `text` is its JSON without a value. */
+export interface KnownParameter {
+  path: string;
+  pvf_type: string | null;
+  required: boolean;
+  text: string;
+}
+
+/** An action that some graph uses. */
+export interface KnownActionAnswer {
+  name: string;
+  description: string;
+  type: string;
+  inputs: KnownParameter[];
+  outputs: KnownParameter[];
+  /** Ids of graphs. */
+  used_in: string[];
 }
 
 export interface Author {
@@ -70,6 +93,15 @@ export function useGraphs() {
     queryKey: keys.graphs,
     queryFn: ({ signal }) => ask<GraphSummary[]>("/api/graphs", { signal }),
     refetchInterval: 8_000,
+  });
+}
+
+/** Every action that all graphs together know, by name. */
+export function useActions() {
+  return useQuery({
+    queryKey: ["actions"],
+    queryFn: ({ signal }) => ask<KnownActionAnswer[]>("/api/actions", { signal }),
+    refetchInterval: 15_000,
   });
 }
 

@@ -1,68 +1,16 @@
 /** The first page: every graph, and how to begin. */
 import { Button, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconFileImport, IconPlus } from "@tabler/icons-react";
-import { Link } from "wouter";
-import { type GraphSummary, useGraphs } from "../api/graphs";
+import { useGraphs } from "../api/graphs";
 import { sentence } from "../api/http";
 import { useMay } from "../api/person";
-import { endWords, runWord } from "../api/progress";
-import { newestRun, useLive } from "../api/use-live";
 import { Empty } from "../ui/empty";
-import { StateWord } from "../ui/state-word";
-import { ago, instant, useNow } from "../ui/when";
-import { GraphMenu } from "./graph-menu";
+import { GraphCards } from "./graph-cards";
 import style from "./home.module.css";
-import { Preview } from "./preview";
 
 interface Props {
   onNew: () => void;
   onImport: () => void;
-}
-
-function Problems({ graph }: { graph: GraphSummary }) {
-  const { error = 0, warning = 0 } = graph.problems ?? {};
-  const count = error + warning;
-  if (count === 0) return null;
-  return (
-    <span className={style.problems} data-worst={error > 0 ? "error" : "warning"}>
-      <IconAlertTriangle size={13} aria-hidden />
-      {count === 1 ? "1 problem" : `${count} problems`}
-    </span>
-  );
-}
-
-function GraphCard({ graph, names }: { graph: GraphSummary; names: readonly string[] }) {
-  const { now: live } = useLive();
-  const now = useNow(20_000);
-  const run = newestRun(live, graph.id);
-  const at = instant(graph.updated_at);
-  return (
-    <article className={style.card}>
-      <Link to={`/graphs/${graph.id}`} className={style.open}>
-        <div className={style.preview}>
-          <Preview graph={graph.id} seq={graph.seq} />
-        </div>
-        <div className={style.body}>
-          <h3 className={style.name}>{graph.name || "Untitled"}</h3>
-          <p className={style.description}>{graph.description || "No description yet"}</p>
-          <div className={style.facts}>
-            {run && (
-              <StateWord
-                tone={runWord(run).tone}
-                word={run.ended_at === null ? runWord(run).word : endWords(run)}
-              />
-            )}
-            <Problems graph={graph} />
-            <span>
-              {graph.actions === 1 ? "1 action" : `${graph.actions ?? 0} actions`}
-              {at !== null && ` · changed ${ago(at, now)}`}
-            </span>
-          </div>
-        </div>
-      </Link>
-      <GraphMenu graph={graph} names={names} />
-    </article>
-  );
 }
 
 function Skeletons() {
@@ -131,13 +79,7 @@ export function Home({ onNew, onImport }: Props) {
               : "What the others make appears here."}
           </Empty>
         )}
-        {list.length > 0 && (
-          <div className={style.cards}>
-            {list.map((graph) => (
-              <GraphCard key={graph.id} graph={graph} names={list.map(({ name }) => name)} />
-            ))}
-          </div>
-        )}
+        {list.length > 0 && <GraphCards graphs={list} />}
       </div>
     </main>
   );

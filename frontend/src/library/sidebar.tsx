@@ -1,13 +1,14 @@
 /** The list on the left: graphs to open, actions to place. */
 import { ActionIcon, Kbd, TextInput, Tooltip } from "@mantine/core";
-import { IconFileImport, IconGripVertical, IconPlus, IconSearch } from "@tabler/icons-react";
+import { IconFileImport, IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { useGraphs } from "../api/graphs";
 import { useMay } from "../api/person";
 import type { NewAction } from "../graph/edit";
-import { actionCarrier } from "../ui/carry";
+import { ActionRow } from "./action-row";
+import { fits } from "./choose";
 import { GraphRow, RowSkeletons } from "./graph-rows";
-import { type KnownAction, signature, useKnownActions } from "./known";
+import { signature, useKnownActions } from "./known";
 import style from "./sidebar.module.css";
 
 interface Props {
@@ -16,36 +17,6 @@ interface Props {
   onImport: () => void;
   /** Puts an action on the canvas; absent where there is none. */
   onPlace?: (template: NewAction) => void;
-}
-
-export function fits(search: string, ...texts: (string | undefined)[]): boolean {
-  const words = search.toLowerCase().split(/\s+/).filter(Boolean);
-  const all = texts.join(" ").toLowerCase();
-  return words.every((word) => all.includes(word));
-}
-
-function ActionRow({ known, onPlace }: { known: KnownAction; onPlace: (t: NewAction) => void }) {
-  const { template, used } = known;
-  return (
-    <button
-      type="button"
-      className={style.row}
-      title={template.description || template.name}
-      onPointerDown={(event) => actionCarrier.press(event, template, template.name)}
-      onClick={() => onPlace(template)}
-    >
-      <span className={style.grip} aria-hidden>
-        <IconGripVertical size={14} />
-      </span>
-      <span className={style.text}>
-        <span className={style.name}>{template.name}</span>
-        <span className={style.sub}>
-          {signature(template)}
-          {used > 0 && ` · used in ${used}`}
-        </span>
-      </span>
-    </button>
-  );
 }
 
 function ActionList({ search, onPlace }: { search: string; onPlace: (t: NewAction) => void }) {
@@ -62,7 +33,10 @@ function ActionList({ search, onPlace }: { search: string; onPlace: (t: NewActio
         <ActionRow key={known.template.name} known={known} onPlace={onPlace} />
       ))}
       {fresh !== "" && !exact && (
-        <ActionRow known={{ template: { name: fresh }, used: 0 }} onPlace={onPlace} />
+        <ActionRow
+          known={{ template: { name: fresh }, usedIn: [], takes: [], gives: [] }}
+          onPlace={onPlace}
+        />
       )}
       {shown.length === 0 && fresh === "" && (
         <p className={style.hint}>
@@ -77,7 +51,9 @@ export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
   const [search, setSearch] = useState("");
   const mayEdit = useMay("edit");
   const graphs = useGraphs();
-  const shown = (graphs.data ?? []).filter((graph) => fits(search, graph.name, graph.description));
+  const shown = (graphs.data ?? []).filter((graph) =>
+    fits(search, graph.name, graph.description, ...(graph.robots ?? []), ...(graph.labels ?? [])),
+  );
   return (
     <div className={style.sidebar}>
       <TextInput

@@ -1,9 +1,10 @@
 /** The properties of the graph itself, and how to begin. */
-import { Kbd } from "@mantine/core";
+import { Kbd, TagsInput } from "@mantine/core";
 import { setGraphDescription, setGraphName } from "../../graph/edit";
 import { useBench } from "../bench";
 import { DraftInput } from "../draft-input";
 import style from "./details.module.css";
+import { labelsOf, setLabels } from "./labels";
 
 export function GraphForm() {
   const { doc, graph } = useBench();
@@ -22,6 +23,14 @@ export function GraphForm() {
         value={graph.description}
         placeholder="What it is for"
         onCommit={(text) => setGraphDescription(doc, text)}
+      />
+      <TagsInput
+        label="Labels"
+        size="sm"
+        placeholder="night shift, demo …"
+        maxTags={20}
+        value={labelsOf(graph)}
+        onChange={(labels) => setLabels(doc, graph, labels)}
       />
       <p className={style.hint}>
         {graph.actions.length === 1 ? "1 action" : `${graph.actions.length} actions`},{" "}

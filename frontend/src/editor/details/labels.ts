@@ -1,0 +1,33 @@
+/** What people sort a graph under: `labels` in its `gui_attributes`, which no engine reads. */
+import type * as Y from "yjs";
+import { memberText, withMember } from "../../api/member";
+import { rootOf } from "../../graph/layout";
+import type { Graph } from "../../graph/model";
+import { together } from "../../graph/pen";
+
+const KEY = "x/gui_attributes";
+
+function attributes(graph: Graph): string {
+  const text = graph.extra.find(([field]) => `x/${field}` === KEY)?.[1] ?? "{}";
+  return text.trimStart().startsWith("{") ? text : "{}";
+}
+
+export function labelsOf(graph: Graph): string[] {
+  const text = memberText(attributes(graph), "labels");
+  const value: unknown = text === null ? [] : JSON.parse(text);
+  return Array.isArray(value) ? value.filter((label) => typeof label === "string") : [];
+}
+
+/** Everything else that stands in `gui_attributes` stays as it is spelled. */
+export function setLabels(doc: Y.Doc, graph: Graph, labels: readonly string[]): void {
+  const kept = [...new Set(labels.map((label) => label.trim()).filter(Boolean))];
+  const text = withMember(
+    attributes(graph),
+    "labels",
+    kept.length === 0 ? null : JSON.stringify(kept),
+  );
+  together(doc, () => {
+    if (text === "{}") rootOf(doc, "meta").delete(KEY);
+    else rootOf(doc, "meta").set(KEY, text);
+  });
+}

@@ -1,0 +1,187 @@
+/** Graphs as cards: searched, sorted, by label; each says how it is and who is in it. */
+import { Select, TextInput } from "@mantine/core";
+import { useLocalStorage } from "@mantine/hooks";
+import { IconAlertTriangle, IconSearch } from "@tabler/icons-react";
+import { useMemo, useState } from "react";
+import { Link } from "wouter";
+import type { GraphSummary } from "../api/graphs";
+import { endWords, runWord } from "../api/progress";
+import { type Run, useRuns } from "../api/runs";
+import { newestRun, useLive } from "../api/use-live";
+import { Empty } from "../ui/empty";
+import { initials, personColor, robotColor } from "../ui/robot";
+import { StateWord } from "../ui/state-word";
+import { ago, instant, useNow } from "../ui/when";
+import { choose, labelsOf, lastRuns, ORDERS, type Order } from "./choose";
+import style from "./graph-cards.module.css";
+import { GraphMenu } from "./graph-menu";
+import home from "./home.module.css";
+import { Preview } from "./preview";
+
+const FEW = 4; // robots or labels on a card
+
+function Problems({ graph }: { graph: GraphSummary }) {
+  const { error = 0, warning = 0 } = graph.problems ?? {};
+  const count = error + warning;
+  if (count === 0) return null;
+  return (
+    <span className={home.problems} data-worst={error > 0 ? "error" : "warning"}>
+      <IconAlertTriangle size={13} aria-hidden />
+      {count === 1 ? "1 problem" : `${count} problems`}
+    </span>
+  );
+}
+
+function LastRun({ run, now }: { run: Run; now: number }) {
+  const going = run.ended_at === null;
+  const at = instant(run.ended_at ?? run.started_at ?? run.requested_at);
+  return (
+    <StateWord
+      tone={runWord(run).tone}
+      word={going ? runWord(run).word : endWords(run)}
+      {...(at === null || going ? {} : { more: ago(at, now) })}
+    />
+  );
+}
+
+function People({ people }: { people: NonNullable<GraphSummary["people"]> }) {
+  if (people.length === 0) return null;
+  const names = people.map(({ name }) => name || "Guest").join(", ");
+  return (
+    <span className={style.people} title={`Now here: ${names}`}>
+      <span className="visually-hidden">Now here: {names}</span>
+      {people.slice(0, FEW).map(({ id, name }) => (
+        <i key={id} style={{ background: personColor(id) }} aria-hidden>
+          {initials(name || "Guest")}
+        </i>
+      ))}
+      {people.length > FEW && <i aria-hidden>+{people.length - FEW}</i>}
+    </span>
+  );
+}
+
+interface CardProps {
+  graph: GraphSummary;
+  names: readonly string[];
+  last: Run | null;
+}
+
+function GraphCard({ graph, names, last }: CardProps) {
+  const now = useNow(20_000);
+  const at = instant(graph.updated_at);
+  const { robots = [], labels = [], people = [] } = graph;
+  return (
+    <article className={home.card}>
+      <Link to={`/graphs/${graph.id}`} className={home.open}>
+        <div className={home.preview}>
+          <Preview graph={graph.id} seq={graph.seq} />
+          <People people={people} />
+        </div>
+        <div className={home.body}>
+          <h3 className={home.name}>{graph.name || "Untitled"}</h3>
+          <p className={home.description}>{graph.description || "No description yet"}</p>
+          {(robots.length > 0 || labels.length > 0) && (
+            <p className={style.marks}>
+              {robots.slice(0, FEW).map((robot) => (
+                <span key={robot} className={style.robot}>
+                  <i style={{ background: robotColor(robot) }} aria-hidden />
+                  <span className="visually-hidden">robot </span>
+                  {robot}
+                </span>
+              ))}
+              {robots.length > FEW && <span>+{robots.length - FEW}</span>}
+              {labels.slice(0, FEW).map((label) => (
+                <span key={label} className={style.label}>
+                  {label}
+                </span>
+              ))}
+              {labels.length > FEW && <span>+{labels.length - FEW}</span>}
+            </p>
+          )}
+          <div className={home.facts}>
+            {last && <LastRun run={last} now={now} />}
+            <Problems graph={graph} />
+            <span>
+              {graph.actions === 1 ? "1 action" : `${graph.actions ?? 0} actions`}
+              {at !== null && ` · changed ${ago(at, now)}`}
+            </span>
+          </div>
+        </div>
+      </Link>
+      <GraphMenu graph={graph} names={names} />
+    </article>
+  );
+}
+
+export function GraphCards({ graphs }: { graphs: readonly GraphSummary[] }) {
+  const { now: live, runner } = useLive();
+  const listed = useRuns(runner).data;
+  const [search, setSearch] = useState("");
+  const [label, setLabel] = useState<string | null>(null);
+  const [order, setOrder] = useLocalStorage<Order>({
+    key: "aa.graphs-by",
+    defaultValue: "changed",
+    getInitialValueInEffect: false,
+  });
+  const runs = useMemo(() => lastRuns([...(listed ?? []), ...live.runs.values()]), [listed, live]);
+  const labels = labelsOf(graphs);
+  const wish = { search, label: label !== null && labels.includes(label) ? label : null, order };
+  const shown = choose(graphs, wish, runs);
+  const names = graphs.map(({ name }) => name);
+  return (
+    <>
+      <search className={style.tools}>
+        <TextInput
+          className={style.search ?? ""}
+          aria-label="Search graphs"
+          placeholder="Name, robot, label, person …"
+          leftSection={<IconSearch size={15} aria-hidden />}
+          value={search}
+          onChange={(event) => setSearch(event.currentTarget.value)}
+          data-search
+        />
+        {labels.length > 0 && (
+          <fieldset className={style.labels}>
+            <legend className="visually-hidden">Only with the label</legend>
+            {labels.map((each) => (
+              <button
+                key={each}
+                type="button"
+                className={style.pick}
+                aria-pressed={wish.label === each}
+                onClick={() => setLabel(wish.label === each ? null : each)}
+              >
+                {each}
+              </button>
+            ))}
+          </fieldset>
+        )}
+        <Select
+          className={style.order ?? ""}
+          aria-label="Sort by"
+          data={Object.entries(ORDERS).map(([value, words]) => ({ value, label: words }))}
+          value={order}
+          onChange={(next) => setOrder((next ?? "changed") as Order)}
+        />
+      </search>
+      <p className="visually-hidden" role="status">
+        {search === "" ? "" : `${shown.length} of ${graphs.length} graphs`}
+      </p>
+      {shown.length === 0 && (
+        <Empty icon={<IconSearch size={22} />} title="No graph says that">
+          Names, descriptions, robots, labels and the people in them are searched.
+        </Empty>
+      )}
+      <div className={home.cards}>
+        {shown.map((graph) => (
+          <GraphCard
+            key={graph.id}
+            graph={graph}
+            names={names}
+            last={newestRun(live, graph.id) ?? runs.get(graph.id) ?? null}
+          />
+        ))}
+      </div>
+    </>
+  );
+}
