@@ -72,7 +72,7 @@ def test_without_rclpy_everything_else_works_and_the_reason_is_told(
     monkeypatch.setenv(interpreter.VARIABLE, sys.executable)
     with running(tmp_path / "data") as product, product.runner() as runner:
         reach = runner.get("/api/reach").json()
-        assert [each["name"] for each in reach["robots"]] == ["simulator"]
+        assert [each["name"] for each in reach["engines"]] == ["simulator"]
         assert reach["no_reach"].startswith("rclpy is not there for this Python")
 
 

@@ -34,7 +34,9 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     _address(editor, port=8000)
     _database(editor)
     _sharing(editor)
-    editor.add_argument("--runner-port", type=_port, metavar="N", help="default: the next port")
+    editor.add_argument(
+        "--runner-port", type=port_number, metavar="N", help="default: the next port"
+    )
     editor.set_defaults(deed=_editor)
 
     runner = commands.add_parser(
@@ -44,7 +46,9 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     _address(runner, port=8001)
     _sharing(runner)
-    runner.add_argument("--page-port", type=_port, metavar="N", help="default: the port before")
+    runner.add_argument(
+        "--page-port", type=port_number, metavar="N", help="default: the port before"
+    )
     runner.set_defaults(deed=_runner)
 
     migrate = commands.add_parser(
@@ -57,7 +61,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     migrate.set_defaults(deed=_migrate)
 
 
-def _port(text: str) -> int:
+def port_number(text: str) -> int:
     number = int(text)
     if not 0 < number < 65536:
         raise ValueError
@@ -74,7 +78,7 @@ def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
         help="default: 127.0.0.1; with --share every address of this computer",
     )
     parser.add_argument(
-        "--port", type=_port, default=port, metavar="N", help="default: %(default)s"
+        "--port", type=port_number, default=port, metavar="N", help="default: %(default)s"
     )
 
 

@@ -3,6 +3,7 @@
 import importlib
 import importlib.util
 import os
+import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from typing import Final
@@ -20,7 +21,7 @@ def ros2_reach(wall: Callable[[], int], environ: Mapping[str, str] = os.environ)
     `wall` gives microseconds UTC. rclpy is imported here and not before: an editor's computer has
     none, and its wheels start their interpreter anew.
     """
-    missing = why_not()
+    missing = why_not(environ)
     if missing:
         return missing
     home = environ.get("ROS_DOMAIN_ID", "0")
@@ -31,11 +32,17 @@ def ros2_reach(wall: Callable[[], int], environ: Mapping[str, str] = os.environ)
     return Ros2(wall, int(home))
 
 
-def why_not() -> str:
+def why_not(environ: Mapping[str, str] = os.environ) -> str:
     """Why this interpreter cannot speak ROS 2; empty when it can."""
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     if importlib.util.find_spec("rclpy") is None:
         return f"rclpy is not there for this Python ({version}, {sys.executable}): {_MAKE}."
+    rmw = environ.get("RMW_IMPLEMENTATION", "")
+    if rmw and not _survives(rmw, environ):
+        return (
+            f"RMW_IMPLEMENTATION is {rmw!r}, which rclpy does not find here. Install it, or unset "
+            "the variable."
+        )
     try:
         importlib.import_module("rclpy")
     except ImportError as error:
@@ -57,3 +64,10 @@ def why_not() -> str:
             "temoto_msgs of March 2025 or later, or ros/temoto_msgs."
         )
     return ""
+
+
+def _survives(rmw: str, environ: Mapping[str, str]) -> bool:
+    """Whether rclpy can be imported with this middleware: if not, it ends the process (code 102)."""
+    asked = {**environ, "RMW_IMPLEMENTATION": rmw}
+    command = [sys.executable, "-c", "import rclpy"]
+    return subprocess.run(command, env=asked, capture_output=True, check=False).returncode != 102
