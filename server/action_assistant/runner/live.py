@@ -119,9 +119,9 @@ class Hub:
     def beat(self) -> str:
         """A sign of life."""
         seen = {
-            run: shapes.time(opened.seen_at)
+            run: shapes.time(opened.watch.seen_at)
             for run, opened in self.control.open.items()
-            if opened.seen_at is not None
+            if opened.watch.seen_at is not None
         }
         return _text(Beat(shapes.time(self.wall()), seen))
 

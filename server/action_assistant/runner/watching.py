@@ -1,0 +1,222 @@
+"""Watches a run: asks, listens, and draws the conclusions that the evidence allows, and no others."""
+
+import itertools
+from collections.abc import Callable
+from typing import Final, Protocol
+
+import anyio
+import msgspec
+
+from action_assistant.runner.events import Answered, End, Proof, Published, RunEvent, Silent
+from action_assistant.runner.history import Aside
+from action_assistant.runner.lateness import fresh
+from action_assistant.runner.links.port import Answer, Link, NoAnswer
+from action_assistant.runner.proof import Rest, hash_of
+from action_assistant.runner.runs import Run, is_news
+from action_assistant.runner.sameness import difference
+from action_assistant.runner.seen import TERMINAL, Seen, Snapshot
+from action_assistant.umrf.model import Graph
+
+_POLL_S: Final = 1.0
+_STOP_POLL_S: Final = 0.1
+_GET_S: Final = 1.0  # an engine that is not busy answers within milliseconds
+_SILENT_S: Final = 3.0
+_APPEAR_S: Final = 3.0  # until a started graph must show in answers
+_GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun
+_SEVERAL: Final = (
+    "{servers} engines are seen on the path of its answers, so that none proves anything"
+)
+
+
+class Watched(Protocol):
+    """The run that is watched."""
+
+    run: Run
+
+    def tell(self, event: RunEvent, author: str = "") -> None:
+        """Show and store an event."""
+        ...
+
+    def observe(self, seen: tuple[Seen, ...]) -> None:
+        """Show and store what was seen."""
+        ...
+
+    def end(self, state: End, detail: str) -> None:
+        """The run is over."""
+        ...
+
+    def alarm(self, code: str, text: str) -> None:
+        """Tell people something now."""
+        ...
+
+
+class Watch:
+    """Evidence of one run. `trouble`: why its stop is not proven yet; `seen_at`: when its engine last
+    showed it."""
+
+    def __init__(
+        self, it: Watched, link: Link, *, exact: bool, wall: Callable[[], int], aside: Aside
+    ) -> None:
+        self.trouble = ""
+        self.seen_at: int | None = None
+        self._it = it
+        self._link = link
+        self._wall = wall
+        self._aside = aside
+        self._look = anyio.Event()
+        self._order = itertools.count(1)
+        self._stop_sent: int | None = None
+        self._sent: Graph | None = None  # until it was compared with what the engine shows
+        self._answered = False  # by a get, since the last feedback
+        self._rest = Rest(exact=exact)
+        self._heard_at = self._began_at = anyio.current_time()
+        self._seen_wall: int | None = None
+
+    def look(self) -> None:
+        """Ask now."""
+        self._look.set()
+
+    def sends(self, graph: Graph) -> None:
+        """This graph is being started: what the engine shows is compared with it, once."""
+        self._sent = graph
+
+    def stop_left(self) -> None:
+        """A stop message has left: whatever is asked from now on may prove it."""
+        if self._stop_sent is None:
+            self._stop_sent = next(self._order)
+
+    def feed(self, ours: tuple[Snapshot, ...]) -> None:
+        """Feedback of this run, oldest first."""
+        overtaken, self._answered = self._answered, False
+        if not ours:
+            return
+        self.seen_at = self._wall()
+        if news := fresh(self._it.run, ours) if overtaken else ours:
+            self._it.observe(news)
+
+    async def run(self) -> None:
+        """Ask until cancelled: each second, sooner when there is news, ten times as often for a stop."""
+        wait = 0.0
+        while True:
+            with anyio.move_on_after(wait):
+                await self._look.wait()
+            self._look = anyio.Event()
+            order, began = next(self._order), anyio.current_time()
+            try:
+                with anyio.fail_after(_GET_S):
+                    answer = await self._link.get()
+            except (NoAnswer, TimeoutError) as nothing:
+                self._hear_nothing(str(nothing))
+            else:
+                self._take(answer, order, began)
+                await self._compare(answer)
+            cost = anyio.current_time() - began
+            hurry = self._it.run.desired == "stopped" or self._rest.pending
+            pace = _STOP_POLL_S if hurry else _POLL_S
+            wait = max(pace, 5 * cost)
+
+    def _hear_nothing(self, why: str) -> None:
+        silent = anyio.current_time() - self._heard_at
+        self.trouble = why or "the engine does not answer"
+        if silent >= _SILENT_S and self._it.run.unknown_since is None:
+            at = self._wall()
+            self._it.tell(Silent(at, at - round(silent * 1e6), self.trouble))
+
+    def _take(self, answer: Answer, order: int, asked: float) -> None:
+        """Draw the conclusions that one answer allows, and no others."""
+        name = self._it.run.graph_name
+        if len({self._it.run.incarnation, answer.incarnation} - {None, ""}) > 1:
+            self._it.alarm("engine_restarted", "The engine was restarted: look at the robot.")
+            self._it.end("lost", "The engine was restarted while the run went on.")
+            return
+        own = next((each for each in answer.graphs if each.graph == name), None)
+        servers = self._link.standing.servers
+        if own is None or own.run != self._it.run.id:
+            if servers > 1:
+                self._hear_nothing(_SEVERAL.format(servers=servers))
+                return
+            self._heard_at = anyio.current_time()
+            self._missing(own, answer)
+            return
+        self._heard_at, self.seen_at, self._answered = anyio.current_time(), answer.at, True
+        if self._it.run.incarnation is None:  # the runner died between sending and noting it
+            self._it.tell(Published(answer.at, answer.incarnation))
+        if self._it.run.unknown_since is not None:
+            self._it.tell(Answered(answer.at))
+        parts = [each for each in answer.graphs if each.graph.startswith(f"{name}__")]
+        shown = [own, *(part for part in parts if part.run in {None, self._it.run.id})]
+        self._note(shown)
+        if servers == 1:
+            self._conclude(shown, answer, order, asked)
+        else:
+            self.trouble = _SEVERAL.format(servers=servers or "no")
+
+    async def _compare(self, answer: Answer) -> None:
+        """Once: whether the engine has what was sent. It is never stopped for that by itself."""
+        sent, text = self._sent, answer.texts.get(self._it.run.graph_name)
+        if sent is None or text is None or self._it.run.graph_state is None:
+            return
+        self._sent = None
+        if why := await self._aside(lambda: difference(sent, text)):
+            self._it.alarm(
+                "echo_differs", f"What {self._it.run.engine} shows is not what was sent: {why}"
+            )
+
+    def _note(self, shown: list[Snapshot]) -> None:
+        """Keep what an answer says beyond what is known already."""
+        since, self._seen_wall = self._seen_wall, shown[0].at
+        news = tuple(
+            msgspec.structs.replace(each, since=since)
+            for each in shown
+            if is_news(self._it.run, each)
+        )
+        if news:
+            self._it.observe(news)
+
+    def _missing(self, other: Snapshot | None, answer: Answer) -> None:
+        """The answer does not show this run."""
+        self._rest.forget()
+        if self._it.run.graph_state is not None:
+            self._it.end(
+                "lost",
+                "The engine does not hold this run any more."
+                if other is None
+                else "Another start has taken the place of this run.",
+            )
+            return
+        waited = anyio.current_time() - self._began_at
+        if waited < _APPEAR_S:
+            return
+        if self._it.run.incarnation is None:
+            self._it.end(
+                "lost", "The runner ended before it could note whether the start was sent."
+            )
+        elif self._it.run.desired == "stopped" and waited >= _GIVEN_UP_S:
+            self._it.end("lost", "The engine answers but has never shown this run.")
+        elif self._it.run.unknown_since is None:
+            since = answer.at - round(waited * 1e6)
+            self._it.tell(
+                Silent(answer.at, since, "The engine answers but does not show this run.")
+            )
+
+    def _conclude(self, shown: list[Snapshot], answer: Answer, order: int, asked: float) -> None:
+        own, at_rest = shown[0], self._rest.seen(shown, asked)
+        if self._it.run.desired != "stopped":
+            end = self._it.run.apparent_end
+            if end is not None and own.state in TERMINAL and at_rest:
+                self._it.end(end, "")
+            return
+        if self._stop_sent is None or order <= self._stop_sent:
+            return
+        if at_rest:
+            self._it.tell(Proof(answer.at, answer.asked_at, hash_of(shown)))
+            self._it.end(self._it.run.apparent_end or "stopped", "")
+        elif self._rest.pending:
+            self.trouble = "nothing moves, but an action may still be about to begin"
+        elif own.state == "FINISHED":
+            self.trouble = (
+                "the graph has finished, so the engine ignores Stop, while "
+                f"{', '.join(self._it.run.active)} goes on"
+            )
+        else:
+            self.trouble = f"{', '.join(self._it.run.active) or own.graph} has not stopped yet"
