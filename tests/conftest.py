@@ -1,10 +1,14 @@
 """What every test may ask for."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from journal import servers
+from journal.servers import Server
 
 # No test speaks to another machine, whatever robots it registers.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -25,6 +29,15 @@ def no_settings_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Settings of whoever runs the tests must not change what they test."""
     for name in [name for name in os.environ if name.startswith("ACTION_ASSISTANT_")]:
         monkeypatch.delenv(name)
+
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[Server]:
+    """A Postgres server that no test harms."""
+    if servers.binaries() is None:
+        pytest.skip("Postgres is not installed (Debian: postgresql)")
+    with servers.server() as one:
+        yield one
 
 
 @pytest.fixture(scope="session")

@@ -1,34 +1,60 @@
-"""Migrations: the scripts make what `tables.py` says, there and back, from anywhere."""
+"""Migrations: the scripts make what `tables.py` says, there and back, from anywhere, with data."""
 
-import sqlite3
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 import pytest
 from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import MetaData, inspect
+from sqlalchemy import JSON, Column, Connection, MetaData, insert, inspect, select, text
 
 from action_assistant import places
 from action_assistant.errors import CannotStart
+from action_assistant.journal.database import database_of
 from action_assistant.journal.migrate import (
     BRANCHES,
     Branch,
     config_for,
     migrate,
 )
-from action_assistant.journal.sqlite import sqlite_engine
 
 branches = pytest.mark.parametrize("branch", ["editor", "runner"])
+Deed: TypeAlias = Callable[[Connection], Any]
 
 
-def schema(path: Path) -> dict[str, Any]:
+class Empty(NamedTuple):
+    """A database without tables, and whose it is to be."""
+
+    branch: Branch
+    url: str
+
+    def migrate(self, revision: str = "head") -> str:
+        return migrate(self.url, self.branch, revision)
+
+    def do(self, deed: Deed) -> Any:
+        """Something in one transaction."""
+        return database_of(self.url).migrate(deed)
+
+
+@pytest.fixture(params=["editor on SQLite", "editor on Postgres", "runner on SQLite"])
+def empty(request: pytest.FixtureRequest, tmp_path: Path) -> Empty:
+    """Each kind of database that there is."""
+    match request.param.split(" on "):
+        case [("editor" | "runner") as branch, "SQLite"]:
+            return Empty(branch, f"sqlite:///{tmp_path / 'one.db'}")
+        case ["editor", "Postgres"]:
+            return Empty("editor", request.getfixturevalue("postgres").new_database())
+        case other:
+            raise AssertionError(other)
+
+
+def schema(connection: Connection) -> dict[str, Any]:
     """Everything that a database says about its tables."""
-    engine = sqlite_engine(path, wait=1)
-    found = inspect(engine)
-    tables = {
+    found = inspect(connection)
+    return {
         name: {
             "columns": [
                 (c["name"], str(c["type"]), c["nullable"]) for c in found.get_columns(name)
@@ -43,64 +69,99 @@ def schema(path: Path) -> dict[str, Any]:
         for name in found.get_table_names()
         if name != "alembic_version"
     }
-    engine.dispose()
-    return tables
 
 
-@branches
-def test_a_migrated_database_equals_a_fresh_one(branch: Branch, tmp_path: Path) -> None:
-    migrate(f"sqlite:///{tmp_path / 'migrated.db'}", branch)
-    engine = sqlite_engine(tmp_path / "fresh.db", wait=1)
-    with engine.begin() as connection:
-        BRANCHES[branch].create_all(connection)
-    engine.dispose()
-    assert schema(tmp_path / "migrated.db") == schema(tmp_path / "fresh.db")
+def steps(empty: Empty) -> list[str]:
+    """All revisions, the oldest first."""
+    script = empty.do(lambda c: ScriptDirectory.from_config(config_for(c, empty.branch)))
+    found = script.iterate_revisions(f"{empty.branch}@head", "base")
+    return [step.revision for step in found][::-1]
 
 
-@branches
-def test_alembic_finds_nothing_to_add(branch: Branch, tmp_path: Path) -> None:
-    migrate(f"sqlite:///{tmp_path / 'migrated.db'}", branch)
-    engine = sqlite_engine(tmp_path / "migrated.db", wait=1)
-    with engine.begin() as connection:
+def test_a_migrated_database_equals_a_fresh_one(empty: Empty) -> None:
+    empty.migrate()
+    migrated = empty.do(schema)
+    empty.do(lambda c: command.downgrade(config_for(c, empty.branch), f"{empty.branch}@base"))
+    empty.do(BRANCHES[empty.branch].create_all)
+    assert migrated == empty.do(schema)
+
+
+def test_alembic_finds_nothing_to_add(empty: Empty) -> None:
+    empty.migrate()
+
+    def compare(connection: Connection) -> Any:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
-        assert compare_metadata(context, BRANCHES[branch]) == []
-    engine.dispose()
+        return compare_metadata(context, BRANCHES[empty.branch])
+
+    assert empty.do(compare) == []
 
 
-@branches
-def test_every_step_can_be_taken_back_and_again(branch: Branch, tmp_path: Path) -> None:
-    path = tmp_path / "steps.db"
-    migrate(f"sqlite:///{path}", branch)
-    wanted = schema(path)
-    engine = sqlite_engine(path, wait=1)
-    with engine.begin() as connection:
-        command.downgrade(config_for(connection, branch), f"{branch}@base")
-    assert schema(path) == {}
-    with engine.begin() as connection:
-        script = ScriptDirectory.from_config(config_for(connection, branch))
-        steps = [s.revision for s in script.iterate_revisions(f"{branch}@head", "base")]
-    engine.dispose()
-    for revision in reversed(steps):
-        migrate(f"sqlite:///{path}", branch, revision)
-    assert schema(path) == wanted
+def test_every_step_can_be_taken_back_and_again(empty: Empty) -> None:
+    empty.migrate()
+    wanted = empty.do(schema)
+    empty.do(lambda c: command.downgrade(config_for(c, empty.branch), f"{empty.branch}@base"))
+    assert empty.do(schema) == {}
+    for revision in steps(empty):
+        empty.migrate(revision)
+    assert empty.do(schema) == wanted
 
 
-@branches
-def test_migrating_twice_changes_nothing(branch: Branch, tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path / 'twice.db'}"
-    assert migrate(url, branch) == migrate(url, branch)
+def test_from_every_earlier_revision_what_is_stored_comes_along(empty: Empty) -> None:
+    for revision in steps(empty):
+        empty.migrate(revision)
+        stored = empty.do(fill)
+        empty.migrate()
+        found = empty.do(lambda c: contents(c, list(stored)))  # noqa: B023 - called at once
+        for table, rows in stored.items():
+            for row, old in zip(found[table], rows, strict=True):
+                kept = old.keys() & row.keys()
+                assert {name: row[name] for name in kept} == {name: old[name] for name in kept}
+        empty.do(lambda c: command.downgrade(config_for(c, empty.branch), f"{empty.branch}@base"))
 
 
-def test_a_database_of_a_newer_version_is_refused_and_left_alone(tmp_path: Path) -> None:
-    path = tmp_path / "editor.db"
-    migrate(f"sqlite:///{path}", "editor")
-    with sqlite3.connect(path) as connection:
-        connection.execute("UPDATE alembic_version SET version_num = 'editor_9999'")
-    connection.close()
-    before = schema(path)
-    with pytest.raises(CannotStart, match=r"newer version .*editor_9999"):
-        migrate(f"sqlite:///{path}", "editor")
-    assert schema(path) == before
+def fill(connection: Connection) -> dict[str, list[dict[str, Any]]]:
+    """Put two rows into each table as it is at this revision; what they are."""
+    metadata = MetaData()
+    metadata.reflect(connection)
+    tables = [table for table in metadata.sorted_tables if table.name != "alembic_version"]
+    for table in tables:
+        for n in (1, 2):
+            connection.execute(insert(table).values({c.name: value(c, n) for c in table.columns}))
+    return contents(connection, [table.name for table in tables])
+
+
+def value(column: Column[Any], n: int) -> Any:
+    """Something that fits a column, and that no other row has."""
+    kind = column.type.as_generic().python_type
+    values = {int: n, str: f"{column.name} {n}", bytes: bytes([n, 0, 255]), bool: n == 1}
+    return {"n": n} if isinstance(column.type.as_generic(), JSON) else values.get(kind, float(n))
+
+
+def contents(connection: Connection, names: list[str]) -> dict[str, list[dict[str, Any]]]:
+    """The rows of some tables."""
+    metadata = MetaData()
+    metadata.reflect(connection, only=names)
+    return {
+        name: sorted(
+            (dict(row) for row in connection.execute(select(metadata.tables[name])).mappings()),
+            key=repr,
+        )
+        for name in names
+    }
+
+
+def test_migrating_twice_changes_nothing(empty: Empty) -> None:
+    assert empty.migrate() == empty.migrate()
+
+
+def test_a_database_of_a_newer_version_is_refused_and_left_alone(empty: Empty) -> None:
+    empty.migrate()
+    newer = f"{empty.branch}_9999"
+    empty.do(lambda c: c.execute(text(f"UPDATE alembic_version SET version_num = '{newer}'")))
+    before = empty.do(schema)
+    with pytest.raises(CannotStart, match=rf"newer version .*{newer}"):
+        empty.migrate()
+    assert empty.do(schema) == before
 
 
 def test_the_other_process_s_database_is_refused(tmp_path: Path) -> None:

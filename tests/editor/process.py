@@ -22,8 +22,9 @@ BEARER = {"authorization": f"Bearer {TOKEN}"}
 class Editor:
     """An editor on a free port. `kill` and `start` may be called in turn."""
 
-    def __init__(self, data: Path) -> None:
+    def __init__(self, data: Path, database: str | None = None) -> None:
         self.data = data
+        self._database = ["--database", database] if database else []
         self.port = free_ports()
         self.log = data.parent / f"{data.name}.log"
         self._process: subprocess.Popen[bytes] | None = None
@@ -36,7 +37,10 @@ class Editor:
         """Start it and wait until it answers."""
         with self.log.open("ab") as log:
             self._process = subprocess.Popen(
-                [*COMMAND, "editor", "--data", str(self.data), "--port", str(self.port)],
+                [
+                    *(*COMMAND, "editor", "--data", str(self.data), "--port", str(self.port)),
+                    *self._database,
+                ],
                 env={**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN},
                 stderr=log,
                 stdout=log,
@@ -99,9 +103,9 @@ class Editor:
 
 
 @contextlib.contextmanager
-def running(data: Path) -> Iterator[Editor]:
+def running(data: Path, database: str | None = None) -> Iterator[Editor]:
     """An editor that runs inside the block."""
-    editor = Editor(data)
+    editor = Editor(data, database)
     editor.start()
     try:
         yield editor

@@ -1,25 +1,15 @@
 """Journals to test: every kind that there is."""
 
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 
 import pytest
 
 from action_assistant.journal.events import Fold, nothing
 from action_assistant.journal.journal import Journal
-from journal import servers
 from journal.servers import Server
 
 Open = Callable[..., Awaitable[Journal]]
-
-
-@pytest.fixture(scope="session")
-def postgres() -> Iterator[Server]:
-    """A Postgres server that no test harms."""
-    if servers.binaries() is None:
-        pytest.skip("Postgres is not installed (Debian: postgresql)")
-    with servers.server() as one:
-        yield one
 
 
 @pytest.fixture(params=["sqlite", "postgres"])

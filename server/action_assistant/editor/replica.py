@@ -18,7 +18,7 @@ from action_assistant.editor.scan import Outline, outline
 from action_assistant.editor.tail import Damaged, Tail
 from action_assistant.editor.wire import NOTHING_NEW, Malformed, Reader
 from action_assistant.errors import Unavailable
-from action_assistant.journal.events import Event
+from action_assistant.journal.events import Event, Snapshot
 from action_assistant.journal.journal import Journal
 
 log: Final = logging.getLogger(__name__)
@@ -271,7 +271,7 @@ async def load(
     `learn`: what only editing needs; by default for a document as it is now. Raises Unavailable.
     """
     learn = upto is None if learn is None else learn
-    snapshot = await journal.snapshot(stream)
+    snapshot = await _snapshot(journal, stream)
     replica = None
     if snapshot is not None and (upto is None or snapshot.seq <= upto):
         replica = Kept.replica(snapshot.state)
@@ -289,6 +289,15 @@ async def load(
         await anyio.lowlevel.checkpoint()
     replica.released()
     return Loaded(replica, tail.seq, start, tail.damaged)
+
+
+async def _snapshot(journal: Journal, stream: str) -> Snapshot | None:
+    """The snapshot; none where it cannot even be read, since the log says all that it could."""
+    try:
+        return await journal.snapshot(stream)
+    except Unavailable as error:
+        log.warning("%s: no use of the snapshot: %s", stream, error.detail)
+        return None
 
 
 async def _first_bad(journal: Journal, stream: str, events: Sequence[Event]) -> Damaged:

@@ -1,0 +1,117 @@
+"""The editor on a real Postgres: what is acknowledged stays, and it goes on by itself."""
+
+import asyncio
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import httpx_ws
+import pytest
+from pycrdt import Doc, Map
+
+from action_assistant.editor import wire
+from editor.process import Editor, running
+from journal.servers import Server, binaries, server
+
+
+@pytest.fixture
+def mortal() -> Iterator[Server]:
+    """A server that a test may stop."""
+    if binaries() is None:
+        pytest.skip("Postgres is not installed (Debian: postgresql)")
+    with server() as one:
+        yield one
+
+
+class Hand:
+    """Someone who writes things into a graph, and comes again until they are durable."""
+
+    def __init__(self, editor: Editor, graph: str) -> None:
+        self.doc: Doc[Any] = Doc()
+        self.things = self.doc.get("things", type=Map)
+        self.turned_away = 0
+        self._editor = editor
+        self._graph = graph
+
+    async def write(self, name: str) -> None:
+        """Until it is acknowledged."""
+        self.things[name] = name
+        async with asyncio.timeout(40):
+            while not await self._acknowledged():
+                self.turned_away += 1
+                await asyncio.sleep(0.1)
+
+    async def _acknowledged(self) -> bool:
+        """Whether one connection was enough."""
+        with contextlib.suppress(ConnectionError):
+            try:
+                async with self._editor.socket(self._graph, "?acks=1") as session:
+                    await self._converse(session)
+                    return True
+            except* (httpx_ws.HTTPXWSException, httpx.TransportError) as gone:
+                raise ConnectionError from gone
+        return False
+
+    async def _converse(self, session: httpx_ws.AsyncWebSocketSession) -> None:
+        await session.send_bytes(wire.question(self.doc.get_state()))
+        while True:
+            frame = await session.receive_bytes()
+            if frame[0] == wire.ACKS and wire.Reader(frame[1:]).number() > 0:
+                return
+            match frame[0] == wire.SYNC and wire.parse(frame):
+                case wire.Question(state):
+                    await session.send_bytes(wire.answer(self.doc.get_update(state)))
+                case wire.Edit(update):
+                    self.doc.apply_update(update)
+
+
+async def seen(editor: Editor, graph: str) -> set[str]:
+    """What somebody finds who comes anew."""
+    doc: Doc[Any] = Doc()
+    things = doc.get("things", type=Map)
+    async with editor.joined(graph, doc):
+        return set(things.keys())
+
+
+def made(editor: Editor) -> str:
+    with editor.client() as client:
+        graph: str = client.post("/api/graphs", json={"name": "on Postgres"}).json()["id"]
+    return graph
+
+
+async def test_after_a_kill_everything_acknowledged_is_there(
+    postgres: Server, tmp_path: Path
+) -> None:
+    with running(tmp_path / "data", postgres.new_database()) as editor:
+        graph = await asyncio.to_thread(made, editor)
+        hand = Hand(editor, graph)
+        for n in range(3):
+            await hand.write(f"before {n}")
+        await asyncio.to_thread(editor.kill)
+        await asyncio.to_thread(editor.start)
+        assert await seen(editor, graph) == {"before 0", "before 1", "before 2"}
+        with editor.client() as client:
+            listed = (await asyncio.to_thread(client.get, "/api/graphs")).json()
+        assert "on Postgres" in [each["name"] for each in listed]
+
+
+async def test_when_postgres_has_stopped_and_is_back_the_editor_goes_on_by_itself(
+    mortal: Server, tmp_path: Path
+) -> None:
+    with running(tmp_path / "data", mortal.new_database()) as editor:
+        graph = await asyncio.to_thread(made, editor)
+        hand = Hand(editor, graph)
+        await hand.write("before")
+        await asyncio.to_thread(mortal.stop, "immediate")
+        with editor.client() as client:
+            ready = await asyncio.to_thread(client.get, "/readyz")
+        assert ready.status_code == 503
+        waiting = asyncio.create_task(hand.write("while it was away"))
+        while hand.turned_away == 0:  # noqa: ASYNC110 - nobody tells
+            await asyncio.sleep(0.02)
+        await asyncio.to_thread(mortal.start)
+        await waiting
+        await hand.write("after")
+        assert await seen(editor, graph) == {"before", "while it was away", "after"}

@@ -1,0 +1,108 @@
+"""Snapshots are a cache: gone, damaged or old ones make no difference but time."""
+
+import hashlib
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pycrdt import Map
+
+from action_assistant.editor.replica import Loaded, load
+from action_assistant.editor.rooms import Rooms
+from action_assistant.journal.events import nothing
+from action_assistant.journal.journal import Journal
+from editor.client import Client, settle
+
+Change = Callable[[sqlite3.Connection], Any]
+
+
+def proof(database: sqlite3.Connection, seq: int, state: bytes) -> bytes:
+    """What ties a state to the event it claims to be made at; also for a wrong state."""
+    (body,) = database.execute("SELECT body FROM event WHERE seq = ?", (seq,)).fetchone()
+    return hashlib.sha256(hashlib.sha256(body).digest() + state).digest()
+
+
+def forged(database: sqlite3.Connection) -> None:
+    """Bytes that are no snapshot of ours, with a proof that fits."""
+    (seq,) = database.execute("SELECT seq FROM snapshot").fetchone()
+    state = b"\x94\x01 rubbish"
+    database.execute(
+        "UPDATE snapshot SET state = ?, proof = ?", (state, proof(database, seq, state))
+    )
+
+
+CHANGES: dict[str, Change] = {
+    "as it was made": lambda _: None,
+    "gone": lambda database: database.execute("DELETE FROM snapshot"),
+    "one byte of it changed": lambda database: database.execute(
+        "UPDATE snapshot SET state = substr(state, 1, 40) || x'00' || substr(state, 42)"
+    ),
+    "cut short": lambda database: database.execute("UPDATE snapshot SET state = substr(state, 1, 99)"),
+    "said to be younger": lambda database: database.execute("UPDATE snapshot SET seq = seq + 1"),
+    "said to be older": lambda database: database.execute("UPDATE snapshot SET seq = seq - 5"),
+    "beyond the end of the log": lambda database: database.execute("UPDATE snapshot SET seq = 9999"),
+    "forged": forged,
+}  # fmt: skip
+
+
+async def written(path: Path) -> None:
+    """A log of three people who write and delete, with a snapshot in its middle."""
+    journal = await Journal.open(f"sqlite:///{path}", branch="editor", fold=nothing)
+    rooms = Rooms(journal, linger=60, window=0)
+    people = [Client(name) for name in ("ada", "bob", "cem")]
+    async with rooms.enter("graph/g") as room:
+        for person in people:
+            person.join(room)
+        await settle(*people)
+        for n in range(60):
+            person = people[n % 3]
+            person.map[f"{person.person.id} {n // 6}"] = n
+            if n % 7 == 6:
+                del person.map[next(iter(person.map.keys()))]
+            await settle(*people)
+            if n == 30:
+                await room._keep_snapshot()
+                old = await journal.snapshot("graph/g")
+        for person in people:
+            person.leave()
+    await rooms.close()
+    assert old is not None
+    await journal.keep_snapshot("graph/g", old.seq, old.state)  # the one in the middle stands
+    await journal.close()
+
+
+def held(loaded: Loaded) -> tuple[Any, ...]:
+    """Everything that a document knows."""
+    replica = loaded.replica
+    things = replica.doc.get("things", type=Map).to_py()
+    state = replica.doc.get_state()
+    replica.close()
+    return loaded.seq, things, sorted(state), replica.owners, loaded.damaged
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+async def test_whatever_became_of_the_snapshot_the_document_is_the_same(
+    change: Change, tmp_path: Path
+) -> None:
+    path = tmp_path / "editor.db"
+    await written(path)
+    with closing(sqlite3.connect(path)) as database:
+        before = database.execute("SELECT seq FROM snapshot").fetchall()
+        change(database)
+        database.commit()
+    journal = await Journal.open(f"sqlite:///{path}", branch="editor", fold=nothing)
+    found = await load(journal, "graph/g")
+    whole = await load(journal, "graph/g", learn=True, upto=await journal.newest("graph/g"))
+    await journal.close()
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("DELETE FROM snapshot")
+        database.commit()
+    journal = await Journal.open(f"sqlite:///{path}", branch="editor", fold=nothing)
+    replayed = await load(journal, "graph/g")
+    await journal.close()
+    assert before == [(before[0][0],)]
+    assert 0 < before[0][0] < replayed.seq
+    assert held(found) == held(replayed) == held(whole)
