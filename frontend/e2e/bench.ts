@@ -181,3 +181,23 @@ export async function arrows(product: Product, id: string): Promise<string[]> {
     ...graph_exit.map((last) => `${named(last)} > exit`),
   ].sort();
 }
+
+/** What a graph means: the digest of what the server would publish of it. */
+export async function digestOf(product: Product, id: string): Promise<string> {
+  const { digest } = await product.ask<{ digest: string }>(`/api/graphs/${id}/versions`, {
+    method: "POST",
+    body: "{}",
+    headers: { "content-type": "application/json" },
+  });
+  return digest;
+}
+
+/** What a file means, once it is read. */
+export async function meant(product: Product, file: object): Promise<string> {
+  const { id } = await product.ask<{ id: string }>("/api/graphs", {
+    method: "POST",
+    body: JSON.stringify(file),
+    headers: { "content-type": "application/json" },
+  });
+  return digestOf(product, id);
+}

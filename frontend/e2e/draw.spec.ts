@@ -220,7 +220,7 @@ test("things are put in their place: aligned, spread, tidied, nudged, framed, no
   const text = page.getByRole("textbox", { name: "Text of the note" });
   await text.fill("=1+1 <script>");
   await text.press("Escape");
-  await expect(page.getByRole("group", { name: "Note, yellow: =1+1 <script>" })).toBeVisible();
+  await expect(page.getByRole("group", { name: "Note, amber: =1+1 <script>" })).toBeVisible();
 
   // The pictures have it all, escaped.
   const download = page.waitForEvent("download");

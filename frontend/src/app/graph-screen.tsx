@@ -100,7 +100,7 @@ function Inside({ id }: { id: string }) {
 
 function TitledBar(props: { id: string } & Parameters<typeof Bar>[0]) {
   const { id, ...parts } = props;
-  const here = parts.crumbs.at(-1)?.label;
+  const here = parts.crumbs.find(({ to, part }) => to === undefined && !part)?.label;
   useTitle(typeof here === "string" ? here : "Graph");
   return <Bar graph={id} {...parts} />;
 }

@@ -2,7 +2,7 @@
 import { Button, Modal } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconFlag, IconPlayerPlay, IconPlus, IconSquareRounded } from "@tabler/icons-react";
-import { useEffect, useRef, useState } from "react";
+import { useRef, useState } from "react";
 import { connect, moveRelation, together } from "../graph/edit";
 import { endsOf } from "../graph/layout";
 import { ENTRY, EXIT, type Key, type Precondition } from "../graph/model";
@@ -49,7 +49,6 @@ const LETTERS: Readonly<Record<string, Precondition>> = {
 
 function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) {
   const row = useRef<HTMLDivElement>(null);
-  useEffect(() => row.current?.querySelector("button")?.focus(), []);
   const onKeyDown = (event: React.KeyboardEvent) => {
     const chosen = LETTERS[event.key.toLowerCase()];
     const buttons = [...(row.current?.querySelectorAll("button") ?? [])];
@@ -73,6 +72,7 @@ function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) 
       {OUTCOMES.map((outcome, i) => (
         <Button
           key={outcome}
+          data-autofocus={i === 0 || undefined}
           onClick={() => onPick(outcome)}
           leftSection={<OutcomeSign outcome={outcome} />}
           rightSection={<span className={style.digit}>{i + 1}</span>}
@@ -138,6 +138,7 @@ export function ArrowDialog({ bench, from: given, to, onClose }: Props) {
       yOffset="14vh"
       centered={false}
       transitionProps={{ duration: 80 }}
+      overlayProps={{ backgroundOpacity: 0.3 }}
     >
       <p className={style.sentence} aria-live="polite">
         {from === ENTRY ? (
@@ -218,6 +219,7 @@ export function RetargetDialog({
       yOffset="14vh"
       centered={false}
       transitionProps={{ duration: 80 }}
+      overlayProps={{ backgroundOpacity: 0.3 }}
     >
       <div className={style.outcomes}>
         <Button

@@ -80,6 +80,15 @@ export async function writeText(text: string): Promise<boolean> {
   return done;
 }
 
+/** Copies an address, or shows it where the browser does not let us. */
+export async function copyLinkTo(link: string): Promise<void> {
+  notifications.show(
+    (await writeText(link))
+      ? { message: "Link copied" }
+      : { title: "The browser did not copy the link", message: link, autoClose: 20_000 },
+  );
+}
+
 /** The system's clipboard where it may be read, else what was copied last in this browser. */
 export async function readText(): Promise<string> {
   try {
@@ -113,6 +122,7 @@ function land(bench: Bench, clip: Clip, own: boolean): void {
     const [first] = keys;
     const at = first === undefined ? undefined : bench.places().get(first);
     if (at) bench.view.reveal(at);
+    if (first !== undefined) bench.view.focus(first);
   });
 }
 

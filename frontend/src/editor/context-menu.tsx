@@ -1,6 +1,6 @@
 /** The menu of what was pressed, at the place where it was pressed. */
 import { Menu } from "@mantine/core";
-import { Fragment } from "react";
+import { Fragment, useEffect, useRef } from "react";
 import { type Bench, selectedActions, selectedNotes, selectedRelations } from "./bench";
 import style from "./context-menu.module.css";
 import * as deeds from "./deeds/all";
@@ -55,6 +55,12 @@ export function ContextMenu({ bench, screen, onClose }: Props) {
   const groups = offered(bench)
     .map((group) => group.filter((deed) => isEnabled(deed, bench)))
     .filter((group) => group.length > 0);
+  const box = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    // The menu is placed first; then its first line has the keys.
+    const timer = setTimeout(() => box.current?.querySelector("button")?.focus(), 80);
+    return () => clearTimeout(timer);
+  }, []);
   return (
     <Menu
       opened
@@ -71,7 +77,11 @@ export function ContextMenu({ bench, screen, onClose }: Props) {
       <Menu.Target>
         <span className={style.spot} style={{ left: screen[0], top: screen[1] }} />
       </Menu.Target>
-      <Menu.Dropdown className={style.menu ?? ""} onContextMenu={(event) => event.preventDefault()}>
+      <Menu.Dropdown
+        ref={box}
+        className={style.menu ?? ""}
+        onContextMenu={(event) => event.preventDefault()}
+      >
         {groups.map((group, i) => (
           <Fragment key={group[0]?.name}>
             {i > 0 && <Menu.Divider />}

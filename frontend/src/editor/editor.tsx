@@ -100,6 +100,19 @@ function obstacleOf(
   return null;
 }
 
+/** Where one is: the graphs, this one, and what of it is chosen. */
+function crumbsOf(bench: Bench): Crumb[] {
+  const [only, ...others] = bench.selection;
+  const action = bench.graph.actions.find(({ key }) => key === only);
+  return [
+    { label: "Graphs", to: "/" },
+    { label: bench.graph.name || "Untitled" },
+    ...(action && others.length === 0
+      ? [{ label: `${action.name} ${action.instanceId}`, part: true }]
+      : []),
+  ];
+}
+
 export function Editor(props: Props) {
   const { id, known, progress } = props;
   const wide = useIsWide();
@@ -180,7 +193,7 @@ export function Editor(props: Props) {
   return (
     <BenchContext value={bench}>
       {props.bar({
-        crumbs: [{ label: "Graphs", to: "/" }, { label: bench.graph.name || "Untitled" }],
+        crumbs: crumbsOf(bench),
         status: (
           <>
             <SavedWord />

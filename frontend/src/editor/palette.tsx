@@ -94,6 +94,7 @@ export function Palette({ bench, onClose }: { bench: Bench; onClose: () => void 
       size="lg"
       padding="sm"
       transitionProps={{ duration: 80 }}
+      overlayProps={{ backgroundOpacity: 0.3 }}
       aria-label="Commands"
     >
       <PickList

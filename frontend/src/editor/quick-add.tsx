@@ -60,15 +60,17 @@ export function QuickAdd({ bench, request, known, onClose }: Props) {
     return () => window.removeEventListener("pointerdown", onDown);
   }, [onClose]);
 
-  const choose = (template: NewAction | undefined) => {
+  const choose = (template: NewAction | undefined, byKey = false) => {
     if (!template) return;
-    bench.select([placed(bench, request, template)]);
+    const key = placed(bench, request, template);
+    bench.select([key]);
+    if (byKey) bench.view.focus(key);
     bench.view.reveal([request.at[0] - CARD.width / 2, request.at[1]]);
     onClose();
   };
   const onKeyDown = (event: React.KeyboardEvent) => {
     if (event.key === "Escape") onClose();
-    else if (event.key === "Enter") choose(list[at]);
+    else if (event.key === "Enter") choose(list[at], true);
     else if (event.key === "ArrowDown") setAt((i) => Math.min(i + 1, list.length - 1));
     else if (event.key === "ArrowUp") setAt((i) => Math.max(i - 1, 0));
     else return;

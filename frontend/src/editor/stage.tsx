@@ -16,6 +16,7 @@ import style from "./stage.module.css";
 import { Toolbar } from "./toolbar";
 import type { EditorState } from "./use-bench";
 import { useCanvas } from "./use-canvas";
+import { useDeepLink } from "./use-deep-link";
 import { useView } from "./use-view";
 
 interface Props {
@@ -65,6 +66,7 @@ function Inside({ me, sight, progress, marks, compact, phone, run, writing, corn
   }, [sight, view, places, sizes]);
 
   useDryRunInView(bench);
+  useDeepLink(bench, begun);
 
   return (
     <div className={style.whole}>
@@ -112,7 +114,7 @@ function Inside({ me, sight, progress, marks, compact, phone, run, writing, corn
             <Robots />
           </div>
         )}
-        <div className={style.tools}>
+        <div className={style.tools} data-hidden={(phone && bench.dryRun !== null) || undefined}>
           <Toolbar compact={compact} />
         </div>
         <div className={style.corner}>

@@ -23,6 +23,18 @@ interface Given {
   pointer: RefObject<Position | null>;
 }
 
+/** How long the view glides, ms; not at all for people who want no motion. */
+function glide(ms: number): number {
+  return window.matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : ms;
+}
+
+/** Focuses a card, which may be drawn some frames later only. */
+function focusCard(room: HTMLElement, key: Key, tries: number): void {
+  const card = room.querySelector<HTMLElement>(`.react-flow__node[data-id="${CSS.escape(key)}"]`);
+  if (card !== null) card.focus({ preventScroll: true });
+  else if (tries > 0) requestAnimationFrame(() => focusCard(room, key, tries - 1));
+}
+
 /** The actions that run, the latest first. */
 export function running(progress: ReadonlyMap<Key, Progress>): Key[] {
   return [...progress]
@@ -50,7 +62,7 @@ export function useView(given: Given) {
       const again = duration > 0 && alike(first, flow.getViewport());
       const next = again ? whole(box, size) : first;
       fitted.current = again ? null : next;
-      void flow.setViewport(next, { duration });
+      void flow.setViewport(next, { duration: glide(duration) });
     },
     [flow, frame, least],
   );
@@ -88,7 +100,7 @@ export function useView(given: Given) {
       const size = { width: room.clientWidth, height: room.clientHeight };
       const here: Looking = flow.getViewport();
       if (goal === "whole") {
-        void flow.setViewport(whole(box, size), { duration: 250 });
+        void flow.setViewport(whole(box, size), { duration: glide(250) });
         return;
       }
       const zoom = goal === "middle" ? Math.max(here.zoom, least) : here.zoom;
@@ -97,7 +109,7 @@ export function useView(given: Given) {
         : goal === "middle"
           ? whole(box, size)
           : null;
-      if (next !== null) void flow.setViewport(next, { duration: 250 });
+      if (next !== null) void flow.setViewport(next, { duration: glide(250) });
     },
     [flow, frame, least],
   );
@@ -105,15 +117,15 @@ export function useView(given: Given) {
   const view = useMemo<View>(
     () => ({
       fit: () => showAll(200),
-      zoomIn: () => void flow.zoomIn({ duration: 120 }),
-      zoomOut: () => void flow.zoomOut({ duration: 120 }),
+      zoomIn: () => void flow.zoomIn({ duration: glide(120) }),
+      zoomOut: () => void flow.zoomOut({ duration: glide(120) }),
       show: (keys, goal = "middle") => show(keys, goal),
       reveal: ([x, y]) => {
         const room = frame.current;
         if (room === null) return;
         const size = { width: room.clientWidth, height: room.clientHeight };
         const next = bring({ x, y, ...CARD }, size, flow.getViewport());
-        if (next !== null) void flow.setViewport(next, { duration: 200 });
+        if (next !== null) void flow.setViewport(next, { duration: glide(200) });
       },
       middle: (): Position => {
         const box = frame.current?.getBoundingClientRect();
@@ -132,11 +144,8 @@ export function useView(given: Given) {
         return { screen, at: [Math.round(at.x), Math.round(at.y)] };
       },
       focus: (key) => {
-        // What was out of view is drawn first.
-        requestAnimationFrame(() => {
-          const card = frame.current?.querySelector<HTMLElement>(`[data-id="${CSS.escape(key)}"]`);
-          card?.focus({ preventScroll: true });
-        });
+        const room = frame.current;
+        if (room !== null) focusCard(room, key, 12);
       },
     }),
     [showAll, show, flow, frame, pointer],

@@ -6,7 +6,7 @@ import { noteKey } from "./layout";
 import type { Graph, JsonText, Position } from "./model";
 import { together } from "./pen";
 
-export const NOTE_COLORS = ["grey", "yellow", "green", "blue", "violet", "red"] as const;
+export const NOTE_COLORS = ["grey", "amber", "green", "blue", "violet", "red"] as const;
 export type NoteColor = (typeof NOTE_COLORS)[number];
 
 export interface Note {

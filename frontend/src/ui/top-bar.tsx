@@ -7,6 +7,8 @@ import style from "./top-bar.module.css";
 export interface Crumb {
   label: ReactNode;
   to?: string;
+  /** Something within the page: named, yet not what the page is. */
+  part?: boolean;
 }
 
 interface Props {
@@ -32,13 +34,15 @@ export function TopBar({ crumbs, status, actions, account, start, stop }: Props)
       </Link>
       <nav className={style.crumbs} aria-label="Where you are">
         {crumbs.map((crumb, i) => (
-          <Fragment key={crumb.to ?? "here"}>
+          <Fragment key={crumb.to ?? (crumb.part ? "part" : "here")}>
             {i > 0 && (
-              <span className={style.slash} aria-hidden>
+              <span className={style.slash} data-part={crumb.part || undefined} aria-hidden>
                 /
               </span>
             )}
-            {crumb.to === undefined ? (
+            {crumb.part ? (
+              <span className={style.part}>{crumb.label}</span>
+            ) : crumb.to === undefined ? (
               <h1 className={style.here}>{crumb.label}</h1>
             ) : (
               <Link to={crumb.to} className={style.crumb}>

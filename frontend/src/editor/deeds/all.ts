@@ -50,6 +50,7 @@ export const DEEDS: readonly Deed[] = [
   look.pan,
   ...look.WALK,
   notes.details,
+  look.toCanvas,
   look.menu,
   look.showJson,
   ...PANELS,

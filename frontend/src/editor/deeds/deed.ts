@@ -45,7 +45,8 @@ interface Pressed {
 /** Whether a key press is this shortcut. */
 export function isPressed(shortcut: string, event: Pressed, mac = onMac): boolean {
   const parts = shortcut.split("+");
-  const key = parts.pop() ?? "";
+  const last = parts.pop() ?? "";
+  const key = last === "Plus" ? "+" : last;
   const mod = mac ? event.metaKey : event.ctrlKey;
   const other = mac ? event.ctrlKey : event.metaKey;
   const letter =
@@ -60,7 +61,8 @@ export function isPressed(shortcut: string, event: Pressed, mac = onMac): boolea
 /** Whether a shortcut is one printed character without Mod or Alt: such keys can be switched off. */
 export function isSingle(shortcut: string): boolean {
   const parts = shortcut.split("+");
-  return (parts.at(-1) ?? "").length === 1 && !parts.includes("Mod") && !parts.includes("Alt");
+  const last = parts.at(-1) ?? "";
+  return (last.length === 1 || last === "Plus") && !parts.includes("Mod") && !parts.includes("Alt");
 }
 
 const signs: Record<string, string> = {

@@ -105,7 +105,9 @@ export const duplicate: Deed = {
   enabled: something,
   run: (bench) => {
     const clip = clipOf(bench.doc, bench.selection, bench.places());
-    bench.select(paste(bench.doc, clip, { by: [40, 40] }));
+    const keys = paste(bench.doc, clip, { by: [40, 40] });
+    bench.select(keys);
+    if (keys[0] !== undefined) bench.view.focus(keys[0]);
   },
 };
 

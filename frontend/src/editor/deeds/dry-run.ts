@@ -2,11 +2,11 @@
 import {
   IconCheck,
   IconExclamationMark,
+  IconFlask,
   IconPlayerPlay,
   IconPlayerSkipBack,
   IconPlayerTrackNext,
   IconPlayerTrackPrev,
-  IconTheater,
   IconX,
 } from "@tabler/icons-react";
 import type { Bench } from "../bench";
@@ -21,7 +21,7 @@ export const dryRun: Deed = {
   name: "dry-run",
   label: "Dry-run",
   shortcuts: ["d"],
-  icon: IconTheater,
+  icon: IconFlask,
   enabled: (bench) => bench.dryRun !== null || bench.graph.actions.length > 0,
   run: (bench) => (bench.dryRun === null ? bench.beginDryRun() : bench.dryRun.close()),
 };

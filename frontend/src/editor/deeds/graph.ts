@@ -1,8 +1,7 @@
 /** Deeds about the graph as a whole: take it elsewhere, point others to it. */
 
-import { notifications } from "@mantine/notifications";
 import { IconDownload, IconLink, IconPhoto, IconVectorTriangle } from "@tabler/icons-react";
-import { writeText } from "../clipboard";
+import { copyLinkTo } from "../clipboard";
 import { linkTo } from "../deep-link";
 import type { Deed } from "./deed";
 
@@ -46,13 +45,6 @@ export const copyLink: Deed = {
   icon: IconLink,
   also: "share url address deep link",
   run: (bench) => {
-    const link = linkTo(bench.id, [...bench.selection]);
-    void writeText(link).then((done) =>
-      notifications.show(
-        done
-          ? { message: "Link copied" }
-          : { title: "The browser did not copy the link", message: link, autoClose: 20_000 },
-      ),
-    );
+    void copyLinkTo(linkTo(bench.id, [...bench.selection]));
   },
 };

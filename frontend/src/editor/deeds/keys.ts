@@ -51,7 +51,9 @@ export function useShortcuts(bench: Bench): void {
   const [singles] = useSingleKeys();
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
-      if (event.defaultPrevented || isTaken(event.target)) return;
+      // The way out of a form works in the form.
+      const leaves = event.key === "F6" && document.querySelector("[role=dialog]") === null;
+      if (event.defaultPrevented || (isTaken(event.target) && !leaves)) return;
       if (MOVING.has(event.key) && !isOnCanvas(event.target)) return;
       if (event.key === "/" && singles) {
         event.preventDefault();
@@ -71,9 +73,11 @@ export function useShortcuts(bench: Bench): void {
       event.preventDefault();
       if (isEnabled(deed, now.current)) deed.run(now.current);
     };
-    // Cards move by arrow keys of their own, which know neither undo nor frames: ours come first.
+    // Cards move by arrow keys of their own, which know neither undo nor frames, and take Shift with
+    // Enter for one more to choose: ours come first.
     const onCanvasKey = (event: KeyboardEvent) => {
-      if (!event.key.startsWith("Arrow") || isTaken(event.target)) return;
+      const ours = event.key.startsWith("Arrow") || (event.key === "Enter" && event.shiftKey);
+      if (!ours || isTaken(event.target)) return;
       if (!(event.target instanceof Element) || !event.target.closest(".react-flow")) return;
       onKey(event);
       event.stopPropagation();

@@ -56,6 +56,20 @@ function spotOf(bench: Bench): readonly [number, number] {
   return [x + 24, y + 24];
 }
 
+export const toCanvas: Deed = {
+  ...look,
+  name: "to-canvas",
+  label: "Back to the canvas",
+  shortcuts: ["F6"],
+  icon: IconFocusCentered,
+  also: "leave the form focus",
+  run: (bench) => {
+    if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
+    const [key] = [...bench.selection].filter((each) => bench.places().has(each));
+    if (key !== undefined) bench.view.focus(key);
+  },
+};
+
 export const fit: Deed = {
   ...look,
   name: "fit",
@@ -87,7 +101,7 @@ export const zoomIn: Deed = {
   ...look,
   name: "zoom-in",
   label: "Zoom in",
-  shortcuts: ["=", "+"],
+  shortcuts: ["=", "Plus"],
   icon: IconZoomIn,
   run: (bench) => bench.view.zoomIn(),
 };

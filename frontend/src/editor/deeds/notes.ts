@@ -9,7 +9,7 @@ import {
 import { relationId } from "../../graph/layout";
 import { writeNote } from "../../graph/notes";
 import { CARD } from "../../ui/canvas/arrange";
-import { type Bench, selectedActions, selectedNotes, selectedRelations } from "../bench";
+import { type Bench, selectedNotes, selectedRelations } from "../bench";
 import type { Deed } from "./deed";
 
 const SIZE = [200, 84] as const; // px of a new note
@@ -27,7 +27,7 @@ export const note: Deed = {
   run: (bench) => {
     const [x, y] = bench.view.pointer()?.at ?? bench.view.middle();
     const at = [x - SIZE[0] / 2, y - SIZE[1] / 2] as const;
-    const key = writeNote(bench.doc, { kind: "note", at, size: SIZE, text: "", color: "yellow" });
+    const key = writeNote(bench.doc, { kind: "note", at, size: SIZE, text: "", color: "amber" });
     bench.select([key]);
     bench.open({ kind: "note", key });
   },
@@ -46,7 +46,7 @@ function boxOf(bench: Bench): { at: readonly [number, number]; size: readonly [n
     return { at: [x - 200, y - 40], size: [400, 280] };
   }
   const left = Math.min(...boxes.map((box) => box[0])) - AIR;
-  const top = Math.min(...boxes.map((box) => box[1])) - AIR - 22; // below the title
+  const top = Math.min(...boxes.map((box) => box[1])) - AIR;
   const right = Math.max(...boxes.map((box) => box[2])) + AIR;
   const bottom = Math.max(...boxes.map((box) => box[3])) + AIR;
   return { at: [left, top], size: [right - left, bottom - top] };
@@ -92,13 +92,17 @@ export const details: Deed = {
   icon: IconLayoutSidebarRight,
   changes: false,
   also: "parameters properties form",
-  enabled: (bench) => selectedActions(bench).length + selectedRelations(bench).length > 0,
+  enabled: () => true,
   run: (bench) => {
     bench.setPanel("details");
-    requestAnimationFrame(() => {
-      const panel = document.querySelector('[aria-label="Details"]');
-      panel?.querySelector<HTMLElement>("input, textarea, button")?.focus();
-    });
+    // Where the panel slides in, it cannot have the focus before it is seen.
+    setTimeout(() => {
+      const panel = document.querySelector(
+        '[aria-label="Details"] [role="tabpanel"]:not([hidden])',
+      );
+      const field = panel?.querySelector<HTMLElement>("input, textarea");
+      (field ?? panel?.querySelector<HTMLElement>("button"))?.focus();
+    }, 60);
   },
 };
 

@@ -1,13 +1,15 @@
 /** What is wrong with the graph, what it would do, where, and what mends it. */
-import { Button } from "@mantine/core";
+import { ActionIcon, Button, Tooltip } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
-import { IconCircleCheck, IconTool } from "@tabler/icons-react";
+import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
 import type { Problem, Problems } from "../../api/graphs";
 import { ABOUT, applyFix, applySafe, fixOf, safeOnes } from "../../graph/fixes";
 import { relationId } from "../../graph/layout";
 import type { Graph } from "../../graph/model";
 import { bySeverity, placeOf } from "../../ui/canvas/marks";
 import { type Bench, endName, useBench } from "../bench";
+import { copyLinkTo } from "../clipboard";
+import { linkToProblem } from "../deep-link";
 import style from "./problems.module.css";
 
 /** Where a problem is, as a person would say it; empty for the graph as a whole. */
@@ -50,6 +52,16 @@ function ProblemItem({ problem, jumps }: { problem: Problem; jumps: boolean }) {
             {words}
           </button>
         )}
+        <Tooltip label="Copy a link to this problem">
+          <ActionIcon
+            size="sm"
+            ml="auto"
+            aria-label={`Copy a link to ${problem.code}`}
+            onClick={() => void copyLinkTo(linkToProblem(bench.id, problem))}
+          >
+            <IconLink size={14} aria-hidden />
+          </ActionIcon>
+        </Tooltip>
       </div>
       <p>{problem.message}</p>
       {fix !== null && bench.mayEdit && (

@@ -13,7 +13,7 @@ import type { ReactNode } from "react";
 import { sentence } from "../../api/http";
 import { fullName } from "../../graph/model";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
-import { type Bench, selectedActions } from "../bench";
+import { type Bench, endName, selectedActions } from "../bench";
 import type { Deed } from "../deeds/deed";
 import { labelOf } from "../deeds/deed";
 import * as deeds from "../deeds/dry-run";
@@ -65,18 +65,25 @@ function Choices({ bench, run }: { bench: Bench; run: DryRun }) {
   const others = run.sighting.going.length > 1;
   return (
     // biome-ignore lint/a11y/useSemanticElements: a fieldset cannot be laid out as a row everywhere
-    <div className={style.choices} role="group" aria-label={`How does ${going.node} end?`}>
+    <div
+      className={style.choices}
+      role="group"
+      aria-label={`How does ${endName(bench.graph, going.key)} end?`}
+    >
       {others ? (
         <Select
           size="xs"
-          w={170}
+          w={150}
           aria-label="Which running action"
-          data={run.sighting.going.map(({ key, node }) => ({ value: key, label: node }))}
+          data={run.sighting.going.map(({ key }) => ({
+            value: key,
+            label: endName(bench.graph, key),
+          }))}
           value={going.key}
           onChange={(key) => key && bench.select([key])}
         />
       ) : (
-        <b>{going.node}</b>
+        <b>{endName(bench.graph, going.key)}</b>
       )}
       <span className={style.how}>ends</span>
       {CHOICES.map((outcome, i) => (

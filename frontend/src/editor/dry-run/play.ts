@@ -149,7 +149,12 @@ const ENDED = new Set(["FINISHED", "HALTED", "STOPPED", "ERROR"]);
 const WAITING: Visit = { state: "", result: null, since: 0, took: null, visits: 0, message: null };
 
 /** What happens at one moment, in short sentences; what matters most comes first. */
-export function wordsOf(trace: readonly TraceEvent[], moment: Moment, before: number): string[] {
+export function wordsOf(
+  trace: readonly TraceEvent[],
+  moment: Moment,
+  before: number,
+  nameOf: (node: string) => string = (node) => node,
+): string[] {
   const events = trace.slice(before, moment.to);
   const ends: string[] = [];
   const begins: string[] = [];
@@ -159,12 +164,12 @@ export function wordsOf(trace: readonly TraceEvent[], moment: Moment, before: nu
   for (const event of events) {
     switch (event.kind) {
       case "node_result":
-        ends.push(`${event.node} ${ENDINGS[event.result] ?? event.result}`);
+        ends.push(`${nameOf(event.node)} ${ENDINGS[event.result] ?? event.result}`);
         break;
       case "node_state":
         waits.delete(event.node);
-        if (event.state === "RUNNING") begins.push(event.node);
-        else if (event.state in SAID) ends.push(`${event.node} ${SAID[event.state]}`);
+        if (event.state === "RUNNING") begins.push(nameOf(event.node));
+        else if (event.state in SAID) ends.push(`${nameOf(event.node)} ${SAID[event.state]}`);
         break;
       case "not_ready":
         waits.set(event.node, waitWords(event.why));
@@ -184,7 +189,7 @@ export function wordsOf(trace: readonly TraceEvent[], moment: Moment, before: nu
     }
   }
   const run = begins.length > 0 ? [`${listed(begins)} ${begins.length > 1 ? "run" : "runs"}`] : [];
-  const wait = [...waits].map(([node, why]) => `${node} ${why}`);
+  const wait = [...waits].map(([node, why]) => `${nameOf(node)} ${why}`);
   return [...hazards, ...ends, ...graph, ...run, ...wait];
 }
 

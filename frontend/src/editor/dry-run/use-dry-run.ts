@@ -3,6 +3,7 @@ import { useCallback, useEffect, useMemo, useState } from "react";
 import type { Progress } from "../../api/progress";
 import { useRehearsal } from "../../api/rehearsal";
 import type { Graph, Key } from "../../graph/model";
+import { endName } from "../bench";
 import { keysByName, momentsOf, type Sighting, sightingAt, wordsOf } from "./play";
 import {
   type Choice,
@@ -75,8 +76,13 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
   }, [trace, moments, index, graph]);
   const words = useMemo(() => {
     const moment = moments[index];
-    return moment ? wordsOf(trace, moment, moments[index - 1]?.to ?? 0) : [];
-  }, [trace, moments, index]);
+    const keys = keysByName(graph);
+    const nameOf = (node: string) => {
+      const key = keys.get(node);
+      return key === undefined ? node : endName(graph, key);
+    };
+    return moment ? wordsOf(trace, moment, moments[index - 1]?.to ?? 0, nameOf) : [];
+  }, [trace, moments, index, graph]);
 
   const go = useCallback(
     (to: number) => setAt(moments[Math.max(0, Math.min(moments.length - 1, to))]?.at ?? 0),

@@ -62,7 +62,7 @@ function Tools({ note, desk }: { note: Note; desk: NoteDesk }) {
     <NodeToolbar
       isVisible={desk.alone === note.key}
       position={Position.Top}
-      offset={10}
+      offset={note.kind === "frame" ? 36 : 10}
       style={{ zIndex: 1200 }}
     >
       <div className={style.tools} role="toolbar" aria-label="Colour">

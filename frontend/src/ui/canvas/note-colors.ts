@@ -3,7 +3,7 @@ import type { NoteColor } from "../../graph/notes";
 
 export const noteColor: Readonly<Record<NoteColor, string>> = {
   grey: "var(--ink3)",
-  yellow: "var(--false)",
+  amber: "var(--false)",
   green: "var(--true)",
   blue: "var(--run)",
   violet: "var(--stopped)",

@@ -110,7 +110,7 @@ class Painter {
         const { width, height } = this.size(id, type ?? "");
         return [x, y - 12, x + width, y + height + 12];
       }),
-      ...this.notes.map(({ at, size }) => [at[0], at[1], at[0] + size[0], at[1] + size[1]]),
+      ...this.notes.map(({ at, size }) => [at[0], at[1] - 22, at[0] + size[0], at[1] + size[1]]),
       ...this.edges.flatMap(({ data }) => {
         const xs = [data?.lane, data?.label?.x].filter((x) => typeof x === "number");
         return xs.map((x) => [x - 60, 0, x + 60, 0]);
@@ -237,7 +237,8 @@ class Painter {
     return data.answers
       .map(({ outcomes, response }, i) => {
         const words = outcomes.map(
-          (o) => `<tspan fill="${this.paint(outcomeColor[o])}">${outcomeWord[o]} </tspan>`,
+          (o) =>
+            `<tspan fill="${this.paint(outcomeColor[o])}">${SIGNS[o]} ${outcomeWord[o]} </tspan>`,
         );
         const last = data.optional && i === (data.answers?.length ?? 0) - 1 ? " · optional" : "";
         return (
@@ -256,7 +257,7 @@ class Painter {
       this.text(
         fitted(text, width - 24, 7),
         x + 12,
-        y + 20,
+        y - 8,
         `fill="${ink}" font-size="12" font-weight="650"`,
       )
     );
