@@ -67,6 +67,12 @@ ros-test: ros ## tests over real rclpy, on loopback
 	@echo "» pytest over rclpy"
 	@$(ROS)/python -m pytest -q tests/ros $(PYTEST)
 
+.PHONY: contract
+contract: ros ## what a link promises, with a real engine: NAME=David [DOMAIN=0] [RMW=…] [ACTION=…]; it moves
+	@TEST_ENGINE_NAME="$(NAME)" TEST_ENGINE_DOMAIN="$(or $(DOMAIN),0)" TEST_ENGINE_ACTION="$(ACTION)" \
+		$(if $(RMW),RMW_IMPLEMENTATION="$(RMW)") \
+		$(ROS)/python -m pytest -q tests/ros/test_contract.py -k real_engine
+
 .PHONY: e2e
 e2e: setup ## tests in Chromium against the real processes
 	@scripts/need chromium=chromium

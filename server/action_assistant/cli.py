@@ -7,7 +7,16 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from action_assistant.commands import backup, doctor, files, maintenance, people, processes, remote
+from action_assistant.commands import (
+    backup,
+    doctor,
+    files,
+    maintenance,
+    people,
+    practice,
+    processes,
+    remote,
+)
 from action_assistant.errors import CannotStart
 from action_assistant.settings import check_environment
 from action_assistant.version import VERSION
@@ -22,7 +31,7 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"action-assistant {VERSION}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in (processes, files, remote, people, maintenance, backup, doctor):
+    for module in (processes, files, remote, people, practice, maintenance, backup, doctor):
         module.add_to(commands)
     return top
 

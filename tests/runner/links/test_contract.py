@@ -1,6 +1,6 @@
 """What every link promises, whatever is behind it."""
 
-from collections.abc import Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -10,6 +10,7 @@ import pytest
 from action_assistant.runner.links.absent import AbsentLink
 from action_assistant.runner.links.port import (
     EngineRefused,
+    ForeignCommand,
     Link,
     NoAnswer,
     NotSent,
@@ -18,11 +19,14 @@ from action_assistant.runner.links.port import (
     Transitions,
 )
 from action_assistant.runner.seen import NodeState, Snapshot
+from action_assistant.runner.standin_engine import StandIn
+from action_assistant.runner.standin_wire import Stop
 from action_assistant.umrf import codec
-from runner.world import engine, sequence, virtual
+from action_assistant.umrf.semantics import script_from
+from runner.air import Air, AirLink, now_ms
+from runner.links.contract import PROMISES, Bench, Promise, keep
+from runner.world import engine, live_through, sequence, virtual
 
-Make = Callable[[dict[str, Any]], Link]
-LINKS: list[Make] = [engine]
 ENDLESS = {"*": [{"never": True}]}
 
 
@@ -44,65 +48,76 @@ async def shown(link: Link, name: str = "patrol") -> Snapshot | None:
     return next((each for each in (await link.get()).graphs if each.graph == name), None)
 
 
-@pytest.mark.parametrize("make", LINKS)
+#: `endless` goes on, everything else ends soon.
+SCRIPT = {
+    **{f"endless/Work_{i}": [{"never": True}] for i in range(3)},
+    "*": [{"after_s": 0.2}],
+}
+
+
+@asynccontextmanager
+async def simulator() -> AsyncIterator[Link]:
+    async with alive(engine(SCRIPT)) as link:
+        yield link
+
+
+@asynccontextmanager
+async def stand_in() -> AsyncIterator[Link]:
+    """A stand-in robot, over messages that take their time and with all of its quirks."""
+    air = Air()
+    air.join(StandIn("David", script=script_from({"behaviours": SCRIPT}), born_ms=now_ms()))
+    async with blowing(air), alive(AirLink(air, "David")) as link:
+        await anyio.sleep(0.1)
+        yield link
+
+
+@asynccontextmanager
+async def blowing(air: Air) -> AsyncIterator[None]:
+    """Messages travel."""
+    async with anyio.create_task_group() as wind:
+        wind.start_soon(air.blow)
+        yield
+        wind.cancel_scope.cancel()
+
+
+@pytest.mark.parametrize("behind", [simulator, stand_in])
+@pytest.mark.parametrize("promise", PROMISES)
+def test_a_link_keeps_what_every_link_promises(promise: Promise, behind: Any) -> None:
+    async def main() -> None:
+        async with behind() as link:
+            bench = Bench(link=link, endless=sequence("endless"), quick=sequence("quick"))
+            await keep(promise, bench)
+
+    live_through(main)
+
+
 @virtual
-async def test_an_answer_shows_the_graph_under_the_identity_it_was_started_with(
-    make: Make,
-) -> None:
-    async with alive(make(ENDLESS)) as link:
-        assert await shown(link) is None
-        await link.start(placed())
-        await anyio.sleep(0.5)
-        found = await shown(link)
-        assert found is not None
-        assert (found.run, found.state, found.source) == ("r1", "RUNNING", "get")
-        assert found.nodes["Work_0"] == "RUNNING"
-        assert found.active
+async def test_commands_of_others_are_reported() -> None:
+    heard: list[Report] = []
+    air = Air()
+    async with alive(AirLink(air, "David")) as link, blowing(air):
+        with link.listen(heard.append):
+            await anyio.sleep(0.1)
+            air.carry(Stop(graph_name="patrol", targets=("Carol",)), "terminal")
+            air.carry(Stop(graph_name="patrol", targets=("David",)), "terminal")
+    foreign = [each for each in heard if isinstance(each, ForeignCommand)]
+    assert [(each.command, each.graph, each.sender) for each in foreign] == [
+        ("stop", "patrol", "terminal")
+    ]
 
 
-@pytest.mark.parametrize("make", LINKS)
 @virtual
-async def test_a_graph_that_has_ended_stays_in_the_answers(make: Make) -> None:
-    async with alive(make({"*": [{"after_s": 0.1}]})) as link:
-        await link.start(placed())
-        await anyio.sleep(2)
-        found = await shown(link)
-        assert found is not None
-        assert (found.state, found.active) == ("FINISHED", False)
-
-
-@pytest.mark.parametrize("make", LINKS)
-@virtual
-async def test_stop_may_be_sent_again_and_again_and_for_graphs_that_are_not_there(
-    make: Make,
-) -> None:
-    async with alive(make(ENDLESS)) as link:
-        await link.stop("nothing")
-        await link.start(placed())
-        await anyio.sleep(0.2)
-        for _ in range(5):
-            await link.stop("patrol")
-            await anyio.sleep(0.01)
-        await anyio.sleep(2)
-        found = await shown(link)
-        assert found is not None
-        assert (found.state, found.active) == ("STOPPED", False)
-
-
-@pytest.mark.parametrize("make", LINKS)
-@virtual
-async def test_the_incarnation_names_one_life_of_one_engine(make: Make) -> None:
-    async with alive(make({})) as one, alive(make({})) as other:
+async def test_the_incarnation_names_one_life_of_one_engine() -> None:
+    async with alive(engine({})) as one, alive(engine({})) as other:
         first, again = (await one.get()).incarnation, (await one.get()).incarnation
         assert first == again
         assert first != (await other.get()).incarnation
 
 
-@pytest.mark.parametrize("make", LINKS)
 @virtual
-async def test_what_came_before_an_answer_is_heard_before_it(make: Make) -> None:
+async def test_what_came_before_an_answer_is_heard_before_it() -> None:
     heard: list[Report] = []
-    async with alive(make({"*": [{"after_s": 0.1}]})) as link:
+    async with alive(engine({"*": [{"after_s": 0.1}]})) as link:
         with link.listen(heard.append):
             await link.start(placed())
             for _ in range(30):

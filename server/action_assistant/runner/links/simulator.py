@@ -67,10 +67,13 @@ class SimulatorLink:
     async def start(self, order: Order) -> None:
         """Start at this moment. Raises EngineRefused."""
         self._alive()
+        before = self._runs.get(order.graph.name)
         self._runs[order.graph.name] = order.run
         try:
             self._tell(self._engine.start(order.graph, self._now()))
         except semantics.EngineRefused as refused:
+            if before is not None:  # that one goes on, or is stopped, under its own identity
+                self._runs[order.graph.name] = before
             self._wake.set()
             raise EngineRefused(str(refused)) from refused
 

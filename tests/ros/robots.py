@@ -1,0 +1,85 @@
+"""Stand-in robots over real rclpy: on a thread of the test, or in a process that can be killed."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from action_assistant.runner.standin import StandInNode
+from action_assistant.runner.standin_engine import StandIn
+from action_assistant.runner.standin_wire import Quirks
+from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.semantics import script_from
+
+
+@contextmanager
+def robot(
+    domain: int,
+    script: dict[str, Any] | None = None,
+    *,
+    name: str = "David",
+    namespace: str = "",
+    quirks: Quirks = Quirks(),  # noqa: B008 - frozen
+    seed: int = 0,
+) -> Iterator[StandInNode]:
+    """A robot on a thread."""
+    node = StandInNode(
+        lambda epoch_ms: StandIn(
+            name,
+            script=script_from({"behaviours": script or {}}),
+            quirks=quirks,
+            seed=seed,
+            epoch_ms=epoch_ms,
+        ),
+        domain=domain,
+        facts=PINNED,
+        namespace=namespace,
+    )
+    thread = threading.Thread(target=node.spin, daemon=True)
+    thread.start()
+    try:
+        yield node
+    finally:
+        node.end()
+        thread.join(10)
+
+
+class RobotProcess:
+    """A robot as people start one: `simulate-robot`."""
+
+    def __init__(self, domain: int, folder: Path, script: dict[str, Any], *more: str) -> None:
+        file = folder / "script.json"
+        file.write_bytes(msgspec.json.encode({"behaviours": script}))
+        command = [sys.executable, "-m", "action_assistant", "simulate-robot", "David"]
+        self._process = subprocess.Popen(
+            [*command, "--domain", str(domain), "--script", str(file), *more],
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ,
+        )
+        assert self._process.stdout is not None
+        self.first = self._process.stdout.readline()
+
+    def signal(self, number: int) -> None:
+        """Send a signal."""
+        self._process.send_signal(number)
+
+    def end(self) -> int:
+        """End it, dead or alive; its exit code."""
+        self._process.send_signal(signal.SIGCONT)
+        self._process.terminate()
+        try:
+            return self._process.wait(10)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            return self._process.wait()
+        finally:
+            assert self._process.stdout is not None
+            self._process.stdout.close()

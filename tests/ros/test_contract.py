@@ -1,0 +1,110 @@
+"""What every link promises, over real rclpy: with a stand-in robot, and with a real engine.
+
+    make contract DOMAIN=7 NAME=David [RMW=rmw_cyclonedds_cpp] [ACTION=OxWork]
+
+asks the engine of that name. ACTION is one of its own whose numbers mean seconds; without it, the
+first that has an input of type number is taken. Nothing else may run on that robot, and it moves.
+"""
+
+import json
+import os
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import partial
+from time import time_ns
+from typing import Any
+
+import anyio
+import pytest
+
+pytest.importorskip(
+    "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
+)
+
+from action_assistant.runner.links import ros2_reach
+from action_assistant.runner.links.port import Link, Registration
+from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.jsontext import dump
+from action_assistant.umrf.model import Action, Graph, Parameter
+from ros.robots import robot
+from runner.links.contract import PROMISES, Bench, Promise, answer, keep
+from runner.world import sequence
+
+SCRIPT = {
+    **{f"endless/Work_{i}": [{"never": True}] for i in range(3)},
+    "*": [{"after_s": 0.2}],
+}
+
+
+@asynccontextmanager
+async def reached(domain: int, name: str, **more: Any) -> AsyncIterator[Link]:
+    """A link over ROS 2 that answers."""
+    reach = ros2_reach(lambda: time_ns() // 1000, {"ROS_DOMAIN_ID": str(domain)})
+    assert not isinstance(reach, str), reach
+    registration = Registration(name=name, domain=domain, **more)
+    link = reach.link(registration, PINNED)
+    try:
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(link.run)
+            with anyio.fail_after(20):
+                while link.standing.state != "answering":  # noqa: ASYNC110 - discovery takes time
+                    await anyio.sleep(0.05)
+            yield link
+            tasks.cancel_scope.cancel()
+    finally:
+        await reach.aclose()
+
+
+@pytest.mark.parametrize("promise", PROMISES)
+async def test_the_link_over_ros_keeps_its_promises_with_a_stand_in(
+    promise: Promise, domain: int
+) -> None:
+    with robot(domain, SCRIPT):
+        async with reached(domain, "David") as link:
+            bench = Bench(link=link, endless=sequence("endless"), quick=sequence("quick"))
+            await keep(promise, bench)
+
+
+ENGINE = os.environ.get("TEST_ENGINE_NAME", "")
+
+
+@pytest.mark.skipif(not ENGINE, reason="no engine was named; see the head of this file")
+@pytest.mark.parametrize("promise", PROMISES)
+async def test_the_link_over_ros_keeps_its_promises_with_a_real_engine(promise: Promise) -> None:
+    async with reached(int(os.environ.get("TEST_ENGINE_DOMAIN", "0")), ENGINE) as link:
+        plain = Bench(link=link, endless=sequence("endless"), quick=sequence("quick"))
+        known = [json.loads(text) for text in (await answer(plain)).known_actions]
+        timed = [each for each in known if _numbers(each)]
+        wanted = os.environ.get("TEST_ENGINE_ACTION", "")
+        action = next(each for each in timed if wanted in {"", each["name"]})
+        make = partial(_of, action)
+        await keep(promise, Bench(link=link, endless=make("endless", 15), quick=make("quick", 0.3)))
+
+
+def _numbers(action: dict[str, Any]) -> list[str]:
+    inputs = action.get("input_parameters", {})
+    return [name for name, leaf in inputs.items() if leaf.get("pvf_type") == "number"]
+
+
+def _of(action: dict[str, Any], name: str, seconds: float) -> Graph:
+    """A sequence of an action that an engine has, with values for all that it takes."""
+    values: dict[str, Any] = {"number": seconds, "string": "on_true", "bool": True}
+    inputs = tuple(
+        Parameter(path, dump({**leaf, "pvf_value": values[leaf["pvf_type"]]}))
+        for path, leaf in action.get("input_parameters", {}).items()
+    )
+    outputs = tuple(
+        Parameter(path, dump(leaf)) for path, leaf in action.get("output_parameters", {}).items()
+    )
+    line = sequence(name)
+    nodes = tuple(
+        Action(
+            key=each.key,
+            name=action["name"],
+            instance_id=each.instance_id,
+            inputs=inputs,
+            outputs=outputs,
+        )
+        for each in line.actions
+    )
+    return Graph(name=name, actions=nodes, relations=line.relations)
