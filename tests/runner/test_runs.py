@@ -24,7 +24,7 @@ from action_assistant.runner.events import (
     decode,
     encode,
 )
-from action_assistant.runner.runs import KEPT, Run, begin, follow, replay
+from action_assistant.runner.runs import Run, begin, follow, replay
 from action_assistant.runner.seen import (
     GraphResult,
     GraphState,
@@ -34,6 +34,7 @@ from action_assistant.runner.seen import (
     Seen,
     Snapshot,
 )
+from action_assistant.runner.visits import KEPT
 
 ANN = Author("ann", "Ann")
 REQUESTED = Requested(

@@ -7,7 +7,8 @@ import msgspec
 from sqlalchemy import Row
 
 from action_assistant.runner.events import Author, Override
-from action_assistant.runner.runs import ActionRun, Desired, How, Outcome, Run, State, Visit
+from action_assistant.runner.runs import Desired, Run, State
+from action_assistant.runner.visits import ActionRun, How, Outcome, Visit
 
 _LIVE: Final = 3_000  # visits in one live message, over all actions
 _WHOLE: Final = 20_000

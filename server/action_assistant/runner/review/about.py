@@ -15,7 +15,8 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.tables import action_sum, review, run_label
 from action_assistant.runner.events import Author
-from action_assistant.runner.runs import ActionRun, Run
+from action_assistant.runner.runs import Run
+from action_assistant.runner.visits import ActionRun
 
 _PREFIX: Final = "about/"
 _WORDS: Final = 8_000  # characters of messages that a search looks through

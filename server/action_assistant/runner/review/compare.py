@@ -6,7 +6,8 @@ from typing import Final, Literal, TypeAlias
 import msgspec
 
 from action_assistant.runner import shapes
-from action_assistant.runner.runs import ActionRun, Run, Visit
+from action_assistant.runner.runs import Run
+from action_assistant.runner.visits import ActionRun, Visit
 from action_assistant.umrf import codec
 from action_assistant.umrf.difference import ActionChange, Difference, difference
 from action_assistant.umrf.model import Graph

@@ -28,7 +28,8 @@ from action_assistant.runner.events import (
     StopSent,
 )
 from action_assistant.runner.review.reel import APART, Reels, fold
-from action_assistant.runner.runs import ActionRun, Run
+from action_assistant.runner.runs import Run
+from action_assistant.runner.visits import ActionRun
 
 _HEAD: Final = (
     "state",
