@@ -172,7 +172,7 @@ def test_pause_and_resume(process: RunnerProcess) -> None:
         assert client.post(f"/api/runs/{run['id']}/pause").status_code == 202
         problem(client.post(f"/api/runs/{run['id']}/pause"), 409)
         assert client.post(f"/api/runs/{run['id']}/resume").status_code == 202
-        problem(client.post(f"/api/runs/{run['id']}/modify"), 409)
+        problem(client.post(f"/api/runs/{run['id']}/modify"), 400)
         assert over(client, run["id"])["state"] == "finished"
 
 

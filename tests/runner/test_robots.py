@@ -253,6 +253,51 @@ async def test_the_simulator_that_plays_a_robot_refuses_what_the_robot_would() -
         assert (await control.start(order(graph, like="David"), ANN)).run.like == "David"
 
 
+# --- changing what runs -----------------------------------------------------------------------
+
+
+def change(graph: Graph) -> bytes:
+    asked = order(graph)
+    return msgspec.json.encode({"version": "v2", "digest": asked.digest, "umrf": asked.umrf})
+
+
+@virtual
+async def test_a_running_graph_takes_another_version_where_pausing_is_safe() -> None:
+    world = World()
+    async with world.runner() as control:
+        script = {"*": [{"after_s": 2}]}
+        run = (await control.start(order(sequence(actions=2), script=script), ANN)).run
+        await anyio.sleep(1)
+        changed = await control.modify(run.id, change(sequence(actions=3)), BEN)
+        assert (changed.version, changed.digest) == ("v2", order(sequence(actions=3)).digest)
+        await until(lambda: not control.open)
+    told = world.ledger.history(run.id)
+    assert (told.state, told.version) == ("finished", "v2")
+    assert [a.state for a in told.actions.values()] == ["FINISHED"] * 3
+
+
+@virtual
+async def test_elsewhere_a_change_is_refused_before_anything_is_read_or_sent() -> None:
+    async with fleet(World(), David=Open(NEVER)) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await until(lambda: control.open[run.id].run.state == "running")
+        with pytest.raises(Conflict, match="not safe on David"):
+            await control.modify(run.id, b"", ANN)
+        control.stop_all(ANN)
+        await until(lambda: not control.open)
+
+
+@virtual
+async def test_a_graph_of_another_name_cannot_take_the_place_of_a_run() -> None:
+    async with World().runner() as control:
+        run = (await control.start(order(sequence(), script=NEVER), ANN)).run
+        await anyio.sleep(1)
+        with pytest.raises(Conflict, match="cannot take its place"):
+            await control.modify(run.id, change(sequence("other")), ANN)
+        control.stop_all(ANN)
+        await until(lambda: not control.open)
+
+
 # --- several robots ---------------------------------------------------------------------------
 
 

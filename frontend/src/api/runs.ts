@@ -66,6 +66,8 @@ export interface Run {
   /** Whether the journal has all of it. */
   recorded: boolean;
   actions?: Record<string, ActionRun>;
+  /** The newest lines of the engine's own log. */
+  log?: { at: string; text: string }[];
   umrf?: unknown;
 }
 

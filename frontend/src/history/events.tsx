@@ -54,6 +54,10 @@ export function happenings(run: Run, version: string): Happening[] {
       });
     }
   }
+  for (const line of run.log ?? []) {
+    const at = instant(line.at);
+    if (at !== null) all.push({ at, tone: "idle", name: "engine", aid: null, text: line.text });
+  }
   for (const alarm of run.alarms) {
     const at = instant(alarm.at);
     if (at !== null) all.push({ at, tone: "error", name: null, aid: null, text: alarm.text });

@@ -18,7 +18,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive, robots_api, shapes
 from action_assistant.runner.admission import SIMULATOR, read_request
 from action_assistant.runner.control import Control
-from action_assistant.runner.described import StartOperation, StopOperation
+from action_assistant.runner.described import ModifyOperation, StartOperation, StopOperation
 from action_assistant.runner.events import Author
 from action_assistant.runner.live import Hub, Stopping, attend
 from action_assistant.runner.review import routes as review
@@ -137,12 +137,14 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs/{run:str}/modify",
         status_code=202,
-        summary="Change a running graph",
+        summary="Change a running graph, where its engine makes that safe",
+        operation_class=ModifyOperation,
         guards=[Needs("simulate")],
     )
     async def modify(run: str, request: _Asking) -> shapes.RunShown:
         await _require_hand_on(house, run, request)
-        return shapes.shown(await house.control.modify(run))
+        body = await request.body()
+        return shapes.shown(await house.control.modify(run, body, _author(request)))
 
     return [stop_all, stop, pause, resume, modify]
 

@@ -13,8 +13,8 @@ import anyio
 import msgspec
 from anyio.abc import TaskGroup
 
-from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
-from action_assistant.runner import archive
+from action_assistant.errors import BadInput, Conflict, Refused
+from action_assistant.runner import archive, steering
 from action_assistant.runner.admission import SIMULATOR, StartRequest
 from action_assistant.runner.booking import Book, booked
 from action_assistant.runner.driving import Clock, OpenRun
@@ -23,12 +23,13 @@ from action_assistant.runner.events import Author, Ended
 from action_assistant.runner.flight import Commanded
 from action_assistant.runner.history import Aside, History, Ledger
 from action_assistant.runner.links.absent import AbsentLink
-from action_assistant.runner.links.port import ForeignCommand, Link, NotSent, Order, Registration
+from action_assistant.runner.links.port import ForeignCommand, Link, Order, Registration
 from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.registered import Robot
 from action_assistant.runner.robots import Ground, Robots
 from action_assistant.runner.runs import ENDED, Run
 from action_assistant.runner.starting import Cleared, GroupRequest, Starting
+from action_assistant.umrf.facts import SIMULATED
 
 log: Final = logging.getLogger(__name__)
 
@@ -285,35 +286,20 @@ class Control:
         return True
 
     async def pause(self, run: str, author: Author) -> Run:
-        """Pause a run. Raises NotFound, Conflict."""
-        opened = await self._movable(run)
-        if opened.run.state != "running" or opened.run.desired != "running":
-            raise Conflict(
-                f"Only a running run can be paused; this one is {_condition(opened.run)}."
-            )
-        if not opened.pauses:
-            raise Conflict(f"Pausing is not safe on {opened.run.engine}; use Stop.")
-        try:
-            await opened.pause(author)
-        except NotSent as why:
-            raise Unavailable(f"The pause could not be sent: {why}") from why
-        return opened.run
+        """Pause a run. Raises NotFound, Conflict, Unavailable."""
+        return await steering.pause(await self._movable(run), author)
 
     async def resume(self, run: str, author: Author) -> Run:
-        """Let a paused run go on. Raises NotFound, Conflict."""
-        opened = await self._movable(run)
-        if opened.run.desired != "paused":
-            raise Conflict(f"Only a paused run can go on; this one is {_condition(opened.run)}.")
-        try:
-            await opened.resume(author)
-        except NotSent as why:
-            raise Unavailable(f"The resume could not be sent: {why}") from why
-        return opened.run
+        """Let a paused run go on. Raises NotFound, Conflict, Unavailable."""
+        return await steering.resume(await self._movable(run), author)
 
-    async def modify(self, run: str) -> Run:
-        """Changing a running graph is offered nowhere yet. Raises NotFound, Conflict."""
+    async def modify(self, run: str, body: bytes, author: Author) -> Run:
+        """Give a run another version of its graph. Raises NotFound, BadInput, Conflict,
+        Unavailable."""
         opened = await self._movable(run)
-        raise Conflict(f"A running graph cannot be changed on {opened.run.engine}; stop it first.")
+        engine = self.robots.link(opened.run.engine)
+        facts = SIMULATED if engine is None else engine.facts
+        return await steering.modify(opened, body, author, facts=facts, aside=self._aside)
 
     async def _movable(self, run: str) -> OpenRun:
         opened = self.open.get(run)
@@ -401,7 +387,3 @@ class Control:
         if run.simulated:
             opened.tell(Ended(self._wall(), "lost", None, _LOST))
         self._tasks.start_soon(self._drive, opened, None)
-
-
-def _condition(run: Run) -> str:
-    return "being paused" if (run.state, run.desired) == ("running", "paused") else run.state

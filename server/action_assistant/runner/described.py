@@ -13,6 +13,7 @@ from litestar.openapi.spec import (
 )
 
 _TEXT: Final = Schema(type=OpenAPIType.STRING)
+_OF_GRAPH: Final = ("version", "digest", "umrf")
 _ANY: Final = Schema(type=OpenAPIType.OBJECT)
 
 
@@ -65,6 +66,19 @@ def _group(*, look: bool) -> RequestBody:
     return _body(whole, required=True)
 
 
+def _modify() -> RequestBody:
+    one = _start().content["application/json"].schema
+    assert isinstance(one, Schema)
+    fields = {k: v for k, v in (one.properties or {}).items() if k in {*_OF_GRAPH, "override"}}
+    whole = Schema(
+        type=OpenAPIType.OBJECT,
+        properties={**fields, "continue_from": _TEXT},
+        required=list(_OF_GRAPH),
+        additional_properties=False,
+    )
+    return _body(whole, required=True)
+
+
 def _stop() -> RequestBody:
     press = Schema(type=OpenAPIType.OBJECT, properties={"stop_id": _TEXT})
     return _body(press, required=False)
@@ -108,3 +122,13 @@ class LookOperation(Operation):
 
     def __post_init__(self) -> None:
         self.request_body = _group(look=True)
+
+
+@dataclass
+class ModifyOperation(Operation):
+    """Another version for a run."""
+
+    request_body: RequestBody | Reference | None = field(default_factory=_modify)
+
+    def __post_init__(self) -> None:
+        self.request_body = _modify()

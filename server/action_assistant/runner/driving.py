@@ -17,6 +17,7 @@ from action_assistant.runner.events import (
     End,
     Ended,
     EngineSaid,
+    ModifyRequested,
     Observed,
     PauseRequested,
     Published,
@@ -119,6 +120,25 @@ class OpenRun:
         """Want the run to go on. Raises NotSent."""
         self.tell(ResumeRequested(self._wall(), author), author.id)
         await self._link.resume(self.run.graph_name)
+        self.watch.look()
+
+    async def modify(
+        self, author: Author, order: Order, version: str, digest: str, continue_from: str
+    ) -> None:
+        """Want the run to go on with another graph. Raises NotSent, EngineRefused."""
+        graph = order.graph
+        asked = ModifyRequested(
+            at=self._wall(),
+            author=author,
+            version=version,
+            digest=digest,
+            actions={each.full_name: each.key for each in graph.actions if not each.missing},
+            umrf=order.umrf,
+            continue_from=continue_from,
+        )
+        self.tell(asked, author.id)
+        self.watch.sends(graph)
+        await self._link.modify(order, continue_from)
         self.watch.look()
 
     @property

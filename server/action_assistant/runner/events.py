@@ -89,6 +89,20 @@ class ResumeRequested(msgspec.Struct, frozen=True):
     author: Author
 
 
+class ModifyRequested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Somebody gave the run another version of its graph. Stored before it is sent."""
+
+    kind: ClassVar[str] = "run.modify_requested.v1"
+
+    at: int
+    author: Author
+    version: str
+    digest: str
+    actions: dict[str, str]  # full name -> aid
+    umrf: str  # as sent
+    continue_from: str = ""
+
+
 class StopRequested(msgspec.Struct, frozen=True, omit_defaults=True):
     """Somebody wants the run stopped. Holds until the run has ended; nothing takes it back."""
 
@@ -179,6 +193,7 @@ RunEvent: TypeAlias = (
     | Observed
     | PauseRequested
     | ResumeRequested
+    | ModifyRequested
     | StopRequested
     | StopSent
     | Proof
@@ -198,6 +213,7 @@ _KINDS: Final[Mapping[str, type[RunEvent]]] = {
         Observed,
         PauseRequested,
         ResumeRequested,
+        ModifyRequested,
         StopRequested,
         StopSent,
         Proof,

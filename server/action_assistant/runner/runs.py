@@ -17,6 +17,7 @@ from action_assistant.runner.events import (
     End,
     Ended,
     EngineSaid,
+    ModifyRequested,
     Observed,
     Override,
     PauseRequested,
@@ -192,6 +193,17 @@ def follow(run: Run, event: RunEvent) -> Run:
             return run if run.desired == "stopped" else replace(run, desired="paused")
         case ResumeRequested():
             return run if run.desired == "stopped" else replace(run, desired="running")
+        case ModifyRequested():
+            actions = {
+                name: replace(run.actions.get(name, ActionRun()), aid=aid)
+                for name, aid in event.actions.items()
+            }
+            return replace(
+                run,
+                version=event.version,
+                digest=event.digest,
+                actions=run.actions | actions,
+            )
         case StopRequested():
             if run.desired == "stopped":
                 return run

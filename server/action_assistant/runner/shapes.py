@@ -12,6 +12,7 @@ from action_assistant.runner.visits import ActionRun, How, Outcome, Visit
 
 _LIVE: Final = 3_000  # visits in one live message, over all actions
 _WHOLE: Final = 20_000
+_LINES: Final = 20  # of the engine's log in one live message
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -88,9 +89,10 @@ class Listed(Summary, frozen=True, kw_only=True):
 
 
 class RunShown(Summary, frozen=True, kw_only=True):
-    """A run with its actions, by full name."""
+    """A run with its actions, by full name, and the newest lines of its engine's log."""
 
     actions: dict[str, ActionShown]
+    log: list[MessageShown]
 
 
 class RunWhole(RunShown, frozen=True, kw_only=True):
@@ -113,14 +115,17 @@ def summary(run: Run, *, recorded: bool = True) -> Summary:
 def shown(run: Run, *, recorded: bool = True) -> RunShown:
     """A run with its actions and their newest visits."""
     actions = _actions(run, _LIVE)
-    return RunShown(**_fields(run, recorded), actions=actions)
+    return RunShown(**_fields(run, recorded), actions=actions, log=_log(run, _LINES))
 
 
 def whole(run: Run, umrf: str, *, recorded: bool = True) -> RunWhole:
     """All there is."""
     actions = _actions(run, _WHOLE)
     raw = msgspec.Raw(umrf.encode())
-    return RunWhole(**_fields(run, recorded), actions=actions, umrf=raw, override=run.override)
+    log = _log(run, len(run.log))
+    return RunWhole(
+        **_fields(run, recorded), actions=actions, log=log, umrf=raw, override=run.override
+    )
 
 
 def summary_of_row(row: Row[Any]) -> Summary:
@@ -211,6 +216,10 @@ def _action(action: ActionRun, most: int) -> ActionShown:
     messages = [MessageShown(time(each.at), each.text) for each in action.messages]
     older = action.older + len(action.visits) - len(visits)
     return ActionShown(action.aid, action.state, visits, older, messages)
+
+
+def _log(run: Run, most: int) -> list[MessageShown]:
+    return [MessageShown(time(each.at), each.text) for each in run.log[-most:]]
 
 
 def _time(us: int | None) -> datetime | None:

@@ -1,0 +1,99 @@
+"""What can be done to a run besides stopping it, where its engine makes that safe."""
+
+from typing import Final
+
+import msgspec
+
+from action_assistant.errors import Conflict, Unavailable
+from action_assistant.runner.admission import SIMULATOR, StartRequest, admit, decoded
+from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.events import Author, Override
+from action_assistant.runner.history import Aside
+from action_assistant.runner.links.port import EngineRefused, NotSent, Order
+from action_assistant.runner.runs import Run
+from action_assistant.umrf import codec
+from action_assistant.umrf.facts import EngineFacts
+
+_MOVING: Final = frozenset({"running", "paused"})
+
+
+class ModifyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Another version of the graph of a run, by value. `continue_from`: the full name of an action
+    that shall be started when the graph goes on."""
+
+    version: str
+    digest: str
+    umrf: msgspec.Raw
+    continue_from: str = ""
+    override: Override | None = None
+
+
+async def pause(opened: OpenRun, author: Author) -> Run:
+    """Pause a run. Raises Conflict, Unavailable."""
+    run = opened.run
+    if run.state != "running" or run.desired != "running":
+        raise Conflict(f"Only a running run can be paused; this one is {_condition(run)}.")
+    if not opened.pauses:
+        raise Conflict(f"Pausing is not safe on {run.engine}; use Stop.")
+    try:
+        await opened.pause(author)
+    except NotSent as why:
+        raise Unavailable(f"The pause could not be sent: {why}") from why
+    return opened.run
+
+
+async def resume(opened: OpenRun, author: Author) -> Run:
+    """Let a paused run go on. Raises Conflict, Unavailable."""
+    if opened.run.desired != "paused":
+        raise Conflict(f"Only a paused run can go on; this one is {_condition(opened.run)}.")
+    try:
+        await opened.resume(author)
+    except NotSent as why:
+        raise Unavailable(f"The resume could not be sent: {why}") from why
+    return opened.run
+
+
+async def modify(
+    opened: OpenRun, body: bytes, author: Author, *, facts: EngineFacts, aside: Aside
+) -> Run:
+    """Give a running graph another structure; `body` is a ModifyRequest. Raises BadInput, Conflict,
+    Unavailable."""
+    run = opened.run
+    if run.state not in _MOVING or run.desired == "stopped":
+        raise Conflict(f"Only a running run can be changed; this one is {_condition(run)}.")
+    if not opened.pauses:
+        raise Conflict(
+            f"A running graph is paused to be changed, and pausing is not safe on {run.engine}; "
+            "stop it and start the new version."
+        )
+    asked = decoded(body, ModifyRequest)
+    start = StartRequest(
+        version=asked.version,
+        digest=asked.digest,
+        umrf=asked.umrf,
+        engine=SIMULATOR if run.simulated else run.engine,
+        request_id=run.request_id,
+        graph=run.graph,
+        override=asked.override,
+    )
+    admitted = await aside(lambda: admit(start, facts))
+    graph = admitted.graph
+    if graph.name != run.graph_name:
+        raise Conflict(
+            f"The run is of {run.graph_name}; a graph called {graph.name} cannot take its place.",
+            where={"path": "/umrf/graph_name"},
+        )
+    umrf = codec.write(graph, codec.Stamp(run.graph, asked.version, run.id))
+    targets = () if run.simulated else (run.engine,)
+    order = Order(run=run.id, graph=graph, umrf=umrf, targets=targets)
+    try:
+        await opened.modify(author, order, asked.version, admitted.digest, asked.continue_from)
+    except NotSent as why:
+        raise Unavailable(f"The change could not be sent: {why}") from why
+    except EngineRefused as why:
+        raise Conflict(f"The engine refuses the change: {why}") from why
+    return opened.run
+
+
+def _condition(run: Run) -> str:
+    return "being paused" if (run.state, run.desired) == ("running", "paused") else run.state
