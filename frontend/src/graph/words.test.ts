@@ -4,7 +4,7 @@ import { addAction, connect, setEntry, setExit, setRequired, setResponse } from 
 import { mapsOf } from "./layout";
 import { EXIT } from "./model";
 import { readGraph } from "./read";
-import { nameOf, relationWords, startWords } from "./words";
+import { ignoredWords, nameOf, relationWords, startWords } from "./words";
 
 function graphOf(doc: Y.Doc) {
   return readGraph(mapsOf(doc));
@@ -23,6 +23,10 @@ test("an arrow says each thing that it does, with the outcomes that lead there",
     "Runs when Scan ends true, ends false or is stopped.",
     "Is passed over when Scan ends with an error: what follows it starts at once.",
   ]);
+  const nothing = () => ignoredWords(graphOf(doc), graphOf(doc).relations[0] as never);
+  expect(nothing()).toBeNull();
+  setResponse(doc, id, "on_false", "ignore");
+  expect(nothing()).toBe("Nothing happens when Scan ends false.");
   for (const outcome of ["on_true", "on_false", "on_error", "on_stopped"] as const)
     setResponse(doc, id, outcome, "ignore");
   expect(words()).toEqual(["Does nothing, however Scan ends."]);

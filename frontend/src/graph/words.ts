@@ -49,6 +49,15 @@ export function relationWords(graph: Graph, relation: Relation): readonly string
   return [`Does nothing, however ${parent} ends.`];
 }
 
+/** The outcomes for which an arrow does nothing, as a sentence; null when there are none. */
+export function ignoredWords(graph: Graph, relation: Relation): string | null {
+  if (relation.parent === ENTRY || relation.only !== null) return null;
+  const ignored = PRECONDITIONS.filter((outcome) => relation.conditions[outcome] === "ignore");
+  if (ignored.length === 0 || ignored.length === PRECONDITIONS.length) return null;
+  const endings = any(ignored.map((outcome) => ENDINGS[outcome]));
+  return `Nothing happens when ${nameOf(graph, relation.parent)} ${endings}.`;
+}
+
 /** When an action runs, or the graph ends: all its arrows, and how they wait for each other. */
 export function startWords(graph: Graph, key: Key): readonly string[] {
   const relations = graph.relations

@@ -26,9 +26,20 @@ export function Mark() {
   return <img src="/mark.svg" alt="" width={24} height={24} className={style.mark} />;
 }
 
+/** The focus goes past the bar. */
+function toContent(): void {
+  const main = document.querySelector<HTMLElement>("main");
+  if (main === null) return;
+  main.tabIndex = -1;
+  main.focus();
+}
+
 export function TopBar({ crumbs, status, actions, account, start, stop }: Props) {
   return (
     <header className={style.bar}>
+      <button type="button" className={style.skip} onClick={toContent}>
+        Skip to the content
+      </button>
       <Link to="/" className={style.home} aria-label="All graphs">
         <Mark />
       </Link>

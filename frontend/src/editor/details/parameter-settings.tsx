@@ -61,7 +61,6 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
         />
       )}
       <Switch
-        mt="xs"
         label="Required"
         description="The action does not run without a value"
         checked={field.required}
@@ -69,14 +68,13 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
       />
       {side === "in" && (
         <Switch
-          mt="xs"
           label="Locked"
           description="Outputs of other actions never replace the value"
           checked={field.locked}
           onChange={(event) => write(withLock(parameter.text, event.currentTarget.checked))}
         />
       )}
-      <Group gap="xs" mt="sm">
+      <Group gap="xs">
         <Button size="compact-sm" onClick={onClose}>
           Close
         </Button>

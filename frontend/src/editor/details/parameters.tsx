@@ -64,7 +64,7 @@ function AddParameter({ action, side, onDone }: AddProps) {
           w={104}
         />
       </Group>
-      <Group gap="xs" mt="xs">
+      <Group gap="xs">
         <Button type="submit" size="compact-sm" disabled={path === "" || wrong !== null}>
           Add
         </Button>

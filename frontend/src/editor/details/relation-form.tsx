@@ -4,7 +4,7 @@ import { IconArrowDown, IconTrash } from "@tabler/icons-react";
 import { removeRelation, setRequired, setResponse } from "../../graph/edit";
 import { relationId } from "../../graph/layout";
 import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../../graph/model";
-import { relationWords } from "../../graph/words";
+import { ignoredWords, relationWords } from "../../graph/words";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
 import { endName, useBench } from "../bench";
 import style from "./details.module.css";
@@ -28,6 +28,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
   const parent = endName(graph, relation.parent);
   const child = endName(graph, relation.child);
   const entry = relation.parent === ENTRY;
+  const nothing = ignoredWords(graph, relation);
   return (
     <div className={style.form}>
       <div className={style.ends}>
@@ -64,6 +65,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
               {relationWords(graph, relation).map((sentence) => (
                 <p key={sentence}>{sentence}</p>
               ))}
+              {nothing !== null && <p>{nothing}</p>}
             </div>
           </div>
           <Switch

@@ -9,7 +9,6 @@ import { OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
 import { robotColor } from "../../ui/robot";
 import { StateWord } from "../../ui/state-word";
 import { duration } from "../../ui/when";
-import { endName, useBench } from "../bench";
 import style from "./outline.module.css";
 import { deedsOf, type RowDeed } from "./row-deeds";
 import { type Change, RowEdit } from "./row-edit";
@@ -21,11 +20,20 @@ interface Props {
   selected: boolean;
   progress: Progress | null;
   change: Change | null;
-  onFlip: (id: string) => void;
-  onFocus: (id: string) => void;
-  onChoose: (row: Row) => void;
-  onDeed: (deed: RowDeed, row: Row) => void;
-  onDone: (said: string | null) => void;
+  /** What the action is called, or that to which the arrow leads. */
+  name: string;
+  mayEdit: boolean;
+  /** Always the same object, so that a row draws again only when something of it changes. */
+  hands: Hands;
+}
+
+/** What a row can ask for. */
+export interface Hands {
+  flip(id: string): void;
+  focus(id: string): void;
+  choose(row: Row): void;
+  run(deed: RowDeed, row: Row): void;
+  done(said: string | null): void;
 }
 
 function Talk({ of }: { of: string }) {
@@ -39,8 +47,7 @@ function Talk({ of }: { of: string }) {
   );
 }
 
-function Words({ row, progress }: { row: Row; progress: Progress | null }) {
-  const { graph } = useBench();
+function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">) {
   switch (row.kind) {
     case "entry":
       return (
@@ -83,8 +90,7 @@ function Words({ row, progress }: { row: Row; progress: Progress | null }) {
     case "target":
       return (
         <span className={style.target}>
-          <span className={style.response}>{row.response}</span>{" "}
-          <b>{endName(graph, row.relation.child)}</b>
+          <span className={style.response}>{row.response}</span> <b>{name}</b>
           {!row.relation.required && <span className={style.sub}>optional</span>}
         </span>
       );
@@ -95,12 +101,12 @@ interface DeedsProps {
   row: Row;
   active: boolean;
   label: string;
-  onDeed: Props["onDeed"];
+  mayEdit: boolean;
+  hands: Hands;
 }
 
 /** The menu itself is made when it is first opened: there may be thousands of rows. */
-function Deeds({ row, active, label, onDeed }: DeedsProps) {
-  const { mayEdit } = useBench();
+function Deeds({ row, active, label, mayEdit, hands }: DeedsProps) {
   const [opened, setOpened] = useState<boolean | null>(null);
   const button = (
     <ActionIcon
@@ -123,7 +129,7 @@ function Deeds({ row, active, label, onDeed }: DeedsProps) {
             key={deed.name}
             disabled={deed.changes && !mayEdit}
             rightSection={<kbd className={style.key}>{keyWords(deed.key)}</kbd>}
-            onClick={() => onDeed(deed, row)}
+            onClick={() => hands.run(deed, row)}
           >
             {deed.label}
           </Menu.Item>
@@ -136,23 +142,22 @@ function Deeds({ row, active, label, onDeed }: DeedsProps) {
 const keyWords = (key: string): string =>
   key.replace("Arrow", "").replace("Alt+Up", "Alt ↑").replace("Alt+Down", "Alt ↓").toUpperCase();
 
-function labelOf(row: Row, name: (key: string) => string): string {
+function labelOf(row: Row, name: string): string {
   switch (row.kind) {
     case "entry":
       return "Entry";
     case "action":
-      return name(row.action.key);
+      return name;
     case "outcome":
-      return `${name(row.action.key)}, ${outcomeWord[row.outcome]}`;
+      return `${name}, ${outcomeWord[row.outcome]}`;
     case "target":
-      return `the arrow to ${name(row.relation.child)}`;
+      return `the arrow to ${name}`;
   }
 }
 
 export const OutlineRow = memo(function OutlineRow(props: Props) {
-  const { row, active, selected, progress, change, onFlip, onFocus, onChoose, onDeed } = props;
-  const { graph } = useBench();
-  const label = labelOf(row, (key) => endName(graph, key));
+  const { row, active, selected, progress, change, name, mayEdit, hands } = props;
+  const label = labelOf(row, name);
   const color = row.kind === "action" ? robotColor(row.action.actor) : "transparent";
   return (
     <tr
@@ -167,7 +172,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
       tabIndex={active ? 0 : -1}
       style={{ "--c": color } as React.CSSProperties}
       onFocus={(event) => {
-        if (event.target === event.currentTarget) onFocus(row.id);
+        if (event.target === event.currentTarget) hands.focus(row.id);
       }}
     >
       <td className={style.words}>
@@ -179,22 +184,22 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
               size={32}
               tabIndex={-1}
               aria-label={row.open ? "Close" : "Open"}
-              onClick={() => onFlip(row.id)}
+              onClick={() => hands.flip(row.id)}
             >
               <IconChevronRight size={15} aria-hidden />
             </ActionIcon>
           </span>
         )}
-        <button type="button" tabIndex={-1} onClick={() => onChoose(row)}>
-          <Words row={row} progress={progress} />
+        <button type="button" tabIndex={-1} onClick={() => hands.choose(row)}>
+          <Words row={row} progress={progress} name={name} />
         </button>
       </td>
       <td className={style.deeds}>
-        <Deeds row={row} active={active} label={label} onDeed={onDeed} />
+        <Deeds row={row} active={active} label={label} mayEdit={mayEdit} hands={hands} />
       </td>
       {change !== null && (
         <td className={style.edit}>
-          <RowEdit row={row} change={change} onDone={props.onDone} />
+          <RowEdit row={row} change={change} onDone={hands.done} />
         </td>
       )}
     </tr>

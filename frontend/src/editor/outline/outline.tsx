@@ -16,10 +16,10 @@ import { useIsPhone } from "../../ui/screen";
 import { useBench } from "../bench";
 import { Robots } from "../robots";
 import style from "./outline.module.css";
-import { OutlineRow } from "./outline-row";
+import { type Hands, OutlineRow } from "./outline-row";
 import { deedFor, move, type RowDeed, remove } from "./row-deeds";
 import type { Change } from "./row-edit";
-import { type Row, rowsOf, subjectOf } from "./rows";
+import { namesOf, type Row, rowsOf, subjectOf } from "./rows";
 
 const MANY = 40; // actions; above that the rows begin closed
 
@@ -78,6 +78,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     const lit = new Set(graph.actions.filter(({ actor }) => actor === robot).map(({ key }) => key));
     return all.filter((row) => row.kind === "entry" || lit.has(ownerOf(row)));
   }, [graph, isOpen, robot]);
+  const names = useMemo(() => namesOf(graph), [graph]);
   const [active, setActive] = useState<string>(ENTRY);
   const [edited, setEdited] = useState<Edited | null>(null);
   const tree = useRef<HTMLTableElement>(null);
@@ -157,6 +158,24 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     if (said !== null) announcer.say(said);
     focus(at);
   };
+  const latest = useRef<Hands | null>(null);
+  latest.current = {
+    flip,
+    focus: setActive,
+    choose: phone ? (row) => run(DETAILS, row) : choose,
+    run,
+    done,
+  };
+  const hands = useMemo((): Hands => {
+    const now = () => latest.current as Hands;
+    return {
+      flip: (id) => now().flip(id),
+      focus: (id) => now().focus(id),
+      choose: (row) => now().choose(row),
+      run: (deed, row) => now().run(deed, row),
+      done: (said) => now().done(said),
+    };
+  }, []);
   const add = () => {
     const middle: [number, number] = [window.innerWidth / 2, 120];
     if (!phone) return bench.openAdd();
@@ -192,11 +211,9 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
                 selected={selection.has(subjectOf(row))}
                 progress={row.kind === "action" ? (progress.get(row.action.key) ?? null) : null}
                 change={edited?.id === row.id ? edited.change : null}
-                onFlip={flip}
-                onFocus={setActive}
-                onChoose={phone ? (chosen) => run(DETAILS, chosen) : choose}
-                onDeed={run}
-                onDone={done}
+                name={names.get(nameKey(row)) ?? ""}
+                mayEdit={mayEdit}
+                hands={hands}
               />
             ))}
           </tbody>
@@ -219,6 +236,9 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
 }
 
 const DETAILS: RowDeed = { name: "details", label: "Details", key: "Enter", changes: false };
+
+/** By whose name a row is called. */
+const nameKey = (row: Row): Key => (row.kind === "target" ? row.relation.child : ownerOf(row));
 
 function ownerOf(row: Row): Key {
   switch (row.kind) {

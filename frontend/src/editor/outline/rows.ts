@@ -3,6 +3,7 @@ import { relationId } from "../../graph/layout";
 import {
   type Action,
   ENTRY,
+  EXIT,
   type Graph,
   type Key,
   PRECONDITIONS,
@@ -143,6 +144,17 @@ function targets(
     outcome,
     response: relation.conditions[outcome],
   }));
+}
+
+/** What people call every end of the graph: with the number only where the name is not enough. */
+export function namesOf(graph: Graph): ReadonlyMap<Key, string> {
+  const counts = new Map<string, number>();
+  for (const { name } of graph.actions) counts.set(name, (counts.get(name) ?? 0) + 1);
+  const names = graph.actions.map(({ key, name, instanceId }): [Key, string] => [
+    key,
+    (counts.get(name) ?? 0) > 1 ? `${name} ${instanceId}` : name,
+  ]);
+  return new Map([[ENTRY, "Entry"], [EXIT, "Exit"], ...names]);
 }
 
 /** What is selected in the graph when a row is. */
