@@ -53,7 +53,7 @@ fix: .venv/.done frontend/node_modules/.done ## mend what the formatters and lin
 	@$(NPM) run --silent fix
 
 .PHONY: test
-test: check unit e2e ## every check and every test, also in a real browser
+test: check unit ros-test e2e ## every check and every test, also in a real browser
 
 .PHONY: unit
 unit: setup ## the tests of the server and of the page's pure parts
@@ -74,7 +74,7 @@ contract: ros ## what a link promises, with a real engine: NAME=David [DOMAIN=0]
 		$(ROS)/python -m pytest -q tests/ros/test_contract.py -k real_engine
 
 .PHONY: e2e
-e2e: setup ## tests in Chromium against the real processes
+e2e: setup ros ## tests in Chromium against the real processes
 	@scripts/need chromium=chromium
 	@echo "» Playwright"
 	@$(NPM) run --silent e2e

@@ -1,0 +1,44 @@
+"""What the package asks for is what every environment installs."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def pinned(lock: str) -> dict[str, set[str]]:
+    """Versions by package."""
+    found: dict[str, set[str]] = {}
+    text = (ROOT / "requirements" / lock).read_text()
+    for name, version in re.findall(r"^([a-z0-9-]+)(?:\[[^\]]*\])?==([^\s;]+)", text, re.MULTILINE):
+        found.setdefault(name, set()).add(version)
+    return found
+
+
+def asked() -> set[str]:
+    """Names of the packages that pyproject.toml asks for."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    return {re.split(r"[\s\[<>=;~!]", each)[0].lower() for each in project["dependencies"]}
+
+
+@pytest.mark.parametrize("lock", ["dev.txt", "ros.txt"])
+def test_every_package_that_is_asked_for_is_locked(lock: str) -> None:
+    missing = asked() - pinned(lock).keys()
+    assert not missing, f"`make lock` renews requirements/{lock}"
+
+
+def test_both_environments_have_the_same_versions() -> None:
+    dev, ros = pinned("dev.txt"), pinned("ros.txt")
+    different = {name for name in dev.keys() & ros.keys() if dev[name] != ros[name]}
+    assert not different, "`make lock` renews both"
+
+
+@pytest.mark.parametrize("lock", ["dev.txt", "ros.txt"])
+def test_a_lock_names_no_machine_and_hashes_everything(lock: str) -> None:
+    text = (ROOT / "requirements" / lock).read_text()
+    assert "://" not in text
+    entries = text.replace("\\\n", " ").splitlines()
+    assert all("--hash=sha256:" in each for each in entries if each and not each.startswith("#"))
