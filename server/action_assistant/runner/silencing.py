@@ -15,8 +15,7 @@ from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.events import Author
 from action_assistant.runner.flight import RobotEvent, StopAsked, StopUnproven, StopWasProven
 from action_assistant.runner.links.port import Answer, NoAnswer
-from action_assistant.runner.proof import send_stop
-from action_assistant.runner.seen import TERMINAL
+from action_assistant.runner.proof import Rest, send_stop
 
 _GAP_S: Final = 0.1
 _SLOWEST_S: Final = 1.0
@@ -75,8 +74,10 @@ class Silencing:
     async def _until_proven(self, engine: KnownEngine, graph: str, robot: str) -> RobotEvent:
         began, gap = anyio.current_time(), _GAP_S
         life = engine.answer.incarnation if engine.answer is not None else ""
+        rest = Rest(exact=False)
         while True:
             why = await send_stop(engine, graph)
+            asked = anyio.current_time()
             answer = await _ask(engine)
             if answer is None:
                 why = why or engine.why or "the engine does not answer"
@@ -85,7 +86,7 @@ class Silencing:
                 return StopUnproven(at=self._wall(), graph=graph, why=why)
             elif engine.standing.servers != 1:
                 why = f"{engine.standing.servers} engines are seen on the path of its answers"
-            elif not why and _at_rest(answer, graph):
+            elif _at_rest(answer, graph, rest, asked) and not why:
                 return StopWasProven(at=answer.at, graph=graph, asked_at=answer.asked_at)
             else:
                 why = why or f"{graph} has not stopped yet"
@@ -104,13 +105,11 @@ async def _ask(engine: KnownEngine) -> Answer | None:
         return None
 
 
-def _at_rest(answer: Answer, graph: str) -> bool:
-    """Whether neither the graph nor a sub-graph of it moves, or may move by itself."""
-    shown = [
-        each for each in answer.graphs if each.graph == graph or each.graph.startswith(f"{graph}__")
-    ]
-    own = [each for each in shown if each.graph == graph]
-    return not any(each.active for each in shown) and all(e.state in TERMINAL for e in own)
+def _at_rest(answer: Answer, graph: str, rest: Rest, asked: float) -> bool:
+    """Whether neither the graph nor a sub-graph of it moves, or will by itself."""
+    own = [each for each in answer.graphs if each.graph == graph]
+    parts = [each for each in answer.graphs if each.graph.startswith(f"{graph}__")]
+    return not own or rest.seen([*own, *parts], asked)
 
 
 def wanted(engine: KnownEngine, open_runs: frozenset[str]) -> list[str]:
