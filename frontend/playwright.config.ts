@@ -5,6 +5,21 @@ import { defineConfig, devices } from "@playwright/test";
 // No test speaks to another machine, whatever robots it registers.
 process.env.ROS_AUTOMATIC_DISCOVERY_RANGE = "LOCALHOST";
 
+const launchOptions = {
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  args: [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+  ],
+};
+/** A name of the network that leads to this computer: its pages are no secure context. */
+const lan = [...launchOptions.args, "--host-resolver-rules=MAP lab.test 127.0.0.1"];
+
 export default defineConfig({
   testDir: "e2e",
   outputDir: "test-results",
@@ -21,17 +36,14 @@ export default defineConfig({
     trace: "retain-on-failure",
     screenshot: "only-on-failure",
     actionTimeout: 15_000,
-    launchOptions: {
-      executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-      args: [
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-quic",
-        "--no-first-run",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-      ],
-    },
+    launchOptions,
   },
+  projects: [
+    { name: "here", testIgnore: "lan.spec.ts" },
+    {
+      name: "lan",
+      testMatch: "lan.spec.ts",
+      use: { launchOptions: { ...launchOptions, args: lan } },
+    },
+  ],
 });

@@ -16,14 +16,26 @@ export class Product {
   readonly data = mkdtempSync(join(tmpdir(), "action-assistant-"));
   readonly log = join(this.data, "serve.log");
   port = 0;
+  private readonly flags: readonly string[];
+  private readonly hosts: string;
   private process: ChildProcess | undefined;
 
+  /** `hosts` are names that lead here, for others on the network. */
+  constructor(flags: readonly string[] = [], hosts = "") {
+    this.flags = flags;
+    this.hosts = hosts;
+  }
+
+  get scheme(): string {
+    return this.flags.includes("--tls") ? "https" : "http";
+  }
+
   get url(): string {
-    return `http://127.0.0.1:${this.port}`;
+    return `${this.scheme}://127.0.0.1:${this.port}`;
   }
 
   get runnerUrl(): string {
-    return `http://127.0.0.1:${this.port + 1}`;
+    return `${this.scheme}://127.0.0.1:${this.port + 1}`;
   }
 
   /** Starts both processes and waits until they answer. */
@@ -32,11 +44,15 @@ export class Product {
     const log = openSync(this.log, "a");
     this.process = spawn(
       COMMAND,
-      ["serve", "--data", this.data, "--port", String(this.port), "--no-open"],
+      ["serve", "--data", this.data, "--port", String(this.port), "--no-open", ...this.flags],
       {
         detached: true,
         stdio: ["ignore", log, log],
-        env: { ...process.env, ACTION_ASSISTANT_TOKEN: TOKEN },
+        env: {
+          ...process.env,
+          ACTION_ASSISTANT_TOKEN: TOKEN,
+          ACTION_ASSISTANT_HOSTS: this.hosts,
+        },
       },
     );
     await this.untilReady();

@@ -11,7 +11,7 @@ import {
   UnstyledButton,
   useMantineColorScheme,
 } from "@mantine/core";
-import { IconDeviceDesktop, IconMoon, IconSun } from "@tabler/icons-react";
+import { IconDeviceDesktop, IconMoon, IconShare, IconSun } from "@tabler/icons-react";
 import { useState } from "react";
 import { sentence } from "../api/http";
 import { usePerson } from "../api/person";
@@ -24,7 +24,8 @@ const schemes = [
   { value: "auto", label: <IconDeviceDesktop size={15} aria-label="Like the system" /> },
 ];
 
-export function AccountMenu() {
+/** `onShare` for who may: the bar of a narrow screen has no room for a button of its own. */
+export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
   const { person, rename } = usePerson();
   const [open, setOpen] = useState(false);
   const [name, setName] = useState(rememberedName() || person.name);
@@ -78,6 +79,23 @@ export function AccountMenu() {
             {person.role !== "owner" && (
               <Text size="sm" c="dimmed">
                 You are here as {person.role}: you may {ROLE_WORDS[person.role]}.
+              </Text>
+            )}
+            {onShare !== null && (
+              <Button
+                leftSection={<IconShare size={15} aria-hidden />}
+                onClick={() => {
+                  setOpen(false);
+                  onShare();
+                }}
+              >
+                Share with others …
+              </Button>
+            )}
+            {!window.isSecureContext && (
+              <Text size="sm" c="dimmed">
+                This page came without TLS: reading the clipboard by a button, and opening without a
+                server, need <code>--tls</code>.
               </Text>
             )}
             <div>

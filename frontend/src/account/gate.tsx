@@ -11,29 +11,60 @@ import {
 import { sessionEnd } from "../api/ended";
 import { Refusal, sentence } from "../api/http";
 import { PersonContext } from "../api/person";
-import { currentPerson, openSession, type Person, rename, takeToken } from "../api/session";
+import {
+  currentPerson,
+  type Invited,
+  type Key,
+  keyIn,
+  lookAt,
+  openSession,
+  type Person,
+  rememberedName,
+  rename,
+  takeKey,
+} from "../api/session";
+import { Invitation } from "./invitation";
 import { SignIn } from "./sign-in";
 import { SignInBar } from "./sign-in-bar";
 
 type Gate =
   | { at: "knocking" }
   | { at: "outside"; why: string }
+  | { at: "invited"; key: Key; invited: Invited }
   | { at: "inside"; person: Person; visit: number };
 
 async function knock(): Promise<Gate> {
-  const token = takeToken();
+  const key = takeKey();
   try {
-    const person = token === null ? await currentPerson() : await openSession(token);
+    if (key?.kind === "invitation") return await knockInvited(key);
+    const person = key === null ? await currentPerson() : await openSession(key);
     return { at: "inside", person, visit: 0 };
   } catch (error) {
     const refused = error instanceof Refusal && error.details.status === 401;
-    if (refused && token === null) return { at: "outside", why: "" };
+    if (refused && isWithdrawn(error)) return { at: "outside", why: WITHDRAWN };
+    if (refused && key === null) return { at: "outside", why: "" };
+    const strange = refused && key?.kind === "token";
     return {
       at: "outside",
-      why: refused ? "The link is of another server, or of an older start." : sentence(error),
+      why: strange ? "The link is of another server, or of an older start." : sentence(error),
     };
   }
 }
+
+/** Who has given a name in this browser before goes straight in; else that is asked first. */
+async function knockInvited(key: Key): Promise<Gate> {
+  const invited = await lookAt(key.text);
+  const known = rememberedName() !== "" || (await currentPerson().catch(() => null))?.name;
+  if (!known) return { at: "invited", key, invited };
+  return { at: "inside", person: await openSession(key), visit: 0 };
+}
+
+function isWithdrawn(error: unknown): boolean {
+  return error instanceof Refusal && error.details.type === "withdrawn";
+}
+
+const WITHDRAWN =
+  "Your link was revoked. Ask for another one. Changes that were not sent stay on this device.";
 
 const visitOf = (gate: Gate): number => (gate.at === "inside" ? gate.visit : 0);
 
@@ -45,7 +76,8 @@ function inside(gate: Gate, person: Person): Gate & { at: "inside" } {
 }
 
 /** A link that does not open the door puts nobody out who is inside already. */
-const stay = (gate: Gate, next: Gate): Gate => (gate.at === "inside" ? gate : next);
+const stay = (gate: Gate, next: Gate): Gate =>
+  gate.at === "inside" && next.at === "outside" ? gate : next;
 
 export function Gate({ children }: { children: ReactNode }) {
   const [gate, setGate] = useState<Gate>({ at: "knocking" });
@@ -59,7 +91,7 @@ export function Gate({ children }: { children: ReactNode }) {
       });
     // A fresh link pasted into the same tab changes only the fragment.
     const onHash = () => {
-      if (location.hash.includes("t=")) enter();
+      if (keyIn(location.hash) !== null) enter();
     };
     enter();
     window.addEventListener("hashchange", onHash);
@@ -85,7 +117,11 @@ export function Gate({ children }: { children: ReactNode }) {
   useEffect(() => {
     if (gate.at !== "inside") return;
     // Another tab of this browser may sign in or out at any time.
-    const look = () => void currentPerson().then(ended ? letIn : () => {}, () => {});
+    const look = () =>
+      void currentPerson().then(ended ? letIn : () => {}, (error) => {
+        if (isWithdrawn(error)) setGate({ at: "outside", why: WITHDRAWN });
+      });
+    if (ended) look();
     const timer = setInterval(look, ended ? 3_000 : 30_000);
     window.addEventListener("focus", look);
     return () => {
@@ -99,6 +135,9 @@ export function Gate({ children }: { children: ReactNode }) {
     [gate, takeName],
   );
   if (gate.at === "knocking") return <div aria-busy="true" />;
+  if (gate.at === "invited") {
+    return <Invitation key={gate.key.text} link={gate.key} invited={gate.invited} onOpen={letIn} />;
+  }
   if (hold === null) {
     return <SignIn why={gate.at === "outside" ? gate.why : ""} onOpen={letIn} />;
   }

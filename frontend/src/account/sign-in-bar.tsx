@@ -1,9 +1,9 @@
 /** Asks to sign in again in place: the session has ended, the page and its edits have not. */
 import { Button, PasswordInput } from "@mantine/core";
 import { useState } from "react";
-import { Refusal, sentence } from "../api/http";
+import { sentence } from "../api/http";
 import { openSession, type Person } from "../api/session";
-import { tokenIn } from "./sign-in";
+import { pastedKey } from "./sign-in";
 import style from "./sign-in-bar.module.css";
 
 export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
@@ -13,10 +13,9 @@ export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
   const submit = async () => {
     setBusy(true);
     try {
-      onOpen(await openSession(tokenIn(pasted)));
+      onOpen(await openSession(pastedKey(pasted)));
     } catch (error) {
-      const wrong = error instanceof Refusal && error.details.status === 401;
-      setProblem(wrong ? "This is not the token of this server." : sentence(error));
+      setProblem(sentence(error));
       setBusy(false);
     }
   };
@@ -30,8 +29,8 @@ export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
       }}
     >
       <p role="status">
-        <b>Your session has ended.</b> Edits stay in this page, and STOP is still sent. Paste the
-        link that the server printed to go on.
+        <b>Your session has ended.</b> Edits stay in this page, and STOP is still sent. Paste your
+        link to go on.
       </p>
       <PasswordInput
         aria-label="Link or token"

@@ -1,8 +1,8 @@
 /** The page for somebody whom the server does not know: says how to get in. */
 import { Button, Paper, PasswordInput, Text, Title } from "@mantine/core";
 import { useState } from "react";
-import { Refusal, sentence } from "../api/http";
-import { openSession, type Person } from "../api/session";
+import { sentence } from "../api/http";
+import { type Key, keyIn, openSession, type Person } from "../api/session";
 import { Mark } from "../ui/top-bar";
 import style from "./sign-in.module.css";
 
@@ -12,10 +12,9 @@ interface Props {
   onOpen: (person: Person) => void;
 }
 
-/** A pasted link counts as its token. */
-export function tokenIn(pasted: string): string {
-  const found = /[#&]t=([^&\s]+)/.exec(pasted);
-  return found?.[1] ? decodeURIComponent(found[1]) : pasted.trim();
+/** What has no fragment is taken for the token itself. */
+export function pastedKey(pasted: string): Key {
+  return keyIn(pasted) ?? { kind: "token", text: pasted.trim() };
 }
 
 export function SignIn({ why, onOpen }: Props) {
@@ -25,10 +24,9 @@ export function SignIn({ why, onOpen }: Props) {
   const submit = async () => {
     setBusy(true);
     try {
-      onOpen(await openSession(tokenIn(pasted)));
+      onOpen(await openSession(pastedKey(pasted)));
     } catch (error) {
-      const wrong = error instanceof Refusal && error.details.status === 401;
-      setProblem(wrong ? "This is not the token of this server." : sentence(error));
+      setProblem(sentence(error));
       setBusy(false);
     }
   };
@@ -40,7 +38,7 @@ export function SignIn({ why, onOpen }: Props) {
           TeMoto Action Assistant
         </Title>
         <Text c="dimmed" mt="xs">
-          Open the link that the server printed when it started. It ends in <code>#t=…</code> and
+          Open the link that the server printed when it started, or the one that you were given. It
           signs this browser in. You can paste it here as well.
         </Text>
         <form
@@ -75,7 +73,8 @@ export function SignIn({ why, onOpen }: Props) {
           </Button>
         </form>
         <Text size="xs" c="dimmed" mt="lg">
-          Lost it? It is the content of the file <code>token</code> in the server’s data folder.
+          It is your server and you lost the link? Its token is the content of the file{" "}
+          <code>token</code> in its data folder.
         </Text>
       </Paper>
     </main>

@@ -1,4 +1,5 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { sessionEnd } from "./ended";
 import { Live } from "./live";
 import type { Run } from "./runs";
 
@@ -9,7 +10,7 @@ class Wire {
   readyState = 1;
   sent: string[] = [];
   onmessage: ((event: { data: string }) => void) | null = null;
-  onclose: (() => void) | null = null;
+  onclose: ((event: { code: number }) => void) | null = null;
   readonly url: string;
   constructor(url: string) {
     this.url = url;
@@ -18,9 +19,9 @@ class Wire {
   send(text: string) {
     this.sent.push(text);
   }
-  close() {
+  close(code = 1000) {
     this.readyState = 3;
-    this.onclose?.();
+    this.onclose?.({ code });
   }
   say(message: object) {
     this.onmessage?.({ data: JSON.stringify(message) });
@@ -53,6 +54,18 @@ beforeEach(() => {
 afterEach(() => {
   vi.useRealTimers();
   vi.unstubAllGlobals();
+});
+
+test("a socket that is closed because the session ended says so at once", () => {
+  const live = new Live("http://127.0.0.1:8001");
+  live.open();
+  newest().close(1006);
+  expect(sessionEnd.now()).toBe(false);
+  vi.advanceTimersByTime(1_000);
+  newest().close(4401);
+  expect(sessionEnd.now()).toBe(true);
+  sessionEnd.clear();
+  live.close();
 });
 
 test("one socket, by the runner's own address", () => {

@@ -1,5 +1,6 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
 import { newAid } from "../graph/ids";
+import { sessionEnd } from "./ended";
 import { Refusal, sentence } from "./http";
 import type { Robot } from "./robots";
 import { getRun, postStop, type Run } from "./runs";
@@ -38,6 +39,7 @@ type Message =
   | { type: "stopping"; stop_id: string; runs: string[] }
   | { type: "refused"; stop_id: string; detail: string };
 
+const SESSION_ENDED = 4401;
 const SILENCE = 3_500; // ms; the runner beats each second
 const STOPS_KEPT = 5;
 const AGAIN = 1_000; // ms between two tries to send a Stop
@@ -142,7 +144,10 @@ export class Live {
       this.#expect(socket);
       this.#hear(JSON.parse(String(event.data)) as Message);
     };
-    socket.onclose = () => this.#lost(socket);
+    socket.onclose = ({ code }) => {
+      if (code === SESSION_ENDED) sessionEnd.notice();
+      this.#lost(socket);
+    };
   }
 
   /** A socket that stays silent is as good as closed, whatever TCP believes. */

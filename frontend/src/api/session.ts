@@ -12,12 +12,30 @@ export interface Person {
 
 const NAME_KEY = "aa.name";
 
-/** The token in the address (`#t=…`), which is erased from it at once. */
-export function takeToken(): string | null {
-  const found = /[#&]t=([^&]+)/.exec(location.hash);
-  if (!found?.[1]) return null;
-  history.replaceState(history.state, "", location.pathname + location.search);
-  return decodeURIComponent(found[1]);
+/** What opens the door: the server's token, or an invitation (`ID.SECRET`). */
+export type Key =
+  | { readonly kind: "token"; readonly text: string }
+  | { readonly kind: "invitation"; readonly text: string };
+
+/** The key in a link or a fragment; null when it has none. */
+export function keyIn(link: string): Key | null {
+  const found = /[#&](t|i)=([^&\s]+)/.exec(link);
+  if (!found?.[1] || !found[2]) return null;
+  const text = decodeURIComponent(found[2]);
+  return { kind: found[1] === "t" ? "token" : "invitation", text };
+}
+
+/** The key in the address, which is erased from it at once. */
+export function takeKey(): Key | null {
+  const key = keyIn(location.hash);
+  if (key !== null) {
+    history.replaceState(history.state, "", location.pathname + location.search);
+  }
+  return key;
+}
+
+export function rememberName(name: string): void {
+  localStorage.setItem(NAME_KEY, name);
 }
 
 export function rememberedName(): string {
@@ -28,10 +46,21 @@ interface SessionAnswer {
   person: Person;
 }
 
-/** Trades a token for a session. Throws `Refusal` when it is not the server's. */
-export async function openSession(token: string): Promise<Person> {
-  const name = rememberedName();
-  const body = name === "" ? { token } : { token, name };
+/** What a link invites to, and by whom. */
+export interface Invited {
+  id: string;
+  role: Role;
+  by: string;
+}
+
+/** Throws `Refusal` when the link is none of this server, or was revoked. */
+export function lookAt(invitation: string): Promise<Invited> {
+  return ask("/api/session/invitation", { method: "POST", body: { invitation } });
+}
+
+/** Trades a key for a session. Throws `Refusal` when it does not fit. */
+export async function openSession(key: Key, name = rememberedName()): Promise<Person> {
+  const body = { [key.kind]: key.text, ...(name !== "" && { name }) };
   return (await ask<SessionAnswer>("/api/session", { method: "POST", body })).person;
 }
 
@@ -43,6 +72,6 @@ export async function currentPerson(): Promise<Person> {
 /** The same session under another name. */
 export async function rename(name: string): Promise<Person> {
   const answer = await ask<SessionAnswer>("/api/session", { method: "POST", body: { name } });
-  localStorage.setItem(NAME_KEY, name);
+  rememberName(name);
   return answer.person;
 }

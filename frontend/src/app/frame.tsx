@@ -1,9 +1,11 @@
 /** What every screen has: the bar with STOP on top, the screen below. */
 import { Button } from "@mantine/core";
-import { IconHistory, IconRobot } from "@tabler/icons-react";
-import type { ReactNode } from "react";
+import { IconHistory, IconRobot, IconShare } from "@tabler/icons-react";
+import { type ReactNode, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
+import { ShareDialog } from "../account/share-dialog";
+import { useMay } from "../api/person";
 import { StopButton } from "../runs/stop-button";
 import { type Crumb, TopBar } from "../ui/top-bar";
 import style from "./frame.module.css";
@@ -46,6 +48,8 @@ function Way({ to, icon: Icon, name, tight }: WayProps) {
 }
 
 export function Bar({ crumbs, status, actions, start, graph, at }: Props) {
+  const mayShare = useMay("share");
+  const [sharing, setSharing] = useState(false);
   return (
     <TopBar
       crumbs={crumbs}
@@ -55,9 +59,24 @@ export function Bar({ crumbs, status, actions, start, graph, at }: Props) {
           {actions}
           {at !== "robots" && <Way to="/robots" icon={IconRobot} name="Robots" tight={start} />}
           {at !== "runs" && <Way to="/runs" icon={IconHistory} name="Runs" tight={start} />}
+          {mayShare && (
+            <Button
+              variant="subtle"
+              color="gray"
+              px="sm"
+              aria-label="Share"
+              leftSection={<IconShare size={16} aria-hidden />}
+              className={`${style.way ?? ""} ${style.share ?? ""}`}
+              data-tight={start ? true : undefined}
+              onClick={() => setSharing(true)}
+            >
+              Share
+            </Button>
+          )}
+          {mayShare && <ShareDialog opened={sharing} onClose={() => setSharing(false)} />}
         </>
       }
-      account={<AccountMenu />}
+      account={<AccountMenu onShare={mayShare ? () => setSharing(true) : null} />}
       start={start}
       stop={<StopButton {...(graph === undefined ? {} : { graph })} />}
     />

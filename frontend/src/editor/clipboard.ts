@@ -12,6 +12,7 @@ import { mapsFrom } from "../graph/layout";
 import { readGraph } from "../graph/read";
 import { umrfText } from "../graph/umrf-text";
 import { arrange } from "../ui/canvas/arrange";
+import { copyText } from "../ui/copy-text";
 import { type Bench, selectedActions } from "./bench";
 
 export interface Held {
@@ -57,33 +58,10 @@ export function held(): Held | null {
   return latest;
 }
 
-/** Puts text on the system's clipboard. Whether that worked. */
-export async function writeText(text: string): Promise<boolean> {
-  try {
-    if (window.isSecureContext) {
-      await navigator.clipboard.writeText(text);
-      return true;
-    }
-  } catch {
-    // no permission; the old way may still work
-  }
-  let done = false;
-  const onCopy = (event: ClipboardEvent) => {
-    event.clipboardData?.setData("text/plain", text);
-    event.preventDefault();
-    event.stopImmediatePropagation();
-    done = true;
-  };
-  document.addEventListener("copy", onCopy, { capture: true });
-  document.execCommand("copy");
-  document.removeEventListener("copy", onCopy, { capture: true });
-  return done;
-}
-
 /** Copies an address, or shows it where the browser does not let us. */
 export async function copyLinkTo(link: string): Promise<void> {
   notifications.show(
-    (await writeText(link))
+    (await copyText(link))
       ? { message: "Link copied" }
       : { title: "The browser did not copy the link", message: link, autoClose: 20_000 },
   );

@@ -30,7 +30,7 @@ import {
 import { relationId } from "../../graph/layout";
 import { type Action, ENTRY, EXIT } from "../../graph/model";
 import { type Bench, selectedActions, selectedNotes, selectedRelations } from "../bench";
-import { copied, hold, pasteText, readText, writeText } from "../clipboard";
+import { copied, hold, pasteText, readText } from "../clipboard";
 import type { Deed } from "./deed";
 
 const always = () => true;
@@ -63,7 +63,7 @@ export const copy: Deed = {
   run: (bench) => {
     const held = copied(bench);
     hold(held);
-    void writeText(held.text);
+    void copyText(held.text);
   },
 };
 

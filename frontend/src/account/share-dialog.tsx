@@ -1,0 +1,155 @@
+/** Share: links with a role, who came in by them, and their end. For owners. */
+import { Button, Group, Modal, SegmentedControl, Select, Text, TextInput } from "@mantine/core";
+import { useMediaQuery } from "@mantine/hooks";
+import { IconLock, IconLockOpen2, IconPlugConnectedX } from "@tabler/icons-react";
+import { useState } from "react";
+import { sentence } from "../api/http";
+import { ROLE_WORDS, type Role } from "../api/session";
+import { type Sharing, useInvite, useSharing } from "../api/sharing";
+import style from "./share-dialog.module.css";
+import { ShareLink } from "./share-link";
+
+const INVITED = ["viewer", "editor", "operator"] as const satisfies readonly Role[];
+const LABELS: Record<(typeof INVITED)[number], string> = {
+  viewer: "Viewer",
+  editor: "Editor",
+  operator: "Operator",
+};
+
+/** The page's own place first, if others can reach it by that. */
+export function originsOf(sharing: Sharing, own: { origin: string; hostname: string }): string[] {
+  const here = /^(localhost|127\.0\.0\.1|\[::1\])$/.test(own.hostname) ? [] : [own.origin];
+  return [...new Set([...here, ...sharing.origins])];
+}
+
+function Where({ secure, reached }: { secure: boolean; reached: boolean }) {
+  if (!reached) {
+    return (
+      <p className={style.where} data-tone="off">
+        <IconPlugConnectedX size={18} aria-hidden />
+        <span>
+          <b>Only this computer reaches this server.</b> Stop it and start it again with{" "}
+          <code>action-assistant serve --share</code>; links that you make now work then.
+        </span>
+      </p>
+    );
+  }
+  return secure ? (
+    <p className={style.where}>
+      <IconLock size={18} aria-hidden />
+      <span>
+        <b>Encrypted.</b> Browsers warn others until they trust this server’s authority, the file{" "}
+        <code>tls/ca.pem</code> in its data folder.
+      </span>
+    </p>
+  ) : (
+    <p className={style.where} data-tone="off">
+      <IconLockOpen2 size={18} aria-hidden />
+      <span>
+        <b>Not encrypted.</b> Others on the same network can read what is sent, links too. Start the
+        server with <code>--tls</code> where you do not trust everybody there.
+      </span>
+    </p>
+  );
+}
+
+function NewLink() {
+  const invite = useInvite();
+  const [role, setRole] = useState<(typeof INVITED)[number]>("editor");
+  const [label, setLabel] = useState("");
+  return (
+    <form
+      className={style.fresh}
+      aria-label="New link"
+      onSubmit={(event) => {
+        event.preventDefault();
+        invite.mutate({ role, label: label.trim() }, { onSuccess: () => setLabel("") });
+      }}
+    >
+      <SegmentedControl
+        fullWidth
+        aria-label="Role"
+        data={INVITED.map((value) => ({ value, label: LABELS[value] }))}
+        value={role}
+        onChange={(value) => setRole(value as (typeof INVITED)[number])}
+      />
+      <Text size="sm" c="dimmed">
+        Whoever has the link may {ROLE_WORDS[role]}.
+      </Text>
+      <Group wrap="nowrap" align="end" gap="sm">
+        <TextInput
+          flex={1}
+          label="For whom"
+          placeholder="A person, a tablet, a class …"
+          maxLength={60}
+          value={label}
+          error={invite.isError ? sentence(invite.error) : undefined}
+          onChange={(event) => setLabel(event.currentTarget.value)}
+        />
+        <Button type="submit" variant="filled" loading={invite.isPending}>
+          New link
+        </Button>
+      </Group>
+    </form>
+  );
+}
+
+function Body() {
+  const sharing = useSharing();
+  const [chosen, setChosen] = useState<string | null>(null);
+  if (sharing.isError) return <Text>{sentence(sharing.error)}</Text>;
+  if (!sharing.data) return <div className={style.waiting} aria-busy="true" />;
+  const origins = originsOf(sharing.data, location);
+  const origin = origins.find((each) => each === chosen) ?? origins[0] ?? location.origin;
+  const open = sharing.data.invitations.filter((each) => each.path !== undefined);
+  const over = sharing.data.invitations.filter((each) => each.path === undefined);
+  return (
+    <div className={style.body}>
+      <Where secure={sharing.data.secure} reached={origins.length > 0} />
+      <NewLink />
+      {open.length > 0 && (
+        <section className={style.links} aria-label="Links">
+          <div className={style.heading}>
+            <h3>{open.length === 1 ? "1 link" : `${open.length} links`}</h3>
+            {origins.length > 1 && (
+              <Select
+                aria-label="Address in the links"
+                size="xs"
+                data={origins}
+                value={origin}
+                onChange={setChosen}
+              />
+            )}
+          </div>
+          <ul>
+            {open.map((invitation) => (
+              <ShareLink key={invitation.id} invitation={invitation} origin={origin} />
+            ))}
+          </ul>
+        </section>
+      )}
+      {over.length > 0 && (
+        <Text size="sm" c="dimmed">
+          Revoked: {over.map((each) => each.label || `a link for ${each.role}s`).join(", ")}
+        </Text>
+      )}
+    </div>
+  );
+}
+
+export function ShareDialog({ opened, onClose }: { opened: boolean; onClose: () => void }) {
+  const phone = useMediaQuery("(max-width: 600px)", false, { getInitialValueInEffect: false });
+  return (
+    <Modal
+      opened={opened}
+      onClose={onClose}
+      title="Share"
+      size={620}
+      fullScreen={phone}
+      centered
+      closeButtonProps={{ "aria-label": "Close" }}
+    >
+      <Body />
+    </Modal>
+  );
+}

@@ -1,0 +1,40 @@
+import { expect, test } from "vitest";
+import { keyIn } from "../api/session";
+import type { Guest, Sharing } from "../api/sharing";
+import { originsOf } from "./share-dialog";
+import { guestWords } from "./share-link";
+import { pastedKey } from "./sign-in";
+
+const at = "2026-01-01T00:00:00Z";
+const guest = (name: string): Guest => ({ person: { id: name, name }, at });
+
+test("a link is told from a token, wherever it stands", () => {
+  expect(keyIn("http://lab:8000/#i=abc.DEF-_1")).toEqual({
+    kind: "invitation",
+    text: "abc.DEF-_1",
+  });
+  expect(keyIn("#t=secret")).toEqual({ kind: "token", text: "secret" });
+  expect(keyIn("http://lab:8000/graphs/x")).toBeNull();
+  expect(pastedKey("  secret ")).toEqual({ kind: "token", text: "secret" });
+  expect(pastedKey("http://lab:8000/#i=abc.D")).toEqual({ kind: "invitation", text: "abc.D" });
+});
+
+test("links begin with the place where the owner has the page, unless others cannot reach it", () => {
+  const sharing: Sharing = {
+    origins: ["http://10.0.0.2:8000", "http://lab.local:8000"],
+    secure: false,
+    invitations: [],
+  };
+  const here = { origin: "http://127.0.0.1:8000", hostname: "127.0.0.1" };
+  const there = { origin: "http://lab.local:8000", hostname: "lab.local" };
+  expect(originsOf(sharing, here)).toEqual(sharing.origins);
+  expect(originsOf(sharing, there)).toEqual(["http://lab.local:8000", "http://10.0.0.2:8000"]);
+  expect(originsOf({ ...sharing, origins: [] }, here)).toEqual([]);
+});
+
+test("who came in is said by name, and many as a number", () => {
+  expect(guestWords([])).toBe("Nobody came in by it yet");
+  expect(guestWords([guest("Ada"), guest("")])).toBe("Ada, Guest came in");
+  const many = Array.from({ length: 9 }, (_, i) => guest(`P${i}`));
+  expect(guestWords(many)).toBe("P0, P1, P2, P3, P4, P5 and 3 more came in");
+});

@@ -1,0 +1,69 @@
+/** Links that let people in, as owners see them. */
+import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import type { Author } from "./graphs";
+import { ask } from "./http";
+import type { Role } from "./roles";
+
+export interface Guest {
+  person: Author;
+  at: string;
+}
+
+export interface Invitation {
+  id: string;
+  role: Role;
+  label: string;
+  made_at: string;
+  made_by: Author;
+  guests: readonly Guest[];
+  /** After the origin of the page; absent once the link is revoked. */
+  path?: string;
+  revoked_at?: string;
+  revoked_by?: Author;
+}
+
+export interface Sharing {
+  /** Where others find the page, the likeliest first; empty when they cannot. */
+  origins: readonly string[];
+  secure: boolean;
+  invitations: readonly Invitation[];
+}
+
+const KEY = ["invitations"] as const;
+const LOOK = 4_000; // ms: who came in is seen soon
+
+export function useSharing() {
+  return useQuery({
+    queryKey: KEY,
+    queryFn: ({ signal }) => ask<Sharing>("/api/invitations", { signal }),
+    refetchInterval: LOOK,
+  });
+}
+
+export function useInvite() {
+  const client = useQueryClient();
+  return useMutation({
+    mutationFn: (wanted: { role: Role; label: string }) =>
+      ask<Invitation>("/api/invitations", { method: "POST", body: wanted }),
+    onSettled: () => client.invalidateQueries({ queryKey: KEY }),
+  });
+}
+
+/** Ends a link at the editor, and at a runner that has a data folder of its own. */
+export function useRevoke(runner: string | undefined) {
+  const client = useQueryClient();
+  return useMutation({
+    mutationFn: async (invitation: string) => {
+      const path = `/api/invitations/${encodeURIComponent(invitation)}/revoke`;
+      await ask<Invitation>(path, { method: "POST" });
+      if (runner === undefined) return;
+      await ask(`${runner}/api/revocations`, { method: "POST", body: { invitation } });
+    },
+    onSettled: () => client.invalidateQueries({ queryKey: KEY }),
+  });
+}
+
+/** The code of a link as a picture. */
+export function codeUrl(invitation: string, origin: string): string {
+  return `/api/invitations/${encodeURIComponent(invitation)}/qr?origin=${encodeURIComponent(origin)}`;
+}
