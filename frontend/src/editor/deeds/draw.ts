@@ -29,6 +29,7 @@ import {
 } from "../../graph/edit";
 import { relationId } from "../../graph/layout";
 import { type Action, ENTRY, EXIT } from "../../graph/model";
+import { copyText } from "../../ui/copy-text";
 import { type Bench, selectedActions, selectedNotes, selectedRelations } from "../bench";
 import { copied, hold, pasteText, readText } from "../clipboard";
 import type { Deed } from "./deed";
