@@ -3,7 +3,7 @@
 Random histories of the real runner with stand-in robots in virtual time: two engines on one path,
 reboots, freezes, starts by others, feedback that somebody made up, actions that begin after the stop
 has passed them by, messages that get lost and starts that come a minute late, answers that are old,
-crashes of the runner, a journal that fails. `TEST_HISTORIES` is how many (default 60).
+crashes of the runner, a journal that fails. `TEST_HISTORIES` is how many (default 40).
 """
 
 import asyncio
@@ -31,7 +31,7 @@ from action_assistant.umrf.semantics import script_from
 from runner.air import Air, AirLink, Node, now, now_ms
 from runner.world import ANN, BEN, World, carousel, live_through, order, sequence, two_ends
 
-HISTORIES = int(os.environ.get("TEST_HISTORIES", "60"))
+HISTORIES = int(os.environ.get("TEST_HISTORIES", "40"))
 FIRST = int(os.environ.get("TEST_HISTORIES_FROM", "0"))
 NAME = "David"
 #: Ends that say that nothing moves any more.

@@ -1,0 +1,283 @@
+"""A Stop arrives although messages get lost and overwrite each other; of many starts at once exactly
+one leaves; and what is shown is true when the engine is silent, killed, restarted, late, not alone,
+or of another generation. The real runner and stand-in robots, in virtual time.
+
+`TEST_STOPS` and `TEST_RACES` are how many (default 20 each); with `-s` the figures are printed.
+"""
+
+import os
+import random
+import statistics
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from typing import Any
+
+import anyio
+import pytest
+
+from action_assistant.errors import Refused
+from action_assistant.runner import shapes
+from action_assistant.runner.control import Control
+from action_assistant.runner.events import Override
+from action_assistant.runner.standin_engine import StandIn
+from action_assistant.runner.standin_wire import Quirks, Start, Stop
+from action_assistant.umrf import codec
+from action_assistant.umrf.semantics import script_from
+from runner.air import Air, AirLink, Node, now, now_ms
+from runner.world import ANN, BEN, World, live_through, order, sequence, until, virtual
+
+STOPS = int(os.environ.get("TEST_STOPS", "20"))
+RACES = int(os.environ.get("TEST_RACES", "20"))
+PATROL, OTHER = sequence("patrol"), sequence("other")
+PATHS = {"David": "/david/umrf_graph_get", "Carol": "/carol/umrf_graph_get"}
+#: `other` does not obey for five seconds, and makes the engine deaf for as long.
+SCRIPT: dict[str, Any] = {
+    "other/Work_0": [{"never": True, "ignores_stop": True}],
+    "*": [{"never": True}],
+}
+KNOWINGLY = Override(codes=("others", "quiet"), reason="it is a test")
+
+
+class Scene:
+    """Robots in the air, each on a path of its own, and the runner."""
+
+    def __init__(self, seed: int, *names: str, quirks: Quirks = Quirks()) -> None:  # noqa: B008
+        self.chance = random.Random(seed)
+        self.air = Air(self.chance)
+        self.lines: list[tuple[float, str]] = []
+        self.quirks = quirks
+        self.names = names or ("David",)
+        links = {name: AirLink(self.air, name, PATHS[name]) for name in self.names}
+        self.world = World(dict(links))
+        self.nodes = {name: self.robot(name) for name in self.names}
+
+    def robot(self, name: str) -> Node:
+        """An engine comes up."""
+        stand_in = StandIn(
+            name,
+            script=script_from({"behaviours": SCRIPT}),
+            quirks=self.quirks,
+            seed=self.chance.getrandbits(32),
+            born_ms=now_ms(),
+        )
+        return self.air.join(stand_in, PATHS[name])
+
+    @asynccontextmanager
+    async def played(self) -> AsyncIterator[Control]:
+        """The runner, with everything alive around it."""
+        with self.air.hearing(self._hear):
+            async with anyio.create_task_group() as wind:
+                wind.start_soon(self.air.blow)
+                async with self.world.runner() as control:
+                    await anyio.sleep(0.5)
+                    yield control
+                wind.cancel_scope.cancel()
+
+    def _hear(self, sound: object) -> None:
+        text = getattr(sound, "text", "")
+        if text:
+            self.lines.append((now(), text))
+
+    def starts(self) -> list[Start]:
+        """Starts of ours that left."""
+        return [each for _, each in self.air.sent if isinstance(each, Start)]
+
+
+def asked(name: str = "David", **more: Any) -> Any:
+    return order(PATROL, engine=name, **more)
+
+
+def shown(control: Control, run: str) -> Any:
+    """A run as the API and the page show it."""
+    return shapes.shown(control.open[run].run)
+
+
+# --- stop -------------------------------------------------------------------------------------------
+
+
+async def stopped(seed: int) -> tuple[float, float]:
+    """One stop through 30 % loss and commands of others that overwrite it: seconds until the engine
+    took it up, and until it was proven."""
+    scene = Scene(seed)
+    async with scene.played() as control:
+        run = (await control.start(asked(), ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+        scene.air.loss = {"stop": 0.3, "get": 0.3}
+        deaf = scene.chance.random() < 0.3
+        if deaf:  # somebody stops a graph that does not obey: five seconds of silence
+            other = Start(graph_name="other", targets=("David",), graph_json=codec.write(OTHER))
+            scene.air.carry(other, "terminal")
+            await anyio.sleep(0.3)
+            scene.nodes["David"].robot.hear(Stop(graph_name="other", targets=("David",)), now_ms())
+        async with anyio.create_task_group() as others:
+            others.start_soon(_chatter, scene)
+            await anyio.sleep(scene.chance.random() * 0.2)
+            clicked = now()
+            await control.stop(run, BEN)
+            await until(lambda: run not in control.open)
+            proven = now() - clicked
+            others.cancel_scope.cancel()
+        ended = await control.find(run)
+        assert ended.state == "stopped", (seed, ended.state, ended.detail)
+        assert "patrol" not in scene.nodes["David"].robot.moving
+        taken = next(
+            at for at, text in scene.lines if text.startswith("Stopping UMRF graph 'patrol'")
+        )
+        return taken - clicked, proven
+
+
+async def _chatter(scene: Scene) -> None:
+    """Others stop other graphs on the same robot, now and then at the very same moment as we do."""
+    seen = 0
+    while True:
+        ours = [each for _, each in scene.air.sent if isinstance(each, Stop)]
+        if len(ours) > seen and scene.chance.random() < 0.5:
+            seen = len(ours)
+            scene.air.carry(Stop(graph_name="nothing", targets=("David",)), "terminal")
+        await anyio.sleep(0.001 if now() % 0.1 < 0.03 else 0.02)
+
+
+@pytest.mark.timeout(0 if STOPS > 200 else 120)
+def test_no_stop_stays_undelivered_whatever_gets_lost_or_overwritten() -> None:
+    told: list[tuple[float, float]] = []
+    for seed in range(STOPS):
+
+        async def main(seed: int = seed) -> None:
+            told.append(await stopped(seed))
+
+        live_through(main)
+    assert len(told) == STOPS
+    for what, times in (("taken up", [a for a, _ in told]), ("proven", [b for _, b in told])):
+        times.sort()
+        p99 = times[min(len(times) - 1, len(times) * 99 // 100)]
+        sys.stdout.write(
+            f"\nstop {what}: n={STOPS} p50={statistics.median(times):.2f} s p99={p99:.2f} s "
+            f"max={times[-1]:.2f} s (virtual)\n"
+        )
+
+
+# --- start ------------------------------------------------------------------------------------------
+
+
+async def raced(seed: int) -> None:
+    """Up to twenty people start at once, some of them twice."""
+    scene = Scene(seed)
+    fresh: list[str] = []
+    async with scene.played() as control:
+
+        async def operator() -> None:
+            request = asked(override=KNOWINGLY)
+            await anyio.sleep(scene.chance.random() * scene.chance.choice([0, 0.001, 0.05]))
+            for _ in range(scene.chance.choice([1, 1, 2])):
+                with suppress(Refused):
+                    started = await control.start(request, ANN)
+                    fresh.extend([started.run.id] if started.fresh else [])
+
+        async with anyio.create_task_group() as people:
+            for _ in range(scene.chance.randint(2, 20)):
+                people.start_soon(operator)
+        assert len(fresh) == 1
+        assert len(scene.starts()) == 1
+        await until(lambda: control.open[fresh[0]].run.state == "running")
+
+
+@pytest.mark.timeout(0 if RACES > 200 else 120)
+def test_of_many_starts_at_once_exactly_one_leaves() -> None:
+    for seed in range(RACES):
+
+        async def main(seed: int = seed) -> None:
+            await raced(seed)
+
+        live_through(main)
+
+
+@virtual
+async def test_a_silent_engine_is_shown_as_unknown_and_as_running_when_it_speaks_again() -> None:
+    scene = Scene(1)
+    async with scene.played() as control:
+        run = (await control.start(asked(), ANN)).run.id
+        await until(lambda: shown(control, run).state == "running")
+        scene.nodes["David"].robot.freeze(now_ms())
+        await until(lambda: shown(control, run).state == "unknown")
+        assert shown(control, run).unknown_since is not None
+        assert len(scene.starts()) == 1
+        scene.nodes["David"].robot.thaw(now_ms())
+        scene.air.stir(scene.nodes["David"])
+        await until(lambda: shown(control, run).state == "running")
+        assert shown(control, run).unknown_since is None
+
+
+@virtual
+async def test_a_killed_engine_is_shown_as_unknown_and_its_stop_as_unconfirmed() -> None:
+    scene = Scene(2)
+    async with scene.played() as control:
+        run = (await control.start(asked(), ANN)).run.id
+        await until(lambda: shown(control, run).state == "running")
+        scene.air.kill(scene.nodes["David"])
+        await until(lambda: shown(control, run).state == "unknown")
+        await control.stop(run, BEN)
+        await anyio.sleep(30)
+        told = shown(control, run)
+        assert (told.state, told.desired) == ("unknown", "stopped")
+        assert any(each.code == "stop_unconfirmed" for each in control.open[run].run.alarms)
+
+
+@virtual
+async def test_a_restarted_engine_ends_the_run_as_lost_and_says_look_at_the_robot() -> None:
+    scene = Scene(3)
+    async with scene.played() as control:
+        run = (await control.start(asked(), ANN)).run.id
+        await until(lambda: shown(control, run).state == "running")
+        scene.air.kill(scene.nodes["David"])
+        await anyio.sleep(1)
+        scene.robot("David")
+        await until(lambda: run not in control.open)
+        told = await control.find(run)
+        assert told.state == "lost"
+        assert "look at the robot" in " ".join(each.text for each in told.alarms)
+        assert len(scene.starts()) == 1
+
+
+@virtual
+async def test_a_start_that_comes_a_minute_late_is_unknown_until_then_and_is_not_sent_again() -> (
+    None
+):
+    scene = Scene(4)
+    async with scene.played() as control:
+        scene.air.late_s = 60.0
+        run = (await control.start(asked(), ANN)).run.id
+        assert shown(control, run).state == "published"
+        await until(lambda: shown(control, run).state == "unknown")
+        await anyio.sleep(50)
+        assert shown(control, run).state == "unknown"
+        await until(lambda: shown(control, run).state == "running")
+        assert len(scene.starts()) == 1
+
+
+@virtual
+async def test_of_two_robots_with_one_graph_name_only_the_meant_one_stops() -> None:
+    scene = Scene(5, "David", "Carol")
+    async with scene.played() as control:
+        david = (await control.start(asked("David"), ANN)).run.id
+        carol = (await control.start(asked("Carol"), ANN)).run.id
+        for run in (david, carol):
+            await until(lambda run=run: shown(control, run).state == "running")
+        await control.stop(david, BEN)
+        await until(lambda: david not in control.open)
+        assert (await control.find(david)).state == "stopped"
+        assert shown(control, carol).state == "running"
+        assert scene.nodes["Carol"].robot.moving == ("patrol",)
+        assert scene.nodes["David"].robot.moving == ()
+
+
+@virtual
+async def test_an_engine_of_another_generation_is_refused_in_a_sentence_and_sent_nothing() -> None:
+    scene = Scene(6)
+    scene.nodes["David"].type_hash = "RIHS01_older"
+    async with scene.played() as control:
+        with pytest.raises(Refused) as refused:
+            await control.start(asked(), ANN)
+        assert "older generation" in refused.value.detail
+        assert scene.air.sent == []
+        assert control.open == {}
