@@ -59,6 +59,49 @@ for (const scheme of ["light", "dark"] as const) {
   });
 }
 
+/** The same graph with robots, so that they can be told apart. */
+async function withRobots(name: string): Promise<string> {
+  const url = await graph(name);
+  const id = url.split("/").at(-1);
+  const file = await product.ask<{ graph_name: string; actions: Record<string, unknown>[] }>(
+    `/api/graphs/${id}/umrf`,
+  );
+  const body = JSON.stringify({
+    ...file,
+    graph_name: "night_round",
+    gui_attributes: { labels: ["night shift"] },
+    actions: file.actions.map((action, i) => ({ ...action, actor: i % 3 === 2 ? "arm" : "rover" })),
+  });
+  const headers = { "content-type": "application/json" };
+  const made = await product.ask<{ id: string }>("/api/graphs", { method: "POST", body, headers });
+  return `${product.url}/graphs/${made.id}`;
+}
+
+for (const scheme of ["light", "dark"] as const) {
+  test(`what a graph says, ${scheme}`, async ({ browser }) => {
+    const options = { colorScheme: scheme, viewport: { width: 1440, height: 900 } };
+    const { page, context } = await product.person(browser, "Ada", options);
+    await page.goto(await withRobots("fetch_tool"));
+    await saved(page);
+    const first = page.locator(".react-flow__node-action").first();
+    await first.click({ position: { x: 50, y: 30 } });
+    await page.keyboard.press("m");
+    const say = page.getByRole("textbox", { name: /^Comment on/ });
+    await say.fill("Slower in the aisle, people walk here at night.");
+    await say.press("ControlOrMeta+Enter");
+    await expect(page.getByRole("button", { name: "Resolve" })).toBeVisible();
+    await page.keyboard.press("o");
+    await page.waitForTimeout(600);
+    await picture(page, `outline-${scheme}`);
+    await page.getByRole("tab", { name: "JSON" }).click();
+    await expect(page.getByRole("textbox", { name: "JSON of the graph" })).toBeVisible();
+    await page.getByRole("button", { name: /^arm/ }).click();
+    await page.waitForTimeout(600);
+    await picture(page, `json-${scheme}`);
+    await context.close();
+  });
+}
+
 for (const [name, width, height] of [
   ["tablet", 768, 1024],
   ["phone", 390, 844],
@@ -70,6 +113,11 @@ for (const [name, width, height] of [
     await saved(page);
     await page.waitForTimeout(800);
     await picture(page, `editor-${name}`);
+    if (name === "phone") {
+      await page.getByRole("radiogroup").getByText("Outline", { exact: true }).tap();
+      await page.waitForTimeout(500);
+      await picture(page, "outline-phone");
+    }
     await context.close();
   });
 }
