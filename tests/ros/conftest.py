@@ -5,25 +5,42 @@ import os
 import random
 import tempfile
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+
+#: Domains that one test may take.
+AT_ONCE = 4
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ.pop("ROS_DOMAIN_ID", None)
 
 
 @pytest.fixture
-def domain() -> Iterator[int]:
-    """The number of a domain of this test's own, also among other processes that run such tests."""
+def domains() -> Iterator[list[int]]:
+    """Numbers of domains of this test's own, also among other processes that run such tests."""
     folder = Path(tempfile.gettempdir()) / "action-assistant-domains"
     folder.mkdir(exist_ok=True)
-    for number in random.sample(range(1, 100), 99):
-        with (folder / str(number)).open("w") as taken:
+    with ExitStack() as held:
+        found: list[int] = []
+        for number in random.sample(range(1, 100), 99):
+            taken = (folder / str(number)).open("w")
             try:
                 fcntl.flock(taken, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
+                taken.close()
                 continue
-            yield number
-            return
-    raise RuntimeError("every domain is taken")
+            held.enter_context(taken)
+            found.append(number)
+            if len(found) == AT_ONCE:
+                break
+        if not found:
+            raise RuntimeError("every domain is taken")
+        yield found
+
+
+@pytest.fixture
+def domain(domains: list[int]) -> int:
+    """One of them."""
+    return domains[0]

@@ -99,6 +99,7 @@ class Story:
         self.false: list[str] = []
         self.still: dict[str, float] = {}
         self.judged: set[str] = set()
+        self.rest_s = 12.0  # beyond the lease, and any freeze
         self.stuck: list[str] = []
         self.replayed: set[str] = set()  # runs that a stranger's copy of our start may begin again
 
@@ -161,6 +162,7 @@ class Story:
                 self.air.loss[value[0]] = value[1]
             case "late":
                 self.air.late_s = value
+                self.rest_s = max(self.rest_s, value + 10)
             case "old":
                 self.air.old_s = value
             case "second engine":
@@ -281,11 +283,14 @@ class Story:
         self.make_well()
         async with self.world.runner() as control:
             control.watch(self.judge)
-            await anyio.sleep(70)  # what was late has come, what was frozen is awake
+            await anyio.sleep(self.rest_s)  # what was late has come, what was frozen is awake
             for node in [each for each in self.air.nodes if not each.robot.gone][:-1]:
                 self.air.kill(node)
             control.stop_all(BEN)
-            await anyio.sleep(60)
+            with anyio.move_on_after(60):
+                while control.open:  # noqa: ASYNC110 - they end by many ways
+                    await anyio.sleep(0.5)
+            await anyio.sleep(2)
             moving = self.moving()
             for run in control.open:  # it does not obey, or is blocked for ever
                 if run not in moving and not self.blocked():

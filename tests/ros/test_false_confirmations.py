@@ -1,0 +1,239 @@
+"""Nothing is called stopped or finished that moves, over real rclpy.
+
+The same kind of histories as in virtual time, in real seconds and therefore shorter: the real runner,
+the real link and stand-in robots on threads, with a second engine on the same path, reboots, freezes,
+starts, stops and feedback of strangers, and actions that begin after the stop has passed them by.
+`TEST_ROS_HISTORIES` is how many (default 3); several go on at once, each on a domain of its own.
+"""
+
+import asyncio
+import json
+import os
+import random
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from typing import Any
+
+import anyio
+import pytest
+
+pytest.importorskip(
+    "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
+)
+
+import rclpy
+from rclpy.context import Context
+from temoto_msgs.msg import UmrfGraphFeedback, UmrfGraphStart, UmrfGraphStop
+
+from action_assistant.errors import Refused
+from action_assistant.runner.control import Control
+from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.events import Override
+from action_assistant.runner.links import ros2_reach
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.robots import Robots
+from action_assistant.runner.runs import ENDED
+from action_assistant.runner.standin import StandInNode
+from action_assistant.runner.standin_wire import Quirks
+from action_assistant.umrf import codec
+from ros.robots import robot
+from runner.world import ANN, BEN, MemoryLedger, at_once, order, sequence, two_ends
+
+HISTORIES = int(os.environ.get("TEST_ROS_HISTORIES", "3"))
+FIRST = int(os.environ.get("TEST_ROS_HISTORIES_FROM", "0"))
+AT_ONCE = int(os.environ.get("TEST_ROS_AT_ONCE", "2"))
+GRAPHS = {"one": sequence("one"), "two": two_ends("two")}
+SCRIPTS: list[dict[str, Any]] = [
+    {"*": [{"after_s": 0.3}]},
+    {"*": [{"never": True}]},
+    {"Work_0": [{"after_s": 0.4}], "*": [{"after_s": 5}]},
+    {"Work_0": [{"after_s": 0.5}], "*": [{"never": True, "stop_s": 1.0}]},
+]
+STILL = ENDED - {"lost", "refused"}
+KNOWINGLY = Override(codes=("proof", "quiet", "others"), reason="it is a test")
+
+
+def wall() -> int:
+    """Microseconds UTC."""
+    return time.time_ns() // 1000
+
+
+class Stranger:
+    """Somebody else on the domain, who publishes what he likes."""
+
+    def __init__(self, domain: int) -> None:
+        self._context = Context()
+        self._context.init(domain_id=domain, initialize_logging=False)
+        self._node = rclpy.create_node("stranger", context=self._context, enable_rosout=False)
+        self._start = self._node.create_publisher(UmrfGraphStart, "/umrf_graph_start", 10)
+        self._stop = self._node.create_publisher(UmrfGraphStop, "/umrf_graph_stop", 10)
+        self._feedback = self._node.create_publisher(UmrfGraphFeedback, "/umrf_graph_feedback", 10)
+
+    def start(self, name: str) -> None:
+        """A start of a graph of that name."""
+        text = codec.write(GRAPHS[name])
+        message = UmrfGraphStart(umrf_graph_name=name, umrf_graph_json=text, targets=["David"])
+        self._start.publish(message)
+
+    def stop(self, name: str) -> None:
+        """A stop."""
+        self._stop.publish(UmrfGraphStop(umrf_graph_name=name, targets=["David"]))
+
+    def make_up(self, umrf: str) -> None:
+        """Feedback that says that a run of ours has ended."""
+        graph = json.loads(umrf) | {"graph_state": "STOPPED"}
+        graph["actions"] = [each | {"state": "FINISHED"} for each in graph["actions"]]
+        self._feedback.publish(UmrfGraphFeedback(actor="David", history=[json.dumps(graph)]))
+
+    def leave(self) -> None:
+        """Go."""
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+
+class Story:
+    """One history."""
+
+    def __init__(self, seed: int, domain: int) -> None:
+        self.chance = random.Random(seed)
+        self.domain = domain
+        self.script = self.chance.choice(SCRIPTS)
+        self.quirks = Quirks(loading_ms=self.chance.choice([1.0, 60.0, 400.0]))
+        self.robots: list[tuple[StandInNode, ExitStack]] = []
+        self.false: list[str] = []
+        self.judged: set[str] = set()
+        self.still: set[str] = set()
+        self.ledger = MemoryLedger()
+        self.texts: list[str] = []
+
+    def robot(self) -> None:
+        """An engine comes up."""
+        stack = ExitStack()
+        node = stack.enter_context(
+            robot(self.domain, self.script, quirks=self.quirks, seed=self.chance.getrandbits(32))
+        )
+        self.robots.append((node, stack))
+
+    async def live(self) -> None:
+        """All steps; then somebody stops everything."""
+        await anyio.to_thread.run_sync(self.robot)
+        reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(self.domain)})
+        assert not isinstance(reach, str), reach
+        stranger = await anyio.to_thread.run_sync(Stranger, self.domain)
+        try:
+            robots = Robots(reach=reach)
+            async with Control.opened(self.ledger, robots, wall=wall, aside=at_once) as control:
+                control.watch(self.judge)
+                await robots.register(Registration(name="David", domain=self.domain), ANN)
+                with anyio.fail_after(20):
+                    while robots.robot("David").state != "answering":  # noqa: ASYNC110
+                        await anyio.sleep(0.05)
+                async with anyio.create_task_group() as tasks:
+                    tasks.start_soon(self.watch_the_truth)
+                    for _ in range(self.chance.randint(4, 9)):
+                        await self.step(control, stranger)
+                    control.stop_all(BEN)
+                    await anyio.sleep(3)
+                    tasks.cancel_scope.cancel()
+        finally:
+            with anyio.CancelScope(shield=True):
+                await reach.aclose()
+                for _, stack in self.robots:
+                    await anyio.to_thread.run_sync(stack.close)
+                await anyio.to_thread.run_sync(stranger.leave)
+
+    async def step(self, control: Control, stranger: Stranger) -> None:
+        """Something happens."""
+        name = self.chance.choice(list(GRAPHS))
+        what = self.chance.choices(
+            ["start", "stop", "wait", "stranger", "made up", "second", "reboot", "quit"],
+            [5, 3, 3, 1, 1, 0.4, 0.4, 0.3],
+        )[0]
+        match what:
+            case "start":
+                with suppress(Refused):
+                    await control.start(
+                        order(GRAPHS[name], engine="David", override=KNOWINGLY), ANN
+                    )
+            case "stop":
+                for run in tuple(control.open)[:1]:
+                    await control.stop(run, BEN)
+            case "stranger":
+                self.chance.choice([stranger.start, stranger.stop])(name)
+            case "made up":
+                for opened in tuple(control.open.values())[:1]:
+                    requested = self.ledger.told(opened.run.id)[0]
+                    stranger.make_up(getattr(requested, "umrf", "{}"))
+            case "second" if len(self.robots) < 2:
+                await anyio.to_thread.run_sync(self.robot)
+            case "reboot" if self.robots:
+                node, stack = self.robots.pop(0)
+                node.robot.kill()
+                await anyio.to_thread.run_sync(stack.close)
+                await anyio.to_thread.run_sync(self.robot)
+            case "quit" if self.robots:
+                node, _ = self.robots[0]
+                node.robot.quit(node.robot._now)
+        await anyio.sleep(self.chance.choice([0.02, 0.1, 0.4, 1.2]))
+
+    def moving(self) -> set[str]:
+        """Runs of ours that really move."""
+        found: set[str] = set()
+        for node, _ in self.robots:
+            for graph in node.robot.moving:
+                plan = node.robot._view.plans.get(graph.partition("__")[0])
+                for mark in list(plan.attributes.values())[:1] if plan is not None else []:
+                    found.add(mark.get("action_assistant", {}).get("run", ""))
+        return found - {""}
+
+    def judge(self, opened: OpenRun) -> None:
+        """What is called still must not move."""
+        run = opened.run
+        if run.state in STILL and run.incarnation is not None and run.id not in self.judged:
+            self.judged.add(run.id)
+            self.still.add(run.id)
+            self.compare()
+
+    def compare(self) -> None:
+        for run in self.moving() & self.still:
+            self.still.discard(run)
+            self.false.append(f"{run} moves")
+
+    async def watch_the_truth(self) -> None:
+        while True:
+            await anyio.sleep(0.05)
+            self.compare()
+
+
+def lived(seed: int, domain: int, told: Callable[[Story], None]) -> None:
+    """One history, on a loop of its own."""
+    story = Story(seed, domain)
+    asyncio.run(story.live())
+    told(story)
+
+
+@pytest.mark.timeout(0 if HISTORIES > 10 else 180)
+def test_nothing_is_called_stopped_or_finished_that_moves(domains: list[int]) -> None:
+    stories: list[Story] = []
+    failures: list[str] = []
+    seeds = iter(range(FIRST, FIRST + HISTORIES))
+
+    def worker(domain: int) -> None:
+        for seed in seeds:
+            try:
+                lived(seed, domain, stories.append)
+            except (Exception, ExceptionGroup) as error:  # noqa: BLE001 - of any kind
+                failures.append(f"seed {seed}: {error!r}")
+
+    threads = [threading.Thread(target=worker, args=[each]) for each in domains[:AT_ONCE]]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join()
+    assert failures == []
+    assert [each for story in stories for each in story.false] == []
+    assert len(stories) == HISTORIES
+    confirmed = sum(len(each.judged) for each in stories)
+    assert confirmed >= HISTORIES // 3, confirmed
