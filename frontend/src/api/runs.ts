@@ -95,6 +95,8 @@ export interface StartOrder {
   engines: readonly string[];
   request: string;
   override?: { codes: readonly string[]; reason: string };
+  /** What simulated actions do. */
+  script?: unknown;
 }
 
 export interface Started {
@@ -114,6 +116,7 @@ export async function startRun(order: StartOrder): Promise<Started> {
     ...(alone ? { engine } : { engines: order.engines }),
     request_id: order.request,
     ...(order.override === undefined ? {} : { override: order.override }),
+    ...(order.script === undefined ? {} : { script: order.script }),
   });
   const body = `${head.slice(0, -1)},"umrf":${order.umrf}}`;
   if (!alone) return ask(`${order.runner}/api/groups`, { method: "POST", body });

@@ -18,7 +18,14 @@ import { DropFiles } from "./drop-files";
 import { GraphScreen } from "./graph-screen";
 import { Lost } from "./lost";
 import { ReviewDialog } from "./review-dialog";
-import { HomeScreen, RobotsScreen, RunScreen, RunsScreen } from "./screens";
+import {
+  CompareScreen,
+  HomeScreen,
+  RobotsScreen,
+  RunScreen,
+  RunsScreen,
+  StatisticsScreen,
+} from "./screens";
 
 const client = new QueryClient({
   defaultOptions: {
@@ -52,6 +59,8 @@ export function App() {
                 <Route path="/graphs/:id">{({ id }) => <GraphScreen key={id} id={id} />}</Route>
                 <Route path="/robots" component={RobotsScreen} />
                 <Route path="/runs" component={RunsScreen} />
+                <Route path="/runs/compare" component={CompareScreen} />
+                <Route path="/runs/statistics" component={StatisticsScreen} />
                 <Route path="/runs/:id">{({ id }) => <RunScreen key={id} id={id} />}</Route>
                 <Route component={Lost} />
               </Switch>

@@ -1,6 +1,8 @@
 /** The screens around the features: home, runs, one run. */
+import { ComparePage } from "../history/compare-page";
 import { RunPage } from "../history/run-page";
 import { RunsPage } from "../history/runs-page";
+import { StatisticsPage } from "../history/statistics-page";
 import { Home } from "../library/home";
 import { RobotsPage } from "../robots/robots-page";
 import { useNewGraphs } from "./files";
@@ -47,6 +49,24 @@ export function RobotsScreen() {
     <Frame>
       <Bar at="robots" crumbs={[{ label: "Graphs", to: "/" }, { label: "Robots" }]} />
       <RobotsPage onImport={onImport} />
+    </Frame>
+  );
+}
+
+export function CompareScreen() {
+  useTitle("Compare runs");
+  return (
+    <Frame>
+      <ComparePage bar={(parts) => <Bar at="runs" {...parts} />} />
+    </Frame>
+  );
+}
+
+export function StatisticsScreen() {
+  useTitle("Statistics");
+  return (
+    <Frame>
+      <StatisticsPage bar={(parts) => <Bar at="runs" {...parts} />} />
     </Frame>
   );
 }

@@ -1,11 +1,15 @@
 /** What happened in a run, in order, in sentences. */
 
+import { TextInput } from "@mantine/core";
+import { useMemo, useState } from "react";
 import { authorName } from "../api/graphs";
 import { begun, ended, endWords, type Tone } from "../api/progress";
+import type { FilmMark } from "../api/review";
 import type { Run } from "../api/runs";
 import { toneColor } from "../ui/state-word";
 import { clock, instant } from "../ui/when";
 import style from "./events.module.css";
+import { wordsOf } from "./film-signs";
 
 interface Happening {
   at: number;
@@ -19,8 +23,22 @@ function spaced(fullName: string): string {
   return fullName.replace(/_(\d+)$/, " $1");
 }
 
+/** Marks that say what neither the visits nor the run's own fields say. */
+const TOLD: ReadonlySet<string> = new Set([
+  "run.stop_requested.v1",
+  "run.pause_requested.v1",
+  "run.resume_requested.v1",
+  "run.proof.v1",
+  "run.silent.v1",
+  "run.answered.v1",
+]);
+
 /** Everything that the run tells, oldest first. */
-export function happenings(run: Run, version: string): Happening[] {
+export function happenings(
+  run: Run,
+  version: string,
+  marks: readonly FilmMark[] = [],
+): Happening[] {
   const all: Happening[] = [];
   const start = instant(run.started_at);
   if (start !== null) {
@@ -58,6 +76,11 @@ export function happenings(run: Run, version: string): Happening[] {
     const at = instant(line.at);
     if (at !== null) all.push({ at, tone: "idle", name: "engine", aid: null, text: line.text });
   }
+  for (const mark of marks) {
+    const at = instant(mark.at);
+    if (at === null || !TOLD.has(mark.kind)) continue;
+    all.push({ at, tone: "stopped", name: null, aid: null, text: wordsOf(mark) });
+  }
   for (const alarm of run.alarms) {
     const at = instant(alarm.at);
     if (at !== null) all.push({ at, tone: "error", name: null, aid: null, text: alarm.text });
@@ -79,34 +102,90 @@ interface Props {
   version: string;
   selected: string | null;
   onPick: (aid: string | null) => void;
+  marks: readonly FilmMark[];
+  /** Where the replay stands, ms; null at the end. */
+  at: number | null;
+  onSeek: (at: number) => void;
 }
 
-export function Events({ run, version, selected, onPick }: Props) {
-  const start = instant(run.started_at) ?? 0;
+const SHOWN = 400;
+
+function Line(
+  props: { event: Happening; start: number; first: boolean } & Omit<
+    Props,
+    "run" | "version" | "marks"
+  >,
+) {
+  const { event, start, first, selected, onPick, at, onSeek } = props;
   return (
-    <ol className={style.events}>
-      {happenings(run, version).map((event, i) => (
-        <li
-          // biome-ignore lint/suspicious/noArrayIndexKey: the list is only ever appended to
-          key={i}
-          className={style.event}
-          data-selected={(event.aid !== null && event.aid === selected) || undefined}
-        >
-          <time className={style.time} dateTime={new Date(event.at).toISOString()}>
-            {i === 0 ? clock(event.at) : `+${((event.at - start) / 1000).toFixed(1)}`}
-          </time>
-          <span>
-            {event.name !== null && (
-              <button type="button" className={style.name} onClick={() => onPick(event.aid)}>
-                {event.name}
-              </button>
-            )}{" "}
-            <span style={event.tone === "idle" ? {} : { color: toneColor[event.tone] }}>
-              {event.text}
-            </span>
-          </span>
-        </li>
-      ))}
-    </ol>
+    <li
+      className={style.event}
+      data-selected={(event.aid !== null && event.aid === selected) || undefined}
+      data-later={(at !== null && event.at > at) || undefined}
+    >
+      <button
+        type="button"
+        className={style.time}
+        onClick={() => onSeek(event.at)}
+        title="Show this moment"
+      >
+        <time dateTime={new Date(event.at).toISOString()}>
+          {first ? clock(event.at) : `+${((event.at - start) / 1000).toFixed(1)}`}
+        </time>
+      </button>
+      <span>
+        {event.name !== null && (
+          <button type="button" className={style.name} onClick={() => onPick(event.aid)}>
+            {event.name}
+          </button>
+        )}{" "}
+        <span style={event.tone === "idle" ? {} : { color: toneColor[event.tone] }}>
+          {event.text}
+        </span>
+      </span>
+    </li>
+  );
+}
+
+export function Events(props: Props) {
+  const { run, version, marks, selected } = props;
+  const [search, setSearch] = useState("");
+  const start = instant(run.started_at) ?? 0;
+  const all = useMemo(() => happenings(run, version, marks), [run, version, marks]);
+  const wanted = search.trim().toLowerCase();
+  const found = all.filter(
+    (event) => wanted === "" || `${event.name ?? ""} ${event.text}`.toLowerCase().includes(wanted),
+  );
+  const shown = found.slice(-SHOWN);
+  return (
+    <>
+      <TextInput
+        className={style.search ?? ""}
+        size="xs"
+        aria-label="Search events"
+        placeholder="Search events"
+        value={search}
+        onChange={(event) => setSearch(event.currentTarget.value)}
+      />
+      {found.length > shown.length && (
+        <p className={style.more}>{found.length - shown.length} earlier ones are not listed.</p>
+      )}
+      {found.length === 0 && <p className={style.more}>Nothing of this was said or seen.</p>}
+      <ol className={style.events}>
+        {shown.map((event, i) => (
+          <Line
+            // biome-ignore lint/suspicious/noArrayIndexKey: the list is only ever appended to
+            key={i}
+            event={event}
+            start={start}
+            first={event === all[0]}
+            selected={selected}
+            onPick={props.onPick}
+            at={props.at}
+            onSeek={props.onSeek}
+          />
+        ))}
+      </ol>
+    </>
   );
 }

@@ -2,11 +2,12 @@
 import { Button, Skeleton, Tabs } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
-import { type ReactNode, useMemo, useState } from "react";
-import { Link } from "wouter";
+import { type ReactNode, useEffect, useMemo, useState } from "react";
+import { Link, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
 import { sentence } from "../api/http";
-import { endWords, progressByAid, runWord } from "../api/progress";
+import { endWords, type Progress, progressByAid, runWord } from "../api/progress";
+import { type FilmMark, useFilm } from "../api/review";
 import { type Run, useRun } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { fromUmrf } from "../ui/canvas/from-umrf";
@@ -19,7 +20,12 @@ import type { Crumb } from "../ui/top-bar";
 import { clock, instant, useNow } from "../ui/when";
 import { Events } from "./events";
 import { Facts } from "./facts";
+import { gapsOf, signsOf } from "./film-signs";
+import { Notes, Pin } from "./notes";
+import { PlayerControls } from "./player";
+import { RunMenu } from "./run-menu";
 import style from "./run-page.module.css";
+import { type Replay, useReplay } from "./use-replay";
 import { useVersionLabel } from "./version-label";
 
 export interface BarParts {
@@ -28,46 +34,105 @@ export interface BarParts {
   actions?: ReactNode;
 }
 
+const NO_MARKS: readonly FilmMark[] = [];
+
 interface Props {
   id: string;
   bar: (parts: BarParts) => ReactNode;
 }
 
-function Shown({ run, bar }: { run: Run; bar: Props["bar"] }) {
-  const { now: live } = useLive();
-  const [selected, setSelected] = useState<string | null>(null);
-  const graph = useMemo(() => fromUmrf(run.umrf), [run.umrf]);
-  const goes = run.ended_at === null;
+/** Progress as it was at a moment: what went on then had gone on for so long. */
+function progressAt(run: Run, unsure: boolean, at: number | null): Map<string, Progress> {
+  const found = progressByAid(run, unsure);
+  if (at === null) return found;
+  for (const [aid, progress] of found) {
+    if (progress.since === null) continue;
+    found.set(aid, { ...progress, since: null, took: Math.max(0, at - progress.since) });
+  }
+  return found;
+}
+
+/** Where a link points: a moment, in ms after the start, and an action. */
+function usePlace(run: Run) {
+  const query = new URLSearchParams(useSearch());
+  const t = query.get("t");
+  const start = instant(run.started_at);
+  const from =
+    t !== null && start !== null && Number.isFinite(Number(t)) ? start + Number(t) : null;
+  return { from, action: query.get("action") };
+}
+
+/** Keeps the address in step, so that it can be sent to somebody. */
+function useAddress(id: string, replay: Replay, selected: string | null): void {
+  const { at, start, playing } = replay;
+  useEffect(() => {
+    const query = new URLSearchParams();
+    if (at !== null) query.set("t", String(Math.round(at - start)));
+    if (selected !== null) query.set("action", selected);
+    const search = query.size > 0 ? `?${query}` : "";
+    if (playing) return; // browsers refuse an address that changes with every frame
+    window.history.replaceState(window.history.state, "", `/runs/${id}${search}`);
+  }, [id, at, start, playing, selected]);
+}
+
+function Shown({ run: newest, bar }: { run: Run; bar: Props["bar"] }) {
+  const { now: live, runner } = useLive();
+  const place = usePlace(newest);
+  const [selected, setSelected] = useState<string | null>(place.action);
+  const graph = useMemo(() => fromUmrf(newest.umrf), [newest.umrf]);
+  const goes = newest.ended_at === null;
   const unsure = goes && live.link === "down";
   const present = useNow(250, goes);
-  const progress = useMemo(() => progressByAid(run, unsure), [run, unsure]);
-  const lanes = useMemo(() => lanesOf(run, graph), [run, graph]);
+  const until = unsure ? live.since : (instant(newest.ended_at) ?? present);
+  const replay = useReplay(runner, newest, until, place.from);
+  const { run } = replay;
+  const past = replay.at !== null;
+  useAddress(newest.id, replay, selected);
+  const progress = useMemo(
+    () => progressAt(run, unsure && !past, replay.at),
+    [run, unsure, past, replay.at],
+  );
+  const lanes = useMemo(() => lanesOf(newest, graph), [newest, graph]);
   const picked = useMemo(() => new Set(selected === null ? [] : [selected]), [selected]);
-  const label = useVersionLabel(run);
+  const film = useFilm(runner, newest.id, 0, true).data;
+  const signs = useMemo(() => signsOf(film), [film]);
+  const gaps = useMemo(() => gapsOf(film, newest, until), [film, newest, until]);
+  const label = useVersionLabel(newest);
   const { tone, word } = runWord(run);
   const since = `unknown since ${clock(live.since)}`;
+  const seen = unsure && !past;
   return (
     <>
       {bar({
         crumbs: [
           { label: "Runs", to: "/runs" },
-          { label: run.graph_name, ...(run.graph === null ? {} : { to: `/graphs/${run.graph}` }) },
-          { label: `Run ${run.number}` },
+          {
+            label: newest.graph_name,
+            ...(newest.graph === null ? {} : { to: `/graphs/${newest.graph}` }),
+          },
+          { label: `Run ${newest.number}` },
         ],
         status: (
           <>
             <StateWord
               pill
-              tone={unsure ? "unknown" : tone}
-              word={unsure ? since : goes ? word : endWords(run)}
+              tone={seen ? "unknown" : tone}
+              word={seen ? since : run.ended_at === null ? word : endWords(run)}
             />
-            {run.simulated && <span className={style.simulated}>simulated</span>}
+            {past && <span className={style.simulated}>as it was then</span>}
+            {newest.simulated && <span className={style.simulated}>simulated</span>}
           </>
         ),
-        actions: run.graph !== null && (
-          <Button component={Link} to={`/graphs/${run.graph}`} className={style.back ?? ""}>
-            Open graph
-          </Button>
+        actions: (
+          <>
+            <Pin runner={runner} run={newest.id} />
+            <RunMenu runner={runner} run={newest} />
+            {newest.graph !== null && (
+              <Button component={Link} to={`/graphs/${newest.graph}`} className={style.back ?? ""}>
+                Open graph
+              </Button>
+            )}
+          </>
         ),
       })}
       <main className={style.page}>
@@ -78,18 +143,28 @@ function Shown({ run, bar }: { run: Run; bar: Props["bar"] }) {
               progress={progress}
               selected={picked}
               onSelect={setSelected}
-              label={`Version ${label} of ${run.graph_name}`}
+              label={`Version ${label} of ${newest.graph_name}`}
             />
           </ReactFlowProvider>
         </section>
         <section className={style.strip} aria-label="Timeline">
+          <PlayerControls replay={replay} goes={goes} />
+          {replay.failed !== null && (
+            <p className={style.failed} role="alert">
+              The replay cannot be loaded: {sentence(replay.failed)}
+            </p>
+          )}
           <Timeline
-            run={run}
+            run={newest}
             lanes={lanes}
-            until={unsure ? live.since : (instant(run.ended_at) ?? present)}
+            until={until}
             unsure={unsure}
             selected={selected}
             onPick={setSelected}
+            cursor={replay.at}
+            onSeek={replay.seek}
+            signs={signs}
+            gaps={gaps}
           />
         </section>
         <aside className={style.side} aria-label="About the run">
@@ -99,10 +174,19 @@ function Shown({ run, bar }: { run: Run; bar: Props["bar"] }) {
               <Tabs.Tab value="facts">Facts</Tabs.Tab>
             </Tabs.List>
             <Tabs.Panel value="events" className={style.panel ?? ""}>
-              <Events run={run} version={label} selected={selected} onPick={setSelected} />
+              <Events
+                run={newest}
+                version={label}
+                selected={selected}
+                onPick={setSelected}
+                marks={film?.marks ?? NO_MARKS}
+                at={replay.at}
+                onSeek={replay.seek}
+              />
             </Tabs.Panel>
             <Tabs.Panel value="facts" className={style.panel ?? ""}>
-              <Facts run={run} version={label} by={authorName(run.author)} />
+              <Notes runner={runner} run={newest.id} />
+              <Facts run={newest} version={label} by={authorName(newest.author)} />
             </Tabs.Panel>
           </Tabs>
         </aside>

@@ -1,50 +1,60 @@
 /** What ran: newest first, with who, when, how long and how it ended. */
-import { SegmentedControl, Skeleton, TextInput } from "@mantine/core";
-import { IconAlertTriangle, IconHistory, IconSearch } from "@tabler/icons-react";
-import { useMemo, useState } from "react";
-import { Link, useLocation } from "wouter";
+import { Button, Checkbox, Skeleton } from "@mantine/core";
+import {
+  IconAlertTriangle,
+  IconArrowsDiff,
+  IconChartBar,
+  IconHistory,
+  IconPinFilled,
+  IconSearch,
+} from "@tabler/icons-react";
+import { useInfiniteQuery } from "@tanstack/react-query";
+import { useCallback, useMemo, useState } from "react";
+import { Link, useLocation, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
 import { sentence } from "../api/http";
 import { endWords, runWord } from "../api/progress";
-import { hasEnded, type Run, useRuns } from "../api/runs";
+import { filterOf, type ListedRun, listRuns, queryOf, type RunFilter } from "../api/review";
+import { hasEnded, type Run } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { Empty } from "../ui/empty";
 import { StateWord } from "../ui/state-word";
 import { clock, day, duration, instant, stopwatch, useNow } from "../ui/when";
+import { Filters } from "./filters";
 import style from "./runs-page.module.css";
 import { useVersionLabel } from "./version-label";
 
-const FILTERS = [
-  { value: "all", label: "All" },
-  { value: "open", label: "Running" },
-  { value: "good", label: "Finished" },
-  { value: "bad", label: "Failed" },
-  { value: "stopped", label: "Stopped" },
-];
+const PAGE = 100;
 
-export function passes(run: Run, filter: string): boolean {
-  switch (filter) {
-    case "open":
-      return !hasEnded(run);
-    case "good":
-      return run.state === "finished" && run.result !== "on_error";
-    case "bad":
-      return ["error", "refused", "lost"].includes(run.state) || run.result === "on_error";
-    case "stopped":
-      return run.state === "stopped" || run.state === "halted";
-    default:
-      return true;
-  }
+/** The stored list with what the live socket knows better, in the order in which it was asked for. */
+export function overlaid(
+  stored: readonly ListedRun[],
+  live: ReadonlyMap<string, Run>,
+): ListedRun[] {
+  return stored.map((run) => {
+    const now = live.get(run.id);
+    return now === undefined ? run : { ...run, ...now };
+  });
 }
 
-/** The stored list, overlaid with what the live socket knows better. */
-export function merged(stored: readonly Run[], live: ReadonlyMap<string, Run>): Run[] {
-  const all = new Map(stored.map((run) => [run.id, run]));
-  for (const [id, run] of live) all.set(id, run);
-  return [...all.values()].sort((a, b) => b.number - a.number);
+/** Runs that began after the list was asked for. They wait behind a pill: nothing moves by itself. */
+export function newcomers(
+  stored: readonly ListedRun[],
+  live: ReadonlyMap<string, Run>,
+  newest: number,
+): number {
+  const known = new Set(stored.map((run) => run.id));
+  return [...live.values()].filter((run) => run.number > newest && !known.has(run.id)).length;
 }
 
-function Row({ run, now }: { run: Run; now: number }) {
+interface RowProps {
+  run: ListedRun;
+  now: number;
+  chosen: boolean;
+  onChoose: (chosen: boolean) => void;
+}
+
+function Row({ run, now, chosen, onChoose }: RowProps) {
   const [, go] = useLocation();
   const label = useVersionLabel(run);
   const { tone, word } = runWord(run);
@@ -54,6 +64,15 @@ function Row({ run, now }: { run: Run; now: number }) {
   const to = `/runs/${run.id}`;
   return (
     <tr className={style.row} onClick={() => go(to)}>
+      {/* biome-ignore lint/a11y/useKeyWithClickEvents: keeps a near miss of the box from leaving */}
+      <td className={style.choose} onClick={(event) => event.stopPropagation()}>
+        <Checkbox
+          size="xs"
+          aria-label={`Choose run ${run.number} to compare`}
+          checked={chosen}
+          onChange={(event) => onChoose(event.currentTarget.checked)}
+        />
+      </td>
       <td className={style.state}>
         <StateWord tone={tone} word={run.ended_at === null ? word : endWords(run)} />
       </td>
@@ -61,6 +80,12 @@ function Row({ run, now }: { run: Run; now: number }) {
         <Link to={to} className={style.link} onClick={(event) => event.stopPropagation()}>
           <span className={style.number}>Run {run.number}</span> {run.graph_name}
         </Link>
+        {run.pinned && <IconPinFilled size={12} aria-label="pinned" className={style.pin} />}
+        {run.labels?.map((each) => (
+          <span key={each} className={style.label}>
+            {each}
+          </span>
+        ))}
       </td>
       <td>
         <span className={style.version}>{label}</span>
@@ -73,7 +98,13 @@ function Row({ run, now }: { run: Run; now: number }) {
   );
 }
 
-function Rows({ runs }: { runs: readonly Run[] }) {
+interface RowsProps {
+  runs: readonly ListedRun[];
+  chosen: readonly string[];
+  onChoose: (run: string, chosen: boolean) => void;
+}
+
+function Rows({ runs, chosen, onChoose }: RowsProps) {
   const going = runs.some((run) => !hasEnded(run));
   const now = useNow(going ? 1000 : 30_000);
   return (
@@ -81,6 +112,9 @@ function Rows({ runs }: { runs: readonly Run[] }) {
       <table className={style.table}>
         <thead>
           <tr>
+            <th>
+              <span className={style.hidden}>Compare</span>
+            </th>
             <th>State</th>
             <th>Run</th>
             <th>Version</th>
@@ -92,7 +126,13 @@ function Rows({ runs }: { runs: readonly Run[] }) {
         </thead>
         <tbody>
           {runs.map((run) => (
-            <Row key={run.id} run={run} now={now} />
+            <Row
+              key={run.id}
+              run={run}
+              now={now}
+              chosen={chosen.includes(run.id)}
+              onChoose={(on) => onChoose(run.id, on)}
+            />
           ))}
         </tbody>
       </table>
@@ -100,60 +140,123 @@ function Rows({ runs }: { runs: readonly Run[] }) {
   );
 }
 
+/** Pages of the list. They are asked for anew only when somebody wants to. */
+function useListed(runner: string | undefined, filter: RunFilter) {
+  return useInfiniteQuery({
+    queryKey: ["runs", "list", "page", queryOf(filter).toString()],
+    queryFn: ({ pageParam, signal }) => listRuns(runner ?? "", filter, pageParam, PAGE, signal),
+    initialPageParam: null as string | null,
+    getNextPageParam: (last) => (last.length < PAGE ? undefined : last.at(-1)?.id),
+    enabled: runner !== undefined,
+    refetchOnWindowFocus: false,
+  });
+}
+
+function Waiting() {
+  return (
+    <div aria-hidden>
+      {[0, 1, 2, 3, 4].map((i) => (
+        <Skeleton key={i} height={40} mb={6} />
+      ))}
+    </div>
+  );
+}
+
 export function RunsPage() {
   const { runner, now } = useLive();
-  const stored = useRuns(runner);
-  const [search, setSearch] = useState("");
-  const [filter, setFilter] = useState("all");
-  const runs = useMemo(() => merged(stored.data ?? [], now.runs), [stored.data, now.runs]);
-  const shown = runs.filter(
-    (run) =>
-      passes(run, filter) &&
-      `${run.number} ${run.graph_name} ${authorName(run.author)}`
-        .toLowerCase()
-        .includes(search.trim().toLowerCase()),
+  const [, go] = useLocation();
+  const search = useSearch();
+  const filter = useMemo(() => filterOf(new URLSearchParams(search)), [search]);
+  const setFilter = useCallback(
+    (next: RunFilter) =>
+      go(`/runs${queryOf(next).size ? `?${queryOf(next)}` : ""}`, { replace: true }),
+    [go],
   );
+  const listed = useListed(runner, filter);
+  const [chosen, setChosen] = useState<readonly string[]>([]);
+  const stored = useMemo(() => listed.data?.pages.flat() ?? [], [listed.data]);
+  const runs = useMemo(() => overlaid(stored, now.runs), [stored, now.runs]);
+  const newest = stored[0]?.number ?? 0;
+  const waiting = listed.isSuccess ? newcomers(stored, now.runs, newest) : 0;
+  const filtered = queryOf(filter).size > 0;
+  const engines = useMemo(
+    () =>
+      [...new Set(["simulator", filter.robot, ...stored.map((run) => run.engine)])].filter(Boolean),
+    [stored, filter.robot],
+  );
+  const choose = (run: string, on: boolean) =>
+    setChosen(on ? [...chosen.slice(-1), run] : chosen.filter((each) => each !== run));
+  const [b = "", a = ""] = [...chosen].sort((x, y) => numberOf(runs, y) - numberOf(runs, x));
   return (
     <main className={style.page}>
       <div className={style.inner}>
         <div className={style.head}>
           <h2 className={style.title}>Runs</h2>
-          <TextInput
-            aria-label="Search runs"
-            placeholder="Graph, person or number"
-            leftSection={<IconSearch size={15} aria-hidden />}
-            value={search}
-            onChange={(event) => setSearch(event.currentTarget.value)}
-            className={style.search ?? ""}
-          />
-          <SegmentedControl size="xs" data={FILTERS} value={filter} onChange={setFilter} />
+          <Filters runner={runner} filter={filter} onChange={setFilter} engines={engines} />
         </div>
-        {stored.isPending && (
-          <div aria-hidden>
-            {[0, 1, 2, 3, 4].map((i) => (
-              <Skeleton key={i} height={40} mb={6} />
-            ))}
-          </div>
-        )}
-        {stored.isError && runs.length === 0 && (
+        <div className={style.deeds} aria-live="polite">
+          {waiting > 0 && (
+            <Button size="compact-sm" variant="light" onClick={() => void listed.refetch()}>
+              {waiting === 1 ? "1 new run" : `${waiting} new runs`}
+            </Button>
+          )}
+          {chosen.length > 0 && (
+            <Button
+              size="compact-sm"
+              variant="default"
+              leftSection={<IconArrowsDiff size={14} aria-hidden />}
+              onClick={() =>
+                go(`/runs/compare?${new URLSearchParams(a === "" ? { b } : { a, b })}`)
+              }
+            >
+              {chosen.length === 2 ? "Compare the two" : "Compare with …"}
+            </Button>
+          )}
+          {filter.graph !== "" && (
+            <Button
+              component={Link}
+              size="compact-sm"
+              variant="default"
+              to={`/runs/statistics?graph=${encodeURIComponent(filter.graph)}`}
+              leftSection={<IconChartBar size={14} aria-hidden />}
+            >
+              Statistics
+            </Button>
+          )}
+        </div>
+        {listed.isPending && <Waiting />}
+        {listed.isError && runs.length === 0 && (
           <Empty icon={<IconAlertTriangle size={22} />} title="The runs cannot be read">
-            {sentence(stored.error)} What was recorded is safe; it shows again when the runner
+            {sentence(listed.error)} What was recorded is safe; it shows again when the runner
             answers.
           </Empty>
         )}
-        {stored.isSuccess && runs.length === 0 && (
+        {listed.isSuccess && runs.length === 0 && !filtered && waiting === 0 && (
           <Empty icon={<IconHistory size={22} />} title="Nothing ran yet">
             Open a graph and hold <b>Start</b>. Every run is kept here, with its exact version and
             what each action did.
           </Empty>
         )}
-        {shown.length > 0 && <Rows runs={shown} />}
-        {runs.length > 0 && shown.length === 0 && (
+        {listed.isSuccess && runs.length === 0 && filtered && (
           <Empty icon={<IconSearch size={22} />} title="No run fits">
-            {runs.length} others do not match this search and filter.
+            Nothing that was recorded matches this search and filter.
           </Empty>
+        )}
+        {runs.length > 0 && <Rows runs={runs} chosen={chosen} onChoose={choose} />}
+        {listed.hasNextPage && (
+          <Button
+            variant="default"
+            loading={listed.isFetchingNextPage}
+            onClick={() => void listed.fetchNextPage()}
+          >
+            Show older runs
+          </Button>
         )}
       </div>
     </main>
   );
+}
+
+function numberOf(runs: readonly ListedRun[], id: string): number {
+  return runs.find((run) => run.id === id)?.number ?? 0;
 }

@@ -1,4 +1,5 @@
 /** Lanes of a run over time: one for each action, with what is not known left hatched. */
+import type { PointerEvent } from "react";
 import { begun, ended, progressOf, type Tone } from "../api/progress";
 import type { Run, Visit } from "../api/runs";
 import type { Lane } from "./lanes";
@@ -15,6 +16,25 @@ interface Props {
   unsure: boolean;
   selected?: string | null;
   onPick?: (aid: string) => void;
+  /** Where a replay stands, ms; null at the live edge. */
+  cursor?: number | null;
+  onSeek?: (at: number) => void;
+  signs?: readonly TimeSign[];
+  gaps?: readonly TimeGap[];
+}
+
+/** A moment worth seeing on the axis: a stop, a pause, a proof, an alarm. */
+export interface TimeSign {
+  at: number;
+  tone: Tone;
+  text: string;
+}
+
+/** A time of which nothing is known, ms. */
+export interface TimeGap {
+  from: number;
+  until: number;
+  text: string;
 }
 
 interface Bar {
@@ -58,16 +78,71 @@ function Ticks({ span }: { span: number }) {
   );
 }
 
-export function Timeline({ run, lanes, until, unsure, selected = null, onPick }: Props) {
+/** Everything that stands across the lanes: gaps, signs and the cursor. */
+function Across(props: {
+  share: (at: number) => number;
+  cursor: number | null;
+  signs: readonly TimeSign[];
+  gaps: readonly TimeGap[];
+}) {
+  const { share, cursor, signs, gaps } = props;
+  return (
+    <div className={style.across} aria-hidden>
+      {gaps.map((gap) => (
+        <i
+          key={gap.from}
+          className={style.gap}
+          title={gap.text}
+          style={{ left: `${share(gap.from)}%`, width: `${share(gap.until) - share(gap.from)}%` }}
+        />
+      ))}
+      {signs.map((sign) => (
+        <i
+          key={`${sign.at} ${sign.text}`}
+          className={style.sign}
+          title={sign.text}
+          style={{ left: `${share(sign.at)}%`, color: toneColor[sign.tone] }}
+        />
+      ))}
+      {cursor !== null && <i className={style.cursor} style={{ left: `${share(cursor)}%` }} />}
+    </div>
+  );
+}
+
+const NOTHING: readonly never[] = [];
+
+export function Timeline(props: Props) {
+  const { run, lanes, until, unsure, selected = null, onPick, onSeek, cursor = null } = props;
   const start = instant(run.started_at) ?? until;
   const over = run.ended_at !== null;
   const end = instant(run.ended_at) ?? until;
   const span = Math.max(1000, end - start);
+  const share = (at: number) => Math.min(100, Math.max(0, ((at - start) / span) * 100));
+  const seek = (event: PointerEvent<HTMLElement>) => {
+    if (onSeek === undefined || (event.type === "pointermove" && event.buttons === 0)) return;
+    if (event.type === "pointerdown") event.currentTarget.setPointerCapture(event.pointerId);
+    const { left, width } = event.currentTarget.getBoundingClientRect();
+    const part = Math.min(1, Math.max(0, (event.clientX - left) / width));
+    onSeek(start + part * span);
+  };
   return (
     <div className={style.timeline}>
       <div className={style.head}>
-        <Ticks span={span} />
+        <div
+          className={style.ruler}
+          data-seeks={onSeek !== undefined || undefined}
+          onPointerDown={seek}
+          onPointerMove={seek}
+        >
+          <Ticks span={span} />
+        </div>
       </div>
+      <Across
+        share={share}
+        cursor={cursor}
+        signs={props.signs ?? NOTHING}
+        gaps={props.gaps ?? NOTHING}
+      />
       <ul className={style.lanes} aria-label="Actions of the run over time">
         {lanes.map((lane) => {
           const action = run.actions?.[lane.name];

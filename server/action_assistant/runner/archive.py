@@ -13,9 +13,11 @@ from sqlalchemy import (
     Executable,
     Select,
     Text,
+    and_,
     cast,
     func,
     insert,
+    not_,
     or_,
     select,
     update,
@@ -39,6 +41,7 @@ from action_assistant.runner.registered import Registered, Removed
 from action_assistant.runner.review import about, again
 
 _OPEN: Final = "open"
+_BAD: Final = ("error", "refused", "lost", "halted")
 
 
 def fold(event: Event) -> Sequence[Executable]:
@@ -146,12 +149,14 @@ def by_request(request_id: str) -> Select[Any]:
 
 
 class Filter(msgspec.Struct, frozen=True, kw_only=True):
-    """Which runs are asked for; None asks for all. `graph` is an id or a name, `person` an id or a
+    """Which runs are asked for; None asks for all. `failed`: refused, lost, halted, or ended in
+    error; the other ones are over as well. `graph` is an id or a name, `person` an id or a
     part of a name, `text` a part of a name or of what was said, `before` a run's id."""
 
     graph: str | None = None
     engine: str | None = None
     states: tuple[str, ...] = ()
+    failed: bool | None = None
     version: str | None = None
     person: str | None = None
     text: str | None = None
@@ -183,6 +188,9 @@ def _conditions(wanted: Filter) -> Iterator[ColumnElement[bool]]:
         yield run.c.engine == wanted.engine
     if wanted.states:
         yield run.c.state.in_([*wanted.states, _OPEN])
+    if wanted.failed is not None:
+        bad = or_(run.c.state.in_(_BAD), func.coalesce(run.c.result, "") == "on_error")
+        yield and_(run.c.state != _OPEN, bad if wanted.failed else not_(bad))
     if wanted.version is not None:
         yield or_(run.c.version == wanted.version, run.c.digest.startswith(wanted.version))
     if wanted.person is not None:

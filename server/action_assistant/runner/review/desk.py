@@ -123,6 +123,10 @@ class Desk:
         """A page of the run's film. Raises NotFound."""
         return await film(self.reels, run_id, after=after)
 
+    async def umrf(self, run_id: str) -> bytes:
+        """The graph as it was sent. Raises NotFound."""
+        return (await self._control.history.umrf(run_id)).encode()
+
     async def mark(self, run_id: str, marks: about.Marks, author: Author) -> Marked:
         """Pin, note or label a run. Raises NotFound."""
         await self.known(run_id)

@@ -12,22 +12,8 @@ import msgspec
 
 from action_assistant.journal.events import Event
 from action_assistant.runner import shapes
-from action_assistant.runner.events import (
-    AlarmRaised,
-    Answered,
-    Ended,
-    Observed,
-    PauseRequested,
-    Proof,
-    Published,
-    Requested,
-    ResumeRequested,
-    RunEvent,
-    Silent,
-    StopRequested,
-    StopSent,
-)
-from action_assistant.runner.review.reel import APART, Reels, fold
+from action_assistant.runner.events import RunEvent
+from action_assistant.runner.review.reel import APART, Mark, Reels, fold, words
 from action_assistant.runner.runs import Run
 from action_assistant.runner.visits import ActionRun
 
@@ -74,6 +60,17 @@ class Chapter(msgspec.Struct, frozen=True):
     at: datetime
 
 
+class MarkShown(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Something that happened around the actions; `since`: from when on nothing was known."""
+
+    seq: int
+    at: datetime
+    kind: str
+    by: str = ""
+    text: str = ""
+    since: datetime | None = None
+
+
 class Film(msgspec.Struct, frozen=True, kw_only=True):
     """A page of a run's film. `base` is the run after `after` events, null at the very beginning;
     `newest` is the last event there is."""
@@ -84,6 +81,7 @@ class Film(msgspec.Struct, frozen=True, kw_only=True):
     base: shapes.RunShown | None
     frames: list[Frame]
     chapters: list[Chapter]
+    marks: list[MarkShown]
 
 
 async def film(reels: Reels, run: str, *, after: int) -> Film:
@@ -105,6 +103,18 @@ async def film(reels: Reels, run: str, *, after: int) -> Film:
         base=shapes.shown(base.run) if base else None,
         frames=frames,
         chapters=chapters,
+        marks=[_shown(mark) for mark in reel.marks],
+    )
+
+
+def _shown(mark: Mark) -> MarkShown:
+    return MarkShown(
+        seq=mark.seq,
+        at=shapes.time(mark.at),
+        kind=mark.kind,
+        by=mark.by,
+        text=mark.text,
+        since=shapes.time(mark.since) if mark.since is not None else None,
     )
 
 
@@ -123,7 +133,7 @@ def _frames(run: Run | None, events: Sequence[Event]) -> list[Frame]:
 
 def frame(event: Event, told: RunEvent, before: Run | None, after: Run, at: int) -> Frame:
     """What one event changed."""
-    by, text = _words(told)
+    by, text = words(told)
     old = before.alarms if before is not None else ()
     return Frame(
         seq=event.seq,
@@ -184,24 +194,3 @@ def _changed(before: ActionRun | None, after: ActionRun) -> ActionFrame:
         visits=[shapes.visit(each) for each in after.visits[first - after.older :]],
         messages=[shapes.MessageShown(shapes.time(each.at), each.text) for each in fresh],
     )
-
-
-def _words(told: RunEvent) -> tuple[str, str]:
-    """Who, and what an event says beside its effect."""
-    match told:
-        case Requested():
-            return told.author.name, told.override.reason if told.override else ""
-        case PauseRequested() | ResumeRequested() | StopRequested():
-            return told.author.name, ""
-        case StopSent():
-            return "", told.failed or f"attempt {told.attempt}"
-        case Silent():
-            return "", told.why
-        case AlarmRaised():
-            return "", told.text
-        case Ended():
-            return "", told.detail
-        case Published() | Observed() | Proof() | Answered():
-            return "", ""
-        case _:
-            return "", ""

@@ -14,7 +14,19 @@ import msgspec
 
 from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.journal.events import Event, Snapshot
-from action_assistant.runner.events import Requested, RunEvent, decode
+from action_assistant.runner.events import (
+    AlarmRaised,
+    Ended,
+    Observed,
+    PauseRequested,
+    Requested,
+    ResumeRequested,
+    RunEvent,
+    Silent,
+    StopRequested,
+    StopSent,
+    decode,
+)
 from action_assistant.runner.history import Aside, Ledger
 from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.runs import Run, begin, follow
@@ -23,6 +35,8 @@ from action_assistant.runner.runs import Run, begin, follow
 FOLD: Final = 1
 #: Events between two keyframes, and in one page of a film.
 APART: Final = 2_000
+#: Marks that are kept of one run.
+MARKS: Final = 2_000
 #: Shorter runs are folded anew; that takes less time than looking for keyframes.
 _WORTH: Final = 500
 _KEPT: Final = 8  # runs whose keyframes stay in memory
@@ -36,11 +50,25 @@ class Keyframe(msgspec.Struct, frozen=True):
     run: Run
 
 
+class Mark(msgspec.Struct, frozen=True):
+    """An event that shows nothing of the engine: a wish, a message sent, a silence, a proof, an
+    alarm. `at` and `since` are microseconds UTC; `by` is a person's name."""
+
+    seq: int
+    at: int
+    kind: str
+    by: str = ""
+    text: str = ""
+    since: int | None = None
+
+
 class Reel(msgspec.Struct, frozen=True):
-    """Keyframes in order; the last one is the newest that was folded."""
+    """Keyframes in order; the last one is the newest that was folded. `marks`: the first
+    `MARKS` of the run."""
 
     fold: int
     keys: tuple[Keyframe, ...]
+    marks: tuple[Mark, ...] = ()
 
     def before(self, seq: int) -> Keyframe | None:
         """The last keyframe at or before `seq`."""
@@ -103,6 +131,7 @@ class Reels:
             raise NotFound("There is no such run.")
         reel = self._known.get(run) or await self._kept(stream)
         keys = list(reel.keys) if reel is not None else []
+        marks = list(reel.marks) if reel is not None else []
         had = keys[-1].seq if keys else 0
         while not keys or keys[-1].seq < newest:
             last = keys[-1] if keys else None
@@ -112,12 +141,13 @@ class Reels:
             if not events:
                 break
             key = await self.aside(lambda last=last, events=events: _next(last, events))  # type: ignore[misc]
+            marks += marks_of(events)
             if last is not None and last.seq % APART:
                 keys.pop()  # an end that has gone on is no keyframe
             keys.append(key)
         if not keys:
             raise NotFound("There is no such run.")
-        found = Reel(FOLD, tuple(keys))
+        found = Reel(FOLD, tuple(keys), tuple(marks[:MARKS]))
         self._remember(run, found)
         if keys[-1].run.end is not None and keys[-1].seq > max(had, _WORTH):
             await self._keep(stream, found)
@@ -163,6 +193,38 @@ def fold(
         if run is not None:
             see(event, told, before, run)
     return run
+
+
+def marks_of(events: Sequence[Event]) -> list[Mark]:
+    """The marks among these events."""
+    marks: list[Mark] = []
+    for event in events:
+        if event.kind == Observed.kind:
+            continue
+        told = decode(event.kind, event.body)
+        by, text = words(told)
+        since = told.since if isinstance(told, Silent) else None
+        marks.append(Mark(event.seq, getattr(told, "at", event.at), event.kind, by, text, since))
+    return marks
+
+
+def words(told: RunEvent) -> tuple[str, str]:
+    """Who, and what an event says beside its effect."""
+    match told:
+        case Requested():
+            return told.author.name, told.override.reason if told.override else ""
+        case PauseRequested() | ResumeRequested() | StopRequested():
+            return told.author.name, ""
+        case StopSent():
+            return "", told.failed or f"attempt {told.attempt}"
+        case Silent():
+            return "", told.why
+        case AlarmRaised():
+            return "", told.text
+        case Ended():
+            return "", told.detail
+        case _:
+            return "", ""
 
 
 def _next(last: Keyframe | None, events: Sequence[Event]) -> Keyframe:

@@ -43,6 +43,10 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
     async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Film:
         return await desk().film(run, after)
 
+    @get("/api/runs/{run:str}/umrf", summary="The graph of a run as it was sent")
+    async def umrf(run: str) -> Response[bytes]:
+        return Response(await desk().umrf(run), media_type="application/json")
+
     @get("/api/runs/{run:str}/marks", summary="What people noted about a run")
     async def marks(run: str) -> Marked:
         return await desk().marks(run)
@@ -70,7 +74,7 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
         content = await desk().export(run, form)
         return Response(content, media_type=_TYPES[form], headers=head)
 
-    return [film, marks, mark, script, export]
+    return [film, umrf, marks, mark, script, export]
 
 
 def _of_many(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:

@@ -1,0 +1,168 @@
+/** Looking back: find a run, replay it, compare it with another, run it again with a fault. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { card } from "./bench";
+import { type Person, Product } from "./product";
+
+interface Run {
+  id: string;
+  number: number;
+  state: string;
+  result: string | null;
+}
+
+const product = new Product();
+let ada: Person;
+let graph: string;
+let good: Run;
+let bad: Run;
+
+const QUICK = { after_s: 0.25 };
+const JAMMED = { after_s: 0.25, result: "on_error", message: "gripper jammed" };
+
+async function version(): Promise<{ id: string; digest: string; umrf: string }> {
+  const made = await product.ask<{ id: string; digest: string }>(`/api/graphs/${graph}/versions`, {
+    method: "POST",
+    body: "{}",
+    headers: { "content-type": "application/json" },
+  });
+  const umrf = JSON.stringify(
+    (await product.ask<{ umrf: unknown }>(`/api/versions/${made.id}`)).umrf,
+  );
+  return { ...made, umrf };
+}
+
+/** Runs the graph's newest version with actions that do as they are told, to its end. */
+async function ran(behaviours: Record<string, unknown[]>): Promise<Run> {
+  const { id, digest, umrf } = await version();
+  const head = {
+    version: id,
+    digest,
+    graph,
+    engine: "simulator",
+    request_id: `e2e-${Math.random()}`,
+  };
+  const body = `${JSON.stringify({ ...head, script: { behaviours } }).slice(0, -1)},"umrf":${umrf}}`;
+  const run = await product.ask<Run>("/api/runs", { method: "POST", body }, product.runnerUrl);
+  const now = () => product.ask<Run>(`/api/runs/${run.id}`, {}, product.runnerUrl);
+  await expect.poll(async () => (await now()).state, { timeout: 20_000 }).toMatch(/finished|error/);
+  return now();
+}
+
+/** The words on the cards, in their order on the canvas. */
+function words(page: Page): Promise<string[]> {
+  return page.locator(".react-flow__node-action span[data-tone]").allTextContents();
+}
+
+test.beforeAll(async ({ browser }) => {
+  await product.start();
+  graph = await product.chain(3);
+  good = await ran({ "*": [QUICK] });
+  bad = await ran({ Wait_1: [JAMMED], "*": [QUICK] });
+  ada = await product.person(browser, "Ada");
+});
+test.afterAll(async () => {
+  expect(ada.failures).toEqual([]);
+  await product.dispose();
+});
+
+test("a replay shows each moment as it was known then, by mouse and by keyboard", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${good.id}`);
+  await expect(card(page, "Wait").first().getByText("true")).toBeVisible();
+  await page.getByRole("button", { name: "To the start" }).click();
+  await expect(page.getByText("as it was then")).toBeVisible();
+  await page.keyboard.press("ArrowRight"); // from the request on, change by change
+  const next = page.getByRole("button", { name: "The next change" });
+  for (let i = 0; i < 12 && !(await words(page)).some((word) => word.includes("running")); i += 1) {
+    await next.click();
+  }
+  expect((await words(page)).filter((word) => word.includes("running"))).toHaveLength(1);
+  expect((await words(page)).some((word) => word.includes("true"))).toBe(false);
+  await expect.poll(() => new URL(page.url()).searchParams.get("t")).not.toBeNull();
+  const shared = page.url();
+  await page.getByLabel("Speed of the replay").selectOption("16");
+  await page.getByText("as it was then").click(); // keys belong to the button that was pressed last
+  await page.keyboard.press("Space");
+  await expect(page.getByText("as it was then")).toBeHidden();
+  expect((await words(page)).filter((word) => word.includes("true"))).toHaveLength(3);
+  await page.goto(shared); // a link carries the moment
+  await expect(page.getByText("as it was then")).toBeVisible();
+  await expect
+    .poll(async () => (await words(page)).filter((w) => w.includes("running")))
+    .toHaveLength(1);
+});
+
+test("a run is found by what was said in it, pinned, labelled and found by that", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${bad.id}`);
+  await page.getByRole("tab", { name: "Facts" }).click();
+  await page.getByRole("button", { name: "Pin this run" }).click();
+  const labels = page.getByRole("combobox", { name: "Labels" });
+  await labels.fill("gripper");
+  await labels.press("Enter");
+  const note = page.getByRole("textbox", { name: "Note" });
+  await note.fill("The finger was bent.");
+  await page.getByRole("button", { name: "Save note" }).click();
+  await expect(page.getByRole("button", { name: "Save note" })).toBeHidden();
+  await page.goto(`${product.url}/runs`);
+  await page.getByRole("textbox", { name: "Search runs" }).fill("finger was bent");
+  const rows = page.getByRole("row").filter({ hasText: "chain_3" });
+  await expect(rows).toHaveCount(1);
+  await expect(rows.getByText("gripper", { exact: true })).toBeVisible();
+  await expect(rows.getByLabel("pinned")).toBeVisible();
+  await page.getByRole("button", { name: "Saved" }).click();
+  await page.getByRole("menuitem", { name: /^Save “/ }).click();
+  await page.goto(`${product.url}/runs`);
+  await expect(rows).toHaveCount(2);
+  await page.getByText("Finished", { exact: true }).click();
+  await expect(rows).toHaveCount(1);
+  await page.getByText("Failed", { exact: true }).click();
+  await expect(rows).toHaveCount(1);
+  await expect(rows.getByText("finished: error")).toBeVisible();
+  await page.getByRole("button", { name: "Saved" }).click();
+  await page.getByRole("menuitem", { name: /finger was bent/ }).click();
+  await expect(rows).toHaveCount(1);
+});
+
+test("“worked yesterday, fails today” is answered in one look", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs`);
+  await page.getByLabel(`Choose run ${good.number} to compare`).check();
+  await page.getByLabel(`Choose run ${bad.number} to compare`).check();
+  await page.getByRole("button", { name: "Compare the two" }).click();
+  await expect(page.getByText(/then Wait_1: true in run \d+, error in run \d+/)).toBeVisible();
+  await expect(page.getByText("gripper jammed")).toBeVisible();
+  await expect(page.getByText("Both ran exactly the same graph.")).toBeVisible();
+  await expect(page.getByRole("row", { name: /Wait_1/ })).toContainText("here they part");
+});
+
+test("new runs wait behind a pill, so that nothing moves under the finger", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs`);
+  await expect(page.getByRole("row").filter({ hasText: "chain_3" })).toHaveCount(2);
+  await ran({ "*": [QUICK] });
+  await page.getByRole("button", { name: "1 new run" }).click();
+  await expect(page.getByRole("row").filter({ hasText: "chain_3" })).toHaveCount(3);
+});
+
+test("a run goes again with one fault, in the simulator", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${good.id}`);
+  await page.getByRole("button", { name: "Again" }).click();
+  await page.getByRole("menuitem", { name: "With one fault …" }).click();
+  await page.getByRole("combobox", { name: "Action" }).click();
+  await page.getByRole("option", { name: "Wait_2" }).click();
+  await page.getByRole("button", { name: "Run in the simulator" }).click();
+  await expect(page).not.toHaveURL(new RegExp(good.id));
+  await expect(card(page, "Wait", 2).getByText("error")).toBeVisible({ timeout: 15_000 });
+});
+
+test("statistics tell how often it succeeds and which action fails", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs?graph=${graph}`);
+  await page.getByRole("link", { name: "Statistics" }).click();
+  await expect(page.getByText(/of \d+ runs finished true/)).toBeVisible();
+  await expect(page.getByRole("row", { name: /Wait_1/ })).toBeVisible();
+  await expect(page.getByText(/Wait_1.*visits|1 of \d+ visits/).first()).toBeVisible();
+});

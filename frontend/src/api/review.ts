@@ -1,0 +1,262 @@
+/** What the runner tells of past runs: films, marks, comparisons, statistics, files. */
+import { useQuery } from "@tanstack/react-query";
+import { ask } from "./http";
+import type { ActionRun, Run, Visit } from "./runs";
+
+/** What became of an action. From the visit number `first` on, its visits are now `visits`. */
+export interface ActionFrame {
+  state: string;
+  first: number;
+  visits?: Visit[];
+  messages?: ActionRun["messages"];
+  aid?: string;
+}
+
+/** One event: the fields of the run and the actions that it changed. */
+export interface Frame {
+  seq: number;
+  at: string;
+  kind: string;
+  by?: string;
+  text?: string;
+  head?: Partial<Run>;
+  actions?: Record<string, ActionFrame>;
+  alarms?: Run["alarms"];
+}
+
+/** Something that happened around the actions: a wish, a message sent, a silence, a proof. */
+export interface FilmMark {
+  seq: number;
+  at: string;
+  kind: string;
+  by?: string;
+  text?: string;
+  since?: string;
+}
+
+/** A page of a run's film: `base` after `after` events, then the frames of the next ones. */
+export interface Film {
+  run: string;
+  after: number;
+  newest: number;
+  base: Run | null;
+  frames: Frame[];
+  chapters: { after: number; at: string }[];
+  marks: FilmMark[];
+}
+
+export interface RunMarks {
+  pinned: boolean;
+  note: string;
+  labels: string[];
+}
+
+/** A run of the list, with what people noted about it. */
+export type ListedRun = Run & Partial<RunMarks>;
+
+export interface Field {
+  field: string;
+  before: unknown;
+  after: unknown;
+}
+
+export interface Change {
+  change: "added" | "removed" | "changed";
+  fields: Field[];
+}
+
+export interface Step {
+  action: string;
+  aid: string | null;
+  visit: number;
+  a: Visit | null;
+  b: Visit | null;
+  relation: "same" | "result" | "only_a" | "only_b" | "unknown";
+  slower: "a" | "b" | null;
+}
+
+export interface Comparison {
+  a: Run;
+  b: Run;
+  same_graph: boolean;
+  same_engine: boolean;
+  graph: {
+    fields: Field[];
+    actions: (Change & { aid: string; name: string })[];
+    relations: (Change & { parent: string; child: string })[];
+  };
+  steps: Step[];
+  left_out: number;
+  parting: { step: Step; text: string; messages_a: string[]; messages_b: string[] } | null;
+  text: string;
+}
+
+export interface ActionStatistics {
+  action: string;
+  aid: string | null;
+  runs: number;
+  visits: number;
+  results: Partial<Record<"true" | "false" | "error" | "stopped", number>>;
+  inferred: number;
+  timed: number;
+  p50: number | null;
+  p90: number | null;
+  p99: number | null;
+  longest: number | null;
+}
+
+export interface Statistics {
+  runs: {
+    id: string;
+    number: number;
+    state: Run["state"];
+    result: Run["result"];
+    took: number | null;
+  }[];
+  judged: number;
+  succeeded: number;
+  actions: ActionStatistics[];
+  never_taken: { parent: string; child: string; outcomes: string[] }[];
+}
+
+/** Which runs a list shows; what is empty asks for all. */
+export interface RunFilter {
+  text: string;
+  graph: string;
+  robot: string;
+  state: string;
+  /** `true`: what went wrong; `false`: what did not. */
+  failed: string;
+  person: string;
+  label: string;
+  version: string;
+  pinned: boolean;
+  since: string;
+}
+
+export const EVERYTHING: RunFilter = {
+  text: "",
+  graph: "",
+  robot: "",
+  state: "",
+  failed: "",
+  person: "",
+  label: "",
+  version: "",
+  pinned: false,
+  since: "",
+};
+
+/** The filter as a query; empty parts are left out. */
+export function queryOf(filter: RunFilter): URLSearchParams {
+  const query = new URLSearchParams();
+  for (const [name, value] of Object.entries(filter)) {
+    if (value !== "" && value !== false) query.set(name, String(value));
+  }
+  return query;
+}
+
+/** The filter in a query; what it does not know is ignored. */
+export function filterOf(query: URLSearchParams): RunFilter {
+  const text = (name: keyof RunFilter) => query.get(name) ?? "";
+  return {
+    text: text("text"),
+    graph: text("graph"),
+    robot: text("robot"),
+    state: text("state"),
+    failed: text("failed"),
+    person: text("person"),
+    label: text("label"),
+    version: text("version"),
+    pinned: query.get("pinned") === "true",
+    since: text("since"),
+  };
+}
+
+const path = (run: string) => `/api/runs/${encodeURIComponent(run)}`;
+
+export function listRuns(
+  runner: string,
+  filter: RunFilter,
+  before: string | null,
+  limit: number,
+  signal?: AbortSignal,
+): Promise<ListedRun[]> {
+  const query = queryOf(filter);
+  query.set("limit", String(limit));
+  if (before !== null) query.set("before", before);
+  return ask(`${runner}/api/runs?${query}`, signal ? { signal } : {});
+}
+
+export function useFilm(runner: string | undefined, run: string, after: number, asked: boolean) {
+  return useQuery({
+    queryKey: ["runs", "film", run, after],
+    queryFn: ({ signal }) =>
+      ask<Film>(`${runner}${path(run)}/film?after=${after}`, { signal, patience: 60_000 }),
+    enabled: asked && runner !== undefined,
+  });
+}
+
+export function useMarks(runner: string | undefined, run: string) {
+  return useQuery({
+    queryKey: ["runs", "marks", run],
+    queryFn: ({ signal }) => ask<RunMarks>(`${runner}${path(run)}/marks`, { signal }),
+    enabled: runner !== undefined,
+  });
+}
+
+export function setMarks(runner: string, run: string, marks: Partial<RunMarks>): Promise<RunMarks> {
+  return ask(`${runner}${path(run)}/marks`, { method: "PATCH", body: marks });
+}
+
+export function useLabels(runner: string | undefined) {
+  return useQuery({
+    queryKey: ["runs", "labels"],
+    queryFn: ({ signal }) => ask<string[]>(`${runner}/api/labels`, { signal }),
+    enabled: runner !== undefined,
+  });
+}
+
+export function useComparison(runner: string | undefined, a: string, b: string) {
+  return useQuery({
+    queryKey: ["runs", "comparison", a, b],
+    queryFn: ({ signal }) =>
+      ask<Comparison>(`${runner}/api/comparison?${new URLSearchParams({ a, b })}`, { signal }),
+    enabled: runner !== undefined && a !== "" && b !== "",
+  });
+}
+
+export function useStatistics(runner: string | undefined, graph: string) {
+  return useQuery({
+    queryKey: ["runs", "statistics", graph],
+    queryFn: ({ signal }) =>
+      ask<Statistics>(`${runner}/api/statistics?${new URLSearchParams({ graph })}`, { signal }),
+    enabled: runner !== undefined && graph !== "",
+  });
+}
+
+export type Fault = "error" | "false" | "hang" | "init_error";
+
+/** What a run did, as a script for the simulator; with `fault` one action fails at its last visit. */
+export function scriptOf(
+  runner: string,
+  run: string,
+  fault?: { action: string; fault: Fault },
+): Promise<{ behaviours: unknown; doubts: { action: string; text: string }[] }> {
+  const query = fault ? `?${new URLSearchParams({ ...fault })}` : "";
+  return ask(`${runner}${path(run)}/script${query}`);
+}
+
+export function expectRun(runner: string, run: string, name: string): Promise<unknown> {
+  return ask(`${runner}/api/expectations`, { method: "POST", body: { run, name } });
+}
+
+/** Where a run can be fetched as a file. */
+export function exportUrl(runner: string, run: string, format: "jsonl" | "csv" | "mcap"): string {
+  return `${runner}${path(run)}/export?format=${format}`;
+}
+
+/** Where the graph of a run is, as it was sent. */
+export function umrfUrl(runner: string, run: string): string {
+  return `${runner}${path(run)}/umrf`;
+}
