@@ -17,6 +17,8 @@ BIN := .venv/bin
 ROS := .venv-ros/bin
 NODE := scripts/with-node
 NPM := $(NODE) npm --prefix frontend
+LOCK = $(BIN)/uv pip compile --quiet --generate-hashes --universal --python-version 3.11 --no-header \
+	--no-annotate --upgrade
 PAGE_SOURCES := $(shell find frontend/src frontend/public frontend/index.html frontend/vite.config.ts frontend/tsconfig.json -type f 2>/dev/null)
 
 .PHONY: help
@@ -110,11 +112,10 @@ build: setup ## the wheel, with migrations and the built page, in dist/
 .PHONY: lock
 lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@$(BIN)/pip install --quiet uv
-	@$(BIN)/uv pip compile --quiet --generate-hashes --universal --python-version 3.11 --no-header \
-		--no-annotate --upgrade pyproject.toml requirements/dev.in --output-file requirements/dev.txt
-	@$(BIN)/uv pip compile --quiet --generate-hashes --universal --python-version 3.11 --no-header \
-		--no-annotate --upgrade --extra ros pyproject.toml requirements/ros.in \
-		--output-file requirements/ros.txt
+	@$(LOCK) pyproject.toml requirements/dev.in --output-file requirements/dev.txt
+	@$(LOCK) --extra ros pyproject.toml requirements/ros.in --output-file requirements/ros.txt
+	@$(LOCK) pyproject.toml requirements/run.in --output-file requirements/run.txt
+	@$(LOCK) requirements/build.in --output-file requirements/build.txt
 
 .venv/.done: requirements/dev.txt pyproject.toml scripts/need
 	@scripts/need python3=python3 || exit 1

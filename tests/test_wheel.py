@@ -1,9 +1,11 @@
-"""The wheel in an empty environment: it brings the page and the migrations, and needs no Node."""
+"""The wheel in an empty environment: it brings the page and the migrations, and needs no Node.
+
+It is built, installed and asked for its health by the very steps of the container images.
+"""
 
 import os
 import shutil
 import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
@@ -13,6 +15,13 @@ import pytest
 from support.product import TOKEN, Product
 
 ROOT = Path(__file__).parents[1]
+IMAGE = ROOT / "scripts" / "image"
+
+
+def healthy(port: int) -> bool:
+    """What the health check of an image would say."""
+    asked = subprocess.run([IMAGE, "healthy", str(port)], capture_output=True, check=False)
+    return asked.returncode == 0
 
 
 @pytest.fixture(scope="module")
@@ -21,13 +30,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if not (ROOT / "frontend" / "dist" / "index.html").is_file():
         pytest.skip("the page is not built; `make setup` builds it")
     folder = tmp_path_factory.mktemp("wheel")
-    subprocess.run(
-        [
-            *(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"),
-            *("--no-build-isolation", "--wheel-dir", str(folder), str(ROOT)),
-        ],
-        check=True,
-    )
+    subprocess.run([IMAGE, "wheel", folder], cwd=ROOT, check=True)
     (found,) = folder.glob("*.whl")
     return found
 
@@ -44,10 +47,11 @@ def test_the_wheel_carries_page_and_migrations_and_nothing_foreign(wheel: Path) 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: Path) -> None:
-    environment = tmp_path / "venv"
-    subprocess.run([sys.executable, "-m", "venv", str(environment)], check=True)
-    python = environment / "bin" / "python"
-    subprocess.run([str(python), "-m", "pip", "install", "--quiet", str(wheel)], check=True)
+    environment, files = tmp_path / "venv", tmp_path / "files"
+    (files / "wheel").mkdir(parents=True)
+    shutil.copy(wheel, files / "wheel")
+    shutil.copy(ROOT / "requirements" / "run.txt", files)
+    subprocess.run([IMAGE, "install", environment, files], check=True)
     product = Product(tmp_path / "data")
     tools = tmp_path / "bin"
     tools.mkdir()
@@ -74,6 +78,9 @@ def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: 
         assert '<div id="root">' in page.text
         with product.editor() as editor:
             assert editor.get("/api/graphs").json()
+        assert healthy(product.port)
+        assert healthy(product.port + 1)
     finally:
         process.terminate()
         process.communicate(timeout=20)
+    assert not healthy(product.port)

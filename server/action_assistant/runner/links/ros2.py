@@ -237,7 +237,10 @@ class Ros2Link:
         """Ask what the engine holds. Raises NoAnswer."""
         if self._domain is None:
             raise NoAnswer(self._standing.why)
-        domain, servers = self._domain, self._domain.servers(self._path)
+        domain = self._domain
+        # Who has just joined does not see everybody yet, and a second server would go unnoticed.
+        await anyio.sleep(max(0.0, domain.joined_at + _DISCOVERY_S - time.monotonic()))
+        servers = domain.servers(self._path)
         self._look()
         if len(servers) != 1:
             raise NoAnswer(self._standing.why)

@@ -40,7 +40,7 @@ async def look(
     found.append(Finding(topic="rclpy", verdict="fine", what=f"rclpy speaks {reach.rmw}."))
     try:
         found += await _robots(reach, robots)
-        found += await _seen(reach, robots)
+        found += _seen(await reach.candidates(), robots)
     except RuntimeError as error:
         found.append(
             Finding(
@@ -217,11 +217,11 @@ def _advice(standing: Standing) -> str:
     )
 
 
-async def _seen(reach: Reach, robots: Sequence[Registration]) -> list[Finding]:
+def _seen(candidates: Sequence[Candidate], robots: Sequence[Registration]) -> list[Finding]:
     """Engines that nobody registered, and what is odd about any."""
     known = {(each.domain, f"/{each.get_service.lstrip('/')}") for each in robots}
     found: list[Finding] = []
-    for each in await reach.candidates():
+    for each in candidates:
         if each.problem:
             found.append(_odd(each))
         elif (each.domain, each.get_service) not in known:
