@@ -11,7 +11,7 @@ export PYTHONNOUSERSITE := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 # Tests never speak to other machines.
-unit e2e ros-test soak pictures bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+unit e2e ros-test soak soak-ros pictures bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 BIN := .venv/bin
 ROS := .venv-ros/bin
@@ -87,8 +87,16 @@ soak: setup ## what takes longer than CI may: crashes, power cuts, floods and fu
 	TEST_KILLS=1000 TEST_MUTANTS=1000000 TEST_RECONNECTS=10000 SOAK_STOPS=100 SOAK_CUTS=1000 \
 		SOAK_IMAGES=10000 SOAK_FAULTS=500 SOAK_FLIPS=10000 TEST_IDLE_SECONDS=61 \
 		$(BIN)/pytest -q --timeout=0 tests/journal tests/editor tests/test_room_clients.py
+	TEST_HISTORIES=10000 TEST_STOPS=1000 TEST_RACES=1000 TEST_STOP_CLICKS=300 $(BIN)/pytest -q -s \
+		--timeout=0 tests/runner/test_false_confirmations.py tests/runner/test_stops_and_starts.py \
+		tests/test_stop_latency.py
 	FUZZ_EXAMPLES=10000 $(BIN)/pytest -q --timeout=0 tests/fuzz
 	$(BIN)/python tests/fuzz/soak_umrf.py 300
+
+.PHONY: soak-ros
+soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops
+	TEST_ROS_HISTORIES=200 TEST_ROS_AT_ONCE=4 TEST_STOP_CLICKS=50 $(ROS)/python -m pytest -q -s \
+		--timeout=0 tests/ros/test_false_confirmations.py tests/ros/test_stop_latency.py
 
 .PHONY: pictures
 pictures: setup ## take the pictures of the documentation from the running product

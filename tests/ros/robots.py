@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import msgspec
 
 from action_assistant.runner.standin import StandInNode
 from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Quirks
+from action_assistant.runner.standin_wire import Quirks, Said
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.semantics import script_from
 
@@ -28,6 +28,7 @@ def robot(
     namespace: str = "",
     quirks: Quirks = Quirks(),  # noqa: B008 - frozen
     seed: int = 0,
+    told: Callable[[Said], None] = lambda _: None,
 ) -> Iterator[StandInNode]:
     """A robot on a thread."""
     node = StandInNode(
@@ -41,6 +42,7 @@ def robot(
         domain=domain,
         facts=PINNED,
         namespace=namespace,
+        told=told,
     )
     thread = threading.Thread(target=node.spin, daemon=True)
     thread.start()
