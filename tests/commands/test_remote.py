@@ -1,14 +1,20 @@
 """Commands against a running server: import, export, graphs, runs, run, stop."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+import anyio
+import httpx
 import pytest
+from httpx_ws import aconnect_ws
+from pycrdt import Doc, Map, Provider
+from pycrdt.websocket.websocket import HttpxWebsocket
 
 from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
-from support.product import Product, running
+from support.product import TOKEN, Product, running
 
 QUICK = {"behaviours": {"*": [{"after_s": 0.05}]}}
 ENDLESS = {"behaviours": {"*": [{"never": True}]}}
@@ -61,6 +67,53 @@ def test_a_run_is_waited_for_and_listed(product: Product, files: dict[str, str])
     assert answer.stdout.splitlines()[-1] == "finished (on_true)"
     (listed,) = json.loads(product.cli("runs", "--graph", graph, "--json").stdout)
     assert (listed["id"], listed["state"], listed["result"]) == (run, "finished", "on_true")
+
+
+def test_expected_courses_are_simulated_again_and_a_changed_graph_is_told(
+    product: Product, files: dict[str, str]
+) -> None:
+    graph = imported(product, files["graph"])
+    run = product.cli("run", graph, "--script", files["quick"]).stdout.split()[0]
+    with product.runner() as runner:
+        saved = runner.post("/api/expectations", json={"run": run, "name": "the pair"})
+        assert saved.status_code == 201, saved.text
+    answer = product.cli("runs", "verify", "--graph", graph)
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    assert answer.stdout.splitlines() == ["same     the pair (then)", "same     the pair (now)"]
+    anyio.run(cut, product, graph)
+    answer = product.cli("runs", "verify", "--graph", graph, "--json")
+    assert answer.returncode == 1
+    then, now = json.loads(answer.stdout)
+    assert (then["same"], now["same"]) == (True, False)
+    assert "B_0 is told to run" in now["why"]
+
+
+async def cut(product: Product, graph: str) -> None:
+    """Somebody deletes the arrow from A to B."""
+    doc: Doc[Any] = Doc()
+    relations = doc.get("relations", type=Map)
+    address = f"{product.url}/api/graphs/{graph}/room"
+    headers = {"authorization": f"Bearer {TOKEN}"}
+    async with (
+        httpx.AsyncClient(trust_env=False) as client,
+        aconnect_ws(address, client, headers=headers) as socket,
+        Provider(doc, HttpxWebsocket(socket, address)),
+    ):
+        await until(lambda: any("entry>" in key for key in relations))
+        with doc.transaction():
+            for key in list(relations):
+                if not key.startswith("entry>") and ">exit|" not in key:
+                    del relations[key]
+        with product.editor() as editor:
+            umrf = f"/api/graphs/{graph}/umrf"
+            await until(lambda: not editor.get(umrf).json()["actions"][0].get("children"))
+
+
+async def until(true: Callable[[], bool]) -> None:
+    """Wait for something that must happen."""
+    with anyio.fail_after(20):
+        while not true():  # noqa: ASYNC110 - what it waits for is in other processes
+            await anyio.sleep(0.05)
 
 
 def test_a_run_is_stopped_and_that_is_proven(product: Product, files: dict[str, str]) -> None:

@@ -35,6 +35,17 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     runs.add_argument("--graph", metavar="GRAPH", help="id or name")
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(deed=_runs)
+    again = command(
+        runs.add_subparsers(metavar="verify"),
+        "verify",
+        "simulate every expected course again, with the graph as it was and as it is now; exit 1 if "
+        "any goes another way",
+        "--graph patrol",
+        of="runs",
+    )
+    again.add_argument("--graph", metavar="GRAPH", help="id or name; only what is expected of it")
+    again.add_argument("--json", action="store_true", help="as JSON, for programs")
+    again.set_defaults(deed=_verify)
 
     run = command(
         commands,
@@ -100,6 +111,12 @@ def _graphs(options: argparse.Namespace) -> int:
     for graph in graphs:
         print(f"{graph['id']}  {graph['updated_at'][:19]}  {graph['name']}")
     return 0
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from action_assistant.commands.expected import verify  # slow to load
+
+    return verify(options)
 
 
 def _runs(options: argparse.Namespace) -> int:
