@@ -39,6 +39,8 @@ export interface Robot {
   /** Programs beside this one that publish starts. */
   others: number;
   actor: string;
+  /** Whether pausing is safe there. */
+  pauses: boolean;
   holds: Held[];
   /** How many it has indexed; null before its first answer. */
   actions: number | null;

@@ -134,6 +134,11 @@ export function postStop(runner: string, run: string | "all", stop: string): Pro
   });
 }
 
+/** Pauses a run, or lets it go on. */
+export function steerRun(runner: string, run: string, way: "pause" | "resume"): Promise<Run> {
+  return ask(`${runner}/api/runs/${encodeURIComponent(run)}/${way}`, { method: "POST", body: {} });
+}
+
 export function useRuns(runner: string | undefined, graph?: string) {
   const filter = graph === undefined ? "" : `&graph=${encodeURIComponent(graph)}`;
   return useQuery({

@@ -12,6 +12,7 @@ import { lanesOf } from "../ui/lanes";
 import { StateWord } from "../ui/state-word";
 import { Timeline } from "../ui/timeline";
 import { clock, day, instant, stopwatch, useNow } from "../ui/when";
+import { PauseButton } from "./pause-button";
 import style from "./run-strip.module.css";
 
 interface Props {
@@ -95,6 +96,7 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, o
             {run.detail}
           </Text>
         )}
+        {goes && <PauseButton run={run} />}
         <Button component={Link} to={`/runs/${run.id}`} size="compact-xs" variant="subtle">
           Open run
         </Button>

@@ -2,6 +2,7 @@
 import { IconSquareFilled } from "@tabler/icons-react";
 import { useEffect } from "react";
 import type { Live } from "../api/live";
+import type { Run } from "../api/runs";
 import { foreignGraphs, openRuns, useLive } from "../api/use-live";
 import style from "./stop-button.module.css";
 
@@ -35,31 +36,43 @@ function words(link: string, count: number): string {
   return count === 1 ? "1 run" : `${count} runs`;
 }
 
+/** What Stop means beside a graph: its one run, or its runs that were started together. */
+export function meantBy(here: readonly Run[]): { id: string; words: string } | null {
+  const [first, ...others] = here;
+  if (first === undefined) return null;
+  if (others.length === 0) {
+    return { id: first.id, words: `run ${first.number} of ${first.graph_name}` };
+  }
+  const { group } = first;
+  if (group === null || others.some((run) => run.group !== group)) return null;
+  return { id: group, words: `the ${here.length} runs of ${first.graph_name}` };
+}
+
 const SOFT = "A software stop: no replacement for the emergency stop.";
 
 export function StopButton({ graph }: Props) {
   const { live, now } = useLive();
   useStopKey(live);
   const open = openRuns(now);
-  const here = open.filter((run) => run.graph === graph);
-  const [only] = here.length === 1 ? here : [];
+  const here = graph === undefined ? [] : open.filter((run) => run.graph === graph);
+  const meant = meantBy(here);
   const all = open.length + foreignGraphs(now).length;
   const calm = now.link === "live" && all === 0;
-  const target = only ? `run ${only.number} of ${only.graph_name}` : "everything that runs";
-  const beside = only !== undefined && all > 1;
+  const target = meant?.words ?? "everything that runs";
+  const beside = meant !== null && all > here.length;
   return (
     <span className={style.both} data-beside={beside || undefined}>
       <button
         type="button"
         className={style.stop}
         data-calm={calm || undefined}
-        onClick={() => live?.stop(only?.id ?? "all")}
+        onClick={() => live?.stop(meant?.id ?? "all")}
         aria-label={`Stop ${target}. Software stop, no emergency stop`}
         title={`Stop ${target}.\n${SOFT}`}
       >
         <IconSquareFilled size={13} aria-hidden style={{ flex: "none" }} />
-        <span className={style.word}>{only || all === 0 ? "STOP" : "STOP ALL"}</span>
-        <span className={style.count}>{words(now.link, only ? 1 : all)}</span>
+        <span className={style.word}>{meant || all === 0 ? "STOP" : "STOP ALL"}</span>
+        <span className={style.count}>{words(now.link, meant ? here.length : all)}</span>
       </button>
       {beside && (
         <button

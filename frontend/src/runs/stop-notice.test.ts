@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { LiveNow, StopAsked } from "../api/live";
 import type { Run } from "../api/runs";
+import { meantBy } from "./stop-button";
 import { noticeOf, othersNotice } from "./stop-notice";
 
 const stop: StopAsked = { id: "s", run: "r", at: 1000, state: "heard", detail: "" };
@@ -63,4 +64,13 @@ test("a Stop of somebody else that nothing proves is shouted here, too, with the
   const stopping = now({ state: "stopping", desired: "stopped", alarms: [alarm] });
   expect(othersNotice(stopping)?.text).toBe("STOP UNCONFIRMED: run 7 on David: it is deaf.");
   expect(othersNotice(now({ desired: "running", alarms: [alarm] }))).toBeNull();
+});
+
+test("beside a graph, Stop means its run or the group it is in, and else everything", () => {
+  const one = { id: "a", number: 1, graph_name: "patrol", group: "g" } as Run;
+  const two = { ...one, id: "b", number: 2 };
+  expect(meantBy([])).toBeNull();
+  expect(meantBy([one])?.id).toBe("a");
+  expect(meantBy([one, two])).toEqual({ id: "g", words: "the 2 runs of patrol" });
+  expect(meantBy([one, { ...two, group: null }])).toBeNull();
 });

@@ -15,8 +15,7 @@ export type Notice = { tone: "quiet" | "loud" | "done"; text: string; stays?: tr
 
 function targets(stop: StopAsked, now: LiveNow): Run[] {
   if (stop.run !== "all") {
-    const run = now.runs.get(stop.run);
-    return run ? [run] : [];
+    return [...now.runs.values()].filter((run) => [run.id, run.group].includes(stop.run));
   }
   return [...now.runs.values()].filter(
     (run) => run.ended_at === null || Date.parse(run.ended_at) >= stop.at,

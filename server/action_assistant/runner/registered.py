@@ -63,7 +63,8 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     """An engine as people see it. `why` explains any state but `answering`.
 
     `servers`: how many answer on the path of its get; `others`: publishers of starts beside us.
-    `actions`, `graphs`: how many it has indexed; None before its first answer.
+    `actions`, `graphs`: how many it has indexed; None before its first answer. `pauses`: whether
+    pausing is safe there.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     servers: int = 0
     others: int = 0
     actor: str = ""
+    pauses: bool = False
     holds: tuple[Held, ...] = ()
     actions: int | None = None
     graphs: int | None = None
@@ -117,6 +119,7 @@ def seen(plain: Robot, engine: KnownEngine, stopping: Callable[[str, str], str |
         servers=standing.servers,
         others=standing.others,
         actor=standing.actor,
+        pauses=engine.pauses,
     )
     if answer is None:
         return known

@@ -169,7 +169,9 @@ class Robots:
 
     def all(self) -> Iterator[Robot]:
         """Every engine, the simulator first."""
-        yield Robot(name=SIMULATOR, simulated=True, state="answering", generation="current")
+        yield Robot(
+            name=SIMULATOR, simulated=True, state="answering", generation="current", pauses=True
+        )
         for name in sorted(self._registered):
             yield self.robot(name)
 
