@@ -6,7 +6,7 @@ edit of the person's own, which undo takes back; `before` lets it see what other
 """
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Final, TypeAlias
 
@@ -25,6 +25,7 @@ from action_assistant.umrf.jsontext import pointer
 from action_assistant.umrf.model import Action, Graph, Key, Problem
 
 _ORDERS: Final = ("order", "po", "co")
+_WORSE: Final = 20  # problems that are told
 _Wanted: TypeAlias = dict[tuple[str, str], object]
 
 
@@ -46,8 +47,9 @@ class Rewriting(msgspec.Struct, frozen=True):
     problems: tuple[Problem, ...]
 
 
-def rewriting(moment: Moment, text: bytes) -> Rewriting:
-    """What `text`, edited from the canonical text of `moment`, changes.
+def rewriting(moment: Moment, text: bytes, known: Iterable[Problem] = ()) -> Rewriting:
+    """What `text`, edited from the canonical text of `moment`, changes. `known`: the problems that
+    the graph has already.
 
     Raises BadInput, NotUmrf, TooLarge with the place; nothing is stored either way.
     """
@@ -57,7 +59,8 @@ def rewriting(moment: Moment, text: bytes) -> Rewriting:
     old = _under_keys(shown.graph, _keys_of(moment.graph, shown.graph))
     new = _under_keys(wanted.graph, _aligned(old, wanted.graph))
     _refuse_ghosts(old, new, text)
-    return Rewriting(moment.seq, tuple(_changes(moment.maps, old, new)), tuple(_worse(old, new)))
+    changes = tuple(_changes(moment.maps, old, new))
+    return Rewriting(moment.seq, changes, _worse(known, new) if changes else ())
 
 
 def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
@@ -74,11 +77,11 @@ def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
             raise NotUmrf(problem.message, where={"path": path} if path else None)
 
 
-def _worse(old: Graph, new: Graph) -> list[Problem]:
+def _worse(known: Iterable[Problem], new: Graph) -> tuple[Problem, ...]:
     """Errors that come with the edit."""
-    known = {(p.code, p.message) for p in check(old)}
-    found = [p for p in check(new) if p.severity == "error"]
-    return [problem for problem in found if (problem.code, problem.message) not in known][:20]
+    old = {(problem.code, problem.message) for problem in known}
+    found = [problem for problem in check(new) if problem.severity == "error"]
+    return tuple(p for p in found if (p.code, p.message) not in old)[:_WORSE]
 
 
 # Which action is which
@@ -255,7 +258,8 @@ def _numbered(
 ) -> dict[str, float]:
     """New numbers so that `now` is the order; those that kept their order keep their numbers."""
     kept = [head for head in now if head in numbers]
-    if kept == [head for head in was if head in set(now)]:
+    there = set(now)
+    if kept == [head for head in was if head in there]:
         if len(kept) == len(now):
             return {}
         values = [numbers[head] for head in kept]

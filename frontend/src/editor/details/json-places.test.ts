@@ -1,10 +1,11 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { addAction } from "../../graph/edit";
+import { addAction, connect, setEntry, setExit } from "../../graph/edit";
 import { mapsOf } from "../../graph/layout";
+import { EXIT } from "../../graph/model";
 import { readGraph } from "../../graph/read";
-import { actionAt, lineOf, rangeOf } from "./json-places";
+import { actionAt, lineOf, rangeOf, rangeOfArrow } from "./json-places";
 
 const graph = {
   graph_name: "g",
@@ -31,6 +32,40 @@ test("a line belongs to the action in whose braces it stands", () => {
   expect(actionAt(drawn, lines, range?.[0] ?? -1)?.name).toBe("A");
   expect(actionAt(drawn, lines, (range?.[1] ?? 0) + 1)).toBeNull();
   expect(actionAt(drawn, lines, 0)).toBeNull();
+});
+
+test("an arrow stands where the action that it comes from names its end", () => {
+  const doc = new Y.Doc();
+  const [a, b, c] = ["A", "B", "C"].map((name) => addAction(doc, { name })) as [
+    string,
+    string,
+    string,
+  ];
+  setEntry(doc, a);
+  connect(doc, a, c);
+  connect(doc, a, b);
+  setExit(doc, b);
+  const drawn = readGraph(mapsOf(doc));
+  const item = (name: string) => ({ name, instance_id: 0 });
+  const text = JSON.stringify(
+    {
+      graph_entry: [item("A")],
+      graph_exit: [item("B")],
+      actions: [{ ...item("A"), children: [item("C"), item("B")] }, item("B"), item("C")],
+    },
+    null,
+    2,
+  );
+  for (const relation of drawn.relations) {
+    const range = rangeOfArrow(drawn, text, relation);
+    const piece = text
+      .split("\n")
+      .slice(range?.[0], (range?.[1] ?? 0) + 1)
+      .join("\n");
+    const wanted = relation.child === EXIT ? relation.parent : relation.child;
+    const name = drawn.actions.find(({ key }) => key === wanted)?.name;
+    expect(JSON.parse(piece.replace(/,$/, ""))).toEqual(item(name ?? ""));
+  }
 });
 
 /** Every way into a value, with what stands there. */

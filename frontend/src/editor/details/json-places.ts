@@ -1,5 +1,5 @@
 /** Where something stands in the JSON text of a graph. Lines count from 0. Pure. */
-import type { Action, Graph } from "../../graph/model";
+import { type Action, ENTRY, EXIT, type Graph, type Relation } from "../../graph/model";
 
 export type Lines = readonly [first: number, last: number];
 
@@ -24,6 +24,32 @@ export function rangeOf(
     if (isAction && members.includes(wanted) && fits) return [first, last];
   }
   return null;
+}
+
+/** The lines of an arrow in canonical text, where the action that it comes from names its end. */
+export function rangeOfArrow(graph: Graph, text: string, relation: Relation): Lines | null {
+  const { parent, child } = relation;
+  const end = child === EXIT;
+  const siblings = graph.relations
+    .filter((other) =>
+      end ? other.child === EXIT : other.parent === parent && other.child !== EXIT,
+    )
+    .filter(({ only }) => only !== (end ? "children" : "parents"))
+    .sort((a, b) => (end ? a.childOrder - b.childOrder : a.parentOrder - b.parentOrder));
+  const at = siblings.indexOf(relation);
+  const action = graph.actions.filter(({ missing }) => !missing).findIndex((a) => a.key === parent);
+  if (at < 0 || (!end && parent !== ENTRY && action < 0)) return null;
+  const list = end
+    ? "/graph_exit"
+    : parent === ENTRY
+      ? "/graph_entry"
+      : `/actions/${action}/children`;
+  const first = lineOf(text, `${list}/${at}`);
+  const lines = text.split("\n");
+  const indent = /^ */.exec(lines[first] ?? "")?.[0] ?? "";
+  if (!lines[first]?.startsWith(`${indent}{`)) return null;
+  const last = lines.findIndex((line, i) => i >= first && line.startsWith(`${indent}}`));
+  return last < 0 ? null : [first, last];
 }
 
 /** The action in whose block a line stands. */

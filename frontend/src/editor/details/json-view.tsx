@@ -4,10 +4,10 @@ import { IconAlertTriangle, IconCheck, IconCopy } from "@tabler/icons-react";
 import { lazy, type ReactNode, Suspense, useMemo, useState } from "react";
 import type { KeyChange } from "../../api/graphs";
 import { sentence } from "../../api/http";
-import { selectedActions, useBench } from "../bench";
+import { selectedActions, selectedRelations, useBench } from "../bench";
 import { keysOf } from "../deeds/deed";
 import type { Fault } from "./json-editor";
-import { actionAt, rangeOf } from "./json-places";
+import { actionAt, rangeOf, rangeOfArrow } from "./json-places";
 import style from "./json-view.module.css";
 import { collisions, places, rewrite } from "./rewrite";
 import { useJson, type Verdict } from "./use-json";
@@ -99,11 +99,11 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
   const [selected] = selectedActions(bench);
   const name = selected?.name;
   const instanceId = selected?.instanceId;
-  const marked = useMemo(
-    () =>
-      name === undefined || instanceId === undefined ? null : rangeOf(lines, { name, instanceId }),
-    [lines, name, instanceId],
-  );
+  const [arrow] = selectedRelations(bench);
+  const marked = useMemo(() => {
+    if (name !== undefined && instanceId !== undefined) return rangeOf(lines, { name, instanceId });
+    return arrow && text !== undefined ? rangeOfArrow(bench.graph, text, arrow) : null;
+  }, [lines, text, name, instanceId, arrow, bench.graph]);
   const faults = useMemo(() => (draft ? faultsOf(verdict) : NO_FAULTS), [draft, verdict]);
   const changes = verdict.kind === "fits" && draft ? verdict.rewriting.changes : [];
   const write = (some: readonly KeyChange[]) => {

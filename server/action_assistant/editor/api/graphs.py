@@ -158,7 +158,8 @@ def _contents(door: Door) -> list[ControllerRouterHandler]:
         house = door.house
         await house.catalogue.require(graph_id)
         then = await house.sights.at(graph_id, seq)
-        return await asyncio.to_thread(rewriting, then, await request.body())
+        known = house.sights.problems(graph_id, then)
+        return await asyncio.to_thread(rewriting, then, await request.body(), known)
 
     return [get_umrf, get_problems, get_rewriting]
 
