@@ -23,7 +23,7 @@ PAGE_SOURCES := $(shell find frontend/src frontend/public frontend/index.html fr
 
 .PHONY: help
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 .PHONY: setup
 setup: .venv/.done frontend/dist/index.html ## everything that running and testing needs
@@ -82,16 +82,9 @@ e2e: setup ros ## tests in Chromium against the real processes
 	@$(NPM) run --silent e2e
 
 .PHONY: soak
-soak: setup ## what takes longer than CI may: crashes, power cuts, floods and fuzzing by the thousand
-	@$(BIN)/pip install --quiet atheris
-	TEST_KILLS=1000 TEST_MUTANTS=1000000 TEST_RECONNECTS=10000 SOAK_STOPS=100 SOAK_CUTS=1000 \
-		SOAK_IMAGES=10000 SOAK_FAULTS=500 SOAK_FLIPS=10000 TEST_IDLE_SECONDS=61 \
-		$(BIN)/pytest -q --timeout=0 tests/journal tests/editor tests/test_room_clients.py
-	TEST_HISTORIES=10000 TEST_STOPS=1000 TEST_RACES=1000 TEST_STOP_CLICKS=300 $(BIN)/pytest -q -s \
-		--timeout=0 tests/runner/test_false_confirmations.py tests/runner/test_stops_and_starts.py \
-		tests/test_stop_latency.py
-	FUZZ_EXAMPLES=10000 $(BIN)/pytest -q --timeout=0 tests/fuzz
-	$(BIN)/python tests/fuzz/soak_umrf.py 300
+soak: setup ## what takes longer than CI may, by the thousand (ARGS="kills images" for some of it)
+	@$(BIN)/python bench/soak.py $(ARGS)
+	@test -n "$(ARGS)" || { $(BIN)/pip install --quiet atheris && $(BIN)/python tests/fuzz/soak_umrf.py 300; }
 
 .PHONY: soak-ros
 soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops
@@ -104,8 +97,12 @@ pictures: setup ## take the pictures of the documentation from the running produ
 	@PICTURES=1 $(NPM) run --silent e2e -- e2e/pictures.spec.ts
 
 .PHONY: bench
-bench: setup ## measure speed; prints tables
+bench: setup ## measure speed; prints tables (ARGS="rooms" for one benchmark)
 	@$(BIN)/python bench/run.py $(ARGS)
+
+.PHONY: performance
+performance: setup ## measure, and write the tables into docs/performance.md (ARGS="rooms browser")
+	@$(BIN)/python bench/performance.py $(ARGS)
 
 .PHONY: migrate
 migrate: .venv/.done ## bring the databases to this version (ARGS="--data DIR")

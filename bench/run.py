@@ -16,7 +16,7 @@ from table import show  # noqa: E402 - the folder is no package
 
 def main(names: list[str]) -> int:
     """Exit code: 2 for a name that is no benchmark."""
-    known = sorted(p.stem for p in FOLDER.glob("*.py") if p.stem not in ("run", "table"))
+    known = sorted(p.stem for p in FOLDER.glob("*.py") if "\nTITLE = " in p.read_text())
     if unknown := [name for name in names if name not in known]:
         sys.stderr.write(f"no benchmark: {', '.join(unknown)}; there are {', '.join(known)}\n")
         return 2

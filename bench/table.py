@@ -14,16 +14,24 @@ class Table(NamedTuple):
 
 def show(table: Table) -> None:
     """Prints a table with columns of equal width."""
-    lines = [table.head, *table.rows]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(table.head))]
+    sys.stdout.write("\n".join((*lines(table), "")))
+    sys.stdout.flush()
+
+
+def lines(table: Table) -> list[str]:
+    """A table as Markdown with columns of equal width."""
+    rows = [table.head, *table.rows]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(table.head))]
     rule = ["-" * widths[0], *("-" * (width - 1) + ":" for width in widths[1:])]
-    for line in (table.head, rule, *table.rows):
-        cells = [
+    return [
+        "| "
+        + " | ".join(
             cell.ljust(width) if i == 0 else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
-        ]
-        sys.stdout.write(f"| {' | '.join(cells)} |\n")
-        sys.stdout.flush()
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        + " |"
+        for row in (table.head, rule, *table.rows)
+    ]
 
 
 def seconds(value: float) -> str:

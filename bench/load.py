@@ -1,0 +1,414 @@
+"""A crowd of Yjs clients in one process: what one server sends to whom, how late, at what cost.
+
+Run as `python load.py JSON`, with a `Plan` as JSON; prints one `Outcome` as JSON. Every edit is a
+real Yjs update that carries who made it, its number and its time, so that what a server merges or
+leaves out is counted right. Delivered: edits that reached a client, each for each.
+"""
+
+import asyncio
+import base64
+import heapq
+import json
+import os
+import random
+import re
+import sys
+import time
+from collections.abc import Callable
+from typing import Any, Final, Literal, NamedTuple
+
+import psutil
+import uvloop
+from pycrdt import Doc, Map
+
+MARK: Final = re.compile(rb"<(\d{4})(\d{7})(\d{19})>")
+NEVER: Final = b"0" * 19
+BINARY: Final = 0x82
+ROOT: Final = "positions"  # keys that belong to no action are left alone by every reader
+PRESENCE_CLIENT: Final = 1 << 20
+WARM_S: Final = 1.0
+DRAIN_S: Final = 5.0
+
+
+class Plan(NamedTuple):
+    """What is to be done. `kind`: edits under new keys, of one key each, or awareness only."""
+
+    port: int
+    pid: int
+    dialect: Literal["plain", "hocuspocus"]
+    path: str  # with {room}
+    rooms: list[str]
+    headers: list[str]
+    deed: Literal["fan out", "idle", "fill", "open", "one by one"]
+    people: int = 1
+    rate: float = 10.0  # per second and person
+    seconds: float = 5.0
+    kind: Literal["add", "drag", "presence"] = "add"
+    count: int = 0
+
+
+def number(value: int) -> bytes:
+    """lib0's varUint."""
+    out = bytearray()
+    while value > 0x7F:
+        out.append(0x80 | value & 0x7F)
+        value >>= 7
+    return bytes((*out, value))
+
+
+def read_number(data: bytes, at: int) -> tuple[int, int]:
+    """A varUint, and where it ends."""
+    value = shift = 0
+    while True:
+        value |= (data[at] & 0x7F) << shift
+        at += 1
+        if data[at - 1] < 0x80:
+            return value, at
+        shift += 7
+
+
+class Person(asyncio.Protocol):
+    """One socket. Speaks y-protocols, or Hocuspocus' form of it, which names the room each time."""
+
+    def __init__(self, crowd: "Crowd", name: int, room: str) -> None:
+        self.crowd, self.name, self.room = crowd, name, room
+        plan = crowd.plan
+        self.prefix = b""
+        if plan.dialect == "hocuspocus":
+            self.prefix = number(len(room)) + room.encode()
+        self.synced: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+        self.acknowledged = self.sent = 0
+        self.news = asyncio.Event()
+        self.last: dict[int, int] = {}
+        self._buffer = bytearray()
+        self._open = False
+        self._client = PRESENCE_CLIENT + name
+
+    def connection_made(self, transport: Any) -> None:
+        self.transport = transport
+        plan = self.crowd.plan
+        lines = [
+            f"GET {plan.path.format(room=self.room)} HTTP/1.1",
+            *(f"Host: 127.0.0.1:{plan.port}", "Upgrade: websocket", "Connection: Upgrade"),
+            f"Sec-WebSocket-Key: {base64.b64encode(os.urandom(16)).decode()}",
+            *("Sec-WebSocket-Version: 13", *plan.headers, "", ""),
+        ]
+        transport.write("\r\n".join(lines).encode())
+
+    def data_received(self, data: bytes) -> None:
+        self._buffer += data
+        if not self._open:
+            end = self._buffer.find(b"\r\n\r\n")
+            if end < 0:
+                return
+            if b" 101 " not in self._buffer[:end]:
+                self.synced.set_exception(ConnectionError(bytes(self._buffer[:end]).decode()))
+                return
+            del self._buffer[: end + 4]
+            self._open = True
+            self._greet()
+        at = 0
+        while (frame := self._frame(at)) is not None:
+            kind, start, at = frame
+            if kind == BINARY:
+                self._take(bytes(self._buffer[start:at]))
+            elif kind == 0x89:
+                self._write(0x8A, bytes(self._buffer[start:at]))
+        del self._buffer[:at]
+
+    def connection_lost(self, _: Exception | None) -> None:
+        self.crowd.lost += not self.crowd.ending
+        self.news.set()
+
+    def _frame(self, at: int) -> tuple[int, int, int] | None:
+        """Kind, start and end of the payload of the frame at `at`, if all of it is there."""
+        buffer = self._buffer
+        if len(buffer) < at + 2:
+            return None
+        size, start = buffer[at + 1], at + 2
+        if size > 125:
+            width = 2 if size == 126 else 8
+            size = int.from_bytes(buffer[start : start + width], "big")
+            start += width
+        return (buffer[at], start, start + size) if len(buffer) >= start + size else None
+
+    def _write(self, kind: int, payload: bytes) -> None:
+        """A frame, under a mask of noughts."""
+        size = len(payload)
+        length = bytes((0x80 | size,)) if size < 126 else b"\xfe" + size.to_bytes(2, "big")
+        if size > 0xFFFF:
+            length = b"\xff" + size.to_bytes(8, "big")
+        self.transport.write(bytes((kind,)) + length + bytes(4) + payload)
+
+    def say(self, message: bytes) -> None:
+        self._write(BINARY, self.prefix + message)
+
+    def _greet(self) -> None:
+        if self.crowd.plan.dialect == "hocuspocus":
+            self.say(b"\x02\x00" + b"\x05token")
+        self.say(b"\x00\x00\x01\x00")  # step 1: nothing is known
+
+    def edit(self, update: bytes) -> None:
+        self.sent += 1
+        self.say(b"\x00\x02" + number(len(update)) + update)
+
+    def be_somewhere(self, nth: int, now: bytes) -> None:
+        """Awareness, as a page sends it while something is dragged."""
+        mark = f"<{self.name:04d}{nth:07d}{now.decode()}>"
+        state = json.dumps({"drag": {"ids": ["a"], "dx": nth, "dy": 1}, "mark": mark}).encode()
+        entry = number(1) + number(self._client) + number(nth + 1) + number(len(state)) + state
+        self.say(b"\x01" + number(len(entry)) + entry)
+
+    def _take(self, data: bytes) -> None:
+        at = 0
+        if self.prefix:
+            size, at = read_number(data, 0)
+            at += size
+        kind, at = read_number(data, at)
+        if kind == 1:
+            self.crowd.heard(self, data)
+        elif kind in (0, 4):
+            self._sync(*read_number(data, at), data)
+        elif kind == 100 or (kind == 8 and self.prefix):
+            # Ours: so many are durable. Hocuspocus': one more was applied in memory.
+            self.acknowledged = read_number(data, at)[0] if kind == 100 else self.acknowledged + 1
+            self.news.set()
+
+    def _sync(self, step: int, at: int, data: bytes) -> None:
+        if step == 0:
+            self.sent += 1
+            self.say(b"\x00\x01\x02\x00\x00")
+        elif step == 1 and not self.synced.done():
+            self.synced.set_result(data[read_number(data, at)[1] :])
+        elif step == 2:
+            self.crowd.heard(self, data)
+
+
+class Crowd:
+    """Everybody, and what they saw."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.people: list[Person] = []
+        self.delivered = self.lost = 0
+        self.delays: list[int] = []  # ns
+        self.ending = self.measuring = False
+        self.process = psutil.Process(plan.pid)
+
+    async def come(self, count: int) -> None:
+        """Connect, 20 at a time, until each has the document."""
+        loop = asyncio.get_running_loop()
+        gate = asyncio.Semaphore(20)
+
+        async def one(name: int) -> Person:
+            async with gate:
+                person = Person(self, name, self.plan.rooms[name % len(self.plan.rooms)])
+                await loop.create_connection(lambda: person, "127.0.0.1", self.plan.port)
+                await asyncio.wait_for(asyncio.shield(person.synced), 60)
+                return person
+
+        self.people = await asyncio.gather(*(one(name) for name in range(count)))
+
+    def heard(self, person: Person, data: bytes) -> None:
+        now = time.monotonic_ns()
+        last = person.last
+        for sender, nth, then in MARK.findall(data):
+            who, which = int(sender), int(nth)
+            fresh = which - last.get(who, -1)
+            if who != person.name and fresh > 0:
+                last[who] = which
+                self.delivered += fresh
+                if self.measuring:
+                    self.delays.append(now - int(then))
+
+    def processor(self) -> float:
+        """Seconds of processor that the server used, all its threads and children."""
+        family = [self.process, *self.process.children(recursive=True)]
+        return sum(sum(each.cpu_times()[:2]) for each in family)
+
+    def memory(self) -> float:
+        """Resident MB of the server."""
+        family = [self.process, *self.process.children(recursive=True)]
+        return sum(each.memory_info().rss for each in family) / 1e6
+
+    def leave(self) -> None:
+        self.ending = True
+        for person in self.people:
+            person.transport.abort()
+
+
+def edits_of(name: int, count: int, kind: str) -> list[tuple[bytes, bytes]]:
+    """Updates of one person, cut where their time goes."""
+    doc: Doc[Any] = Doc(client_id=random.randrange(1 << 21, 1 << 31))
+    things = doc.get(ROOT, type=Map)
+    made: list[bytes] = []
+    subscription = doc.observe(lambda event: made.append(bytes(event.update)))
+    for nth in range(count):
+        key = f"{name}" if kind == "drag" else f"{name}/{nth}"
+        things[key] = f"<{name:04d}{nth:07d}{NEVER.decode()}>"
+    doc.unobserve(subscription)
+    cuts = [update.index(b"<%04d%07d" % (name, nth)) + 12 for nth, update in enumerate(made)]
+    return [(u[:cut], u[cut + 19 :]) for u, cut in zip(made, cuts, strict=True)]
+
+
+async def fan_out(crowd: Crowd) -> dict[str, Any]:
+    """Everybody does something `rate` times a second; what reached the others, and its cost."""
+    plan = crowd.plan
+    await crowd.come(plan.people)
+    each = int(plan.rate * (plan.seconds + WARM_S)) + 2
+    edits = {p.name: edits_of(p.name, each, plan.kind) for p in crowd.people}
+    done = [0] * plan.people
+    gap, begin = 1 / plan.rate, time.monotonic() + 0.1
+    order = [(begin + random.Random(n).random() * gap, n) for n in range(plan.people)]
+    heapq.heapify(order)
+    neighbours = [sum(p.room == other.room for other in crowd.people) - 1 for p in crowd.people]
+    start: tuple[float, float, int] | None = None
+    while (now := time.monotonic()) < begin + WARM_S + plan.seconds:
+        if start is None and now >= begin + WARM_S:
+            crowd.measuring, start = True, (now, crowd.processor(), crowd.delivered)
+        while order[0][0] <= now:
+            due, name = heapq.heappop(order)
+            heapq.heappush(order, (due + gap, name))
+            act(crowd.people[name], edits[name], done, plan.kind)
+        await asyncio.sleep(max(0.0005, order[0][0] - time.monotonic()))
+    assert start is not None
+    wall, cost = now - start[0], crowd.processor() - start[1]
+    reached = crowd.delivered - start[2]
+    expected = sum(count * others for count, others in zip(done, neighbours, strict=True))
+    until = time.monotonic() + DRAIN_S
+    while crowd.delivered < expected and time.monotonic() < until:  # noqa: ASYNC110 - nobody tells
+        await asyncio.sleep(0.02)
+    delays = sorted(crowd.delays) or [0]
+    return {
+        "delivered_per_s": reached / wall,
+        "cpu_us": cost / max(reached, 1) * 1e6,
+        "cpu_share": cost / wall,
+        "p50_ms": delays[len(delays) // 2] / 1e6,
+        "p99_ms": delays[int(len(delays) * 0.99)] / 1e6,
+        "missing": expected - crowd.delivered,
+        "disconnected": crowd.lost,
+        "memory_mb": crowd.memory(),
+    }
+
+
+def act(person: Person, edits: list[tuple[bytes, bytes]], done: list[int], kind: str) -> None:
+    """The next deed of one person."""
+    nth, now = done[person.name], b"%019d" % time.monotonic_ns()
+    if nth >= len(edits):
+        return
+    done[person.name] += 1
+    if kind == "presence":
+        person.be_somewhere(nth, now)
+    else:
+        before, after = edits[nth]
+        person.edit(before + now + after)
+
+
+async def idle(crowd: Crowd) -> dict[str, Any]:
+    """What a thousand sockets that say nothing cost."""
+    before, cost = crowd.memory(), crowd.processor()
+    await crowd.come(crowd.plan.people)
+    cost = crowd.processor() - cost
+    await asyncio.sleep(2)
+    return {
+        "memory_mb": crowd.memory() - before,
+        "connect_ms": cost / crowd.plan.people * 1e3,
+    }
+
+
+async def fill(crowd: Crowd) -> dict[str, Any]:
+    """One person writes a long history."""
+    await crowd.come(1)
+    (person,) = crowd.people
+    for nth, (before, after) in enumerate(edits_of(0, crowd.plan.count, "add")):
+        person.edit(before + b"%019d" % time.monotonic_ns() + after)
+        if nth % 200 == 199:
+            await until_acknowledged(person)
+    await until_acknowledged(person)
+    return {}
+
+
+async def until_acknowledged(person: Person) -> None:
+    """Wait until the server has said so of everything that was sent."""
+    async with asyncio.timeout(60):
+        while person.acknowledged < person.sent - (person.prefix != b""):
+            person.news.clear()
+            await person.news.wait()
+
+
+async def open_(crowd: Crowd) -> dict[str, Any]:
+    """How long until the whole document is there, and for how long nobody else was served."""
+    plan = crowd.plan
+    longest, looking = 0.0, True
+
+    async def look() -> None:
+        nonlocal longest
+        reader, writer = await asyncio.open_connection("127.0.0.1", plan.port)
+        while looking:
+            then = time.monotonic()
+            writer.write(f"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1:{plan.port}\r\n\r\n".encode())
+            await reader.readuntil(b"}" if plan.dialect == "plain" else b"\r\n\r\n")
+            longest = max(longest, time.monotonic() - then)
+            await asyncio.sleep(0.001)
+        writer.close()
+
+    looks = asyncio.create_task(look()) if plan.dialect == "plain" else None
+    await asyncio.sleep(0.3)
+    longest, begin, cost = 0.0, time.monotonic(), crowd.processor()
+    await crowd.come(1)
+    took = time.monotonic() - begin
+    answer = crowd.people[0].synced.result()
+    await asyncio.sleep(0.1)
+    looking = False
+    if looks is not None:
+        await looks
+    doc: Doc[Any] = Doc()
+    things = doc.get(ROOT, type=Map)
+    doc.apply_update(answer)
+    return {
+        "ms": took * 1e3,
+        "cpu_ms": (crowd.processor() - cost) * 1e3,
+        "blocked_ms": longest * 1e3 if looks is not None else None,
+        "things": len(things),
+        "bytes": len(answer),
+    }
+
+
+async def one_by_one(crowd: Crowd) -> dict[str, Any]:
+    """One person who waits for each acknowledgement before the next edit."""
+    await crowd.come(1)
+    (person,) = crowd.people
+    times: list[float] = []
+    cost = crowd.processor()
+    for before, after in edits_of(0, crowd.plan.count, "add"):
+        then = time.monotonic()
+        person.edit(before + b"%019d" % time.monotonic_ns() + after)
+        await until_acknowledged(person)
+        times.append(time.monotonic() - then)
+        await asyncio.sleep(0.02)
+    times.sort()
+    return {
+        "p50_ms": times[len(times) // 2] * 1e3,
+        "p99_ms": times[int(len(times) * 0.99)] * 1e3,
+        "cpu_us": (crowd.processor() - cost) / len(times) * 1e6,
+    }
+
+
+DEEDS: Final[dict[str, Callable[[Crowd], Any]]] = {
+    "fan out": fan_out,
+    "idle": idle,
+    "fill": fill,
+    "open": open_,
+    "one by one": one_by_one,
+}
+
+
+async def main(plan: Plan) -> None:
+    crowd = Crowd(plan)
+    found = await DEEDS[plan.deed](crowd)
+    crowd.leave()
+    sys.stdout.write(json.dumps(found))
+
+
+if __name__ == "__main__":
+    uvloop.run(main(Plan(**json.loads(sys.argv[1]))))

@@ -1,0 +1,112 @@
+"""`make soak`: what takes longer than CI may. Each part is a bigger dose of tests that CI runs too."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Final, NamedTuple
+
+REPOSITORY: Final = Path(__file__).parents[1]
+
+
+class Part(NamedTuple):
+    """What happens so many times, and the tests that do it."""
+
+    what: str
+    dose: dict[str, str]
+    tests: tuple[str, ...]
+
+
+PARTS: Final[dict[str, Part]] = {
+    "kills": Part(
+        "1,000 × kill -9 of a process at 8 chosen points and at any",
+        {"TEST_KILLS": "1000"},
+        ("tests/editor/test_kill.py", "-k", "wherever"),
+    ),
+    "images": Part(
+        "10,000 images of a disk after a power cut",
+        {"SOAK_IMAGES": "10000"},
+        ("tests/journal/test_power.py", "-k", "power_cut"),
+    ),
+    "faults": Part(
+        "500 writes that fail, full disks",
+        {"SOAK_FAULTS": "500"},
+        ("tests/journal/test_power.py", "-k", "not power_cut"),
+    ),
+    "stops": Part(
+        "100 immediate stops of Postgres under load",
+        {"SOAK_STOPS": "100"},
+        ("tests/journal/test_postgres.py", "-k", "immediate_stops"),
+    ),
+    "cuts": Part(
+        "1,000 connections to Postgres cut at any moment",
+        {"SOAK_CUTS": "1000"},
+        ("tests/journal/test_postgres.py", "-k", "cuts_anywhere"),
+    ),
+    "flips": Part(
+        "10,000 flipped bytes of a log",
+        {"SOAK_FLIPS": "10000"},
+        ("tests/journal/test_verify.py",),
+    ),
+    "reconnects": Part(
+        "10,000 reconnects, floods of upgrades",
+        {"TEST_RECONNECTS": "10000"},
+        ("tests/editor/test_floods.py",),
+    ),
+    "mutants": Part(
+        "1,000,000 mutated updates against the scanner",
+        {"TEST_MUTANTS": "1000000"},
+        ("tests/editor/test_scan_fuzz.py",),
+    ),
+    "files": Part(
+        "10,000 generated files through every reader",
+        {"FUZZ_EXAMPLES": "10000"},
+        ("tests/fuzz",),
+    ),
+    "robots": Part(
+        "10,000 histories of runs with false confirmations, 1,000 stops and races, 300 clicks on Stop",
+        {
+            "TEST_HISTORIES": "10000",
+            "TEST_STOPS": "1000",
+            "TEST_RACES": "1000",
+            "TEST_STOP_CLICKS": "300",
+        },
+        (
+            "-s",
+            "tests/runner/test_false_confirmations.py",
+            "tests/runner/test_stops_and_starts.py",
+            "tests/test_stop_latency.py",
+        ),
+    ),
+    "clients": Part(
+        "stock clients in a room that is silent for a minute",
+        {"TEST_IDLE_SECONDS": "61"},
+        ("tests/test_room_clients.py",),
+    ),
+}
+
+
+def main(names: list[str]) -> int:
+    """Exit code: 1 when a part failed, 2 for a name that is none."""
+    if unknown := [name for name in names if name not in PARTS]:
+        sys.stderr.write(f"no part: {', '.join(unknown)}; there are {', '.join(PARTS)}\n")
+        return 2
+    failed = [name for name in names or PARTS if not passes(name, PARTS[name])]
+    return 1 if failed else 0
+
+
+def passes(name: str, part: Part) -> bool:
+    """Run a part, and say how long it took."""
+    start = time.monotonic()
+    command = [sys.executable, "-m", "pytest", "-q", "--timeout=0", *part.tests]
+    done = subprocess.run(command, cwd=REPOSITORY, env={**os.environ, **part.dose}, check=False)
+    word = "passed" if done.returncode == 0 else "FAILED"
+    took = time.monotonic() - start
+    sys.stdout.write(f"{name}: {part.what}: {word} after {took:.0f} s\n")
+    sys.stdout.flush()
+    return done.returncode == 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
