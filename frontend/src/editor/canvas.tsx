@@ -27,7 +27,7 @@ import { robotColor } from "../ui/robot";
 import { type Bench, endName, GRID, placeAction } from "./bench";
 import style from "./canvas.module.css";
 import { arrowAt } from "./hit";
-import { Cursors } from "./people";
+import { AtCards, Cursors } from "./people";
 import type { useCanvas } from "./use-canvas";
 import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
 import { usePress } from "./use-press";
@@ -235,6 +235,7 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
           <ArrowTips />
           <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
           <Cursors me={me} />
+          <AtCards me={me} places={canvas.places} sizes={canvas.sizes} />
           {map && (
             <MiniMap<CanvasNode>
               position="top-right"

@@ -1,24 +1,37 @@
-/** Who else is here: faces in the bar, pointers on the canvas. */
+/** Who else is here: faces in the bar, pointers on the canvas, and who is at which card. */
 import { Tooltip } from "@mantine/core";
 import { ViewportPortal } from "@xyflow/react";
+import type { CSSProperties } from "react";
+import { splitKey } from "../graph/layout";
 import type { Person } from "../room/presence";
-import { usePeople } from "../room/use-room";
+import { useFollowing, usePeople } from "../room/use-room";
+import { CARD, type Places, type Sizes } from "../ui/canvas/arrange";
 import { colorsOf, initials } from "../ui/robot";
 import style from "./people.module.css";
 
 const MOST = 4;
 
-function nameOf(person: Person): string {
+export function nameOf(person: { readonly name: string }): string {
   return person.name || "Guest";
 }
 
+/** A name as it is written, whatever its direction does to what stands beside it. */
+function Name({ of }: { of: { readonly name: string } }) {
+  return <bdi className={style.name}>{nameOf(of)}</bdi>;
+}
+
 /** Each person once, however many windows they have. */
-export function onePerId(people: readonly Person[]): Person[] {
+export function onePerId<T extends { readonly id: string }>(people: readonly T[]): T[] {
   return [...new Map(people.map((person) => [person.id, person])).values()];
 }
 
+const colored = (color: string | undefined) => ({ "--c": color }) as CSSProperties;
+
 export function People({ me }: { me: string }) {
-  const others = onePerId(usePeople()).filter((person) => person.id !== me);
+  const { whom, follow } = useFollowing();
+  const people = usePeople().filter((person) => person.id !== me);
+  const leader = people.find(({ client }) => client === whom);
+  const others = onePerId(leader ? [...people, leader] : people);
   if (others.length === 0) return null;
   const shown = others.slice(0, MOST);
   const colors = colorsOf([me, ...others.map((person) => person.id)]);
@@ -26,18 +39,54 @@ export function People({ me }: { me: string }) {
   return (
     <div className={style.people}>
       <span className="visually-hidden">Also here: {names}</span>
-      {shown.map((person) => (
-        <Tooltip key={person.id} label={nameOf(person)}>
-          <span className={style.face} style={{ background: colors.get(person.id) }}>
-            {initials(nameOf(person))}
-          </span>
-        </Tooltip>
-      ))}
+      {shown.map((person) => {
+        const followed = person.client === whom;
+        return (
+          <Tooltip
+            key={person.id}
+            label={
+              <>
+                {followed ? "Stop following" : "Follow"} <Name of={person} />
+              </>
+            }
+          >
+            <button
+              type="button"
+              className={style.face}
+              style={colored(colors.get(person.id))}
+              aria-pressed={followed}
+              aria-label={`Follow ${nameOf(person)}`}
+              onClick={() => follow(followed ? null : person.client)}
+            >
+              {initials(nameOf(person))}
+            </button>
+          </Tooltip>
+        );
+      })}
       {others.length > MOST && (
         <span className={style.face} data-more>
           +{others.length - MOST}
         </span>
       )}
+    </div>
+  );
+}
+
+/** Around the canvas while it shows what somebody else sees. */
+export function FollowFrame({ me }: { me: string }) {
+  const { whom, follow } = useFollowing();
+  const people = usePeople();
+  const leader = people.find(({ client }) => client === whom);
+  if (leader === undefined) return null;
+  const color = colorsOf([me, ...people.map((person) => person.id)]).get(leader.id);
+  return (
+    <div className={style.frame} style={colored(color)}>
+      <span className={style.followed} role="status">
+        Following <Name of={leader} />
+        <button type="button" onClick={() => follow(null)}>
+          Stop following<kbd aria-hidden>Esc</kbd>
+        </button>
+      </span>
     </div>
   );
 }
@@ -54,12 +103,10 @@ export function Cursors({ me }: { me: string }) {
           <div
             key={person.client}
             className={style.cursor}
-            style={
-              {
-                transform: `translate(${at[0]}px, ${at[1]}px)`,
-                "--c": colors.get(person.id),
-              } as React.CSSProperties
-            }
+            style={{
+              transform: `translate(${at[0]}px, ${at[1]}px)`,
+              ...colored(colors.get(person.id)),
+            }}
             aria-hidden
           >
             <svg width="14" height="18" viewBox="0 0 14 18" aria-hidden="true">
@@ -69,10 +116,64 @@ export function Cursors({ me }: { me: string }) {
                 stroke="#fff"
               />
             </svg>
-            <span>{nameOf(person)}</span>
+            <span>
+              <Name of={person} />
+            </span>
           </div>
         );
       })}
     </ViewportPortal>
+  );
+}
+
+interface AtCardsProps {
+  me: string;
+  places: Places;
+  sizes: Sizes;
+}
+
+/** Small initials at the cards of which somebody has a field under their caret. */
+export function AtCards({ me, places, sizes }: AtCardsProps) {
+  const people = usePeople();
+  const at = new Map<string, Person[]>();
+  for (const person of people) {
+    const { head } = splitKey(person.presence.editing ?? "");
+    if (person.id !== me && places.has(head)) at.set(head, [...(at.get(head) ?? []), person]);
+  }
+  if (at.size === 0) return null;
+  const colors = colorsOf([me, ...people.map((person) => person.id)]);
+  return (
+    <ViewportPortal>
+      {[...at].map(([key, editors]) => {
+        const [x, y] = places.get(key) ?? [0, 0];
+        const right = x + (sizes.get(key)?.width ?? CARD.width);
+        return (
+          <div
+            key={key}
+            className={style.atCard}
+            style={{ transform: `translate(${right}px, ${y}px) translate(-100%, -50%)` }}
+          >
+            {onePerId(editors).map((person) => (
+              <Initial key={person.id} person={person} color={colors.get(person.id)} />
+            ))}
+          </div>
+        );
+      })}
+    </ViewportPortal>
+  );
+}
+
+interface InitialProps {
+  person: { readonly name: string };
+  color: string | undefined;
+}
+
+/** A person as a small round sign. */
+export function Initial({ person, color }: InitialProps) {
+  return (
+    <span className={style.initial} style={colored(color)} title={`${nameOf(person)} is writing`}>
+      <span aria-hidden>{initials(nameOf(person))}</span>
+      <span className="visually-hidden">{nameOf(person)} is writing</span>
+    </span>
   );
 }

@@ -11,12 +11,14 @@ import { Empty } from "../ui/empty";
 import { type Bench, useBench } from "./bench";
 import { Canvas } from "./canvas";
 import { DryRunBar } from "./dry-run/dry-run-bar";
+import { FollowFrame } from "./people";
 import { Robots } from "./robots";
 import style from "./stage.module.css";
 import { Toolbar } from "./toolbar";
 import type { EditorState } from "./use-bench";
 import { useCanvas } from "./use-canvas";
 import { useDeepLink } from "./use-deep-link";
+import { useFollowedView } from "./use-following";
 import { useView } from "./use-view";
 
 interface Props {
@@ -61,9 +63,10 @@ function Inside({ me, sight, progress, marks, compact, phone, run, writing, corn
     run: bench.dryRun ? null : run,
     pointer,
   });
+  const followed = useFollowedView({ flow, frame, view, onPanned });
   useEffect(() => {
-    sight.current = { places: () => places, sizes: () => sizes, view };
-  }, [sight, view, places, sizes]);
+    sight.current = { places: () => places, sizes: () => sizes, view: followed.view };
+  }, [sight, followed, places, sizes]);
 
   useDryRunInView(bench);
   useDeepLink(bench, begun);
@@ -76,7 +79,10 @@ function Inside({ me, sight, progress, marks, compact, phone, run, writing, corn
           canvas={canvas}
           me={me}
           map={!compact && bench.graph.actions.length > 3}
-          onPanned={onPanned}
+          onPanned={() => {
+            onPanned();
+            followed.end();
+          }}
           pointer={pointer}
           writing={writing}
         />
@@ -114,6 +120,7 @@ function Inside({ me, sight, progress, marks, compact, phone, run, writing, corn
             <Robots />
           </div>
         )}
+        <FollowFrame me={me} />
         <div className={style.tools} data-hidden={(phone && bench.dryRun !== null) || undefined}>
           <Toolbar compact={compact} />
         </div>

@@ -4,6 +4,7 @@ import type * as Y from "yjs";
 import { undoOf } from "../graph/edit";
 import { followGraph, type GraphSource } from "../graph/read";
 import { type ConnectOptions, connect, type Room } from "./connect";
+import { Following } from "./following";
 import { type PresenceSource, presenceOf } from "./presence";
 
 export interface OpenRoom {
@@ -11,6 +12,7 @@ export interface OpenRoom {
   readonly doc: Y.Doc;
   readonly source: GraphSource;
   readonly presence: PresenceSource;
+  readonly following: Following;
   readonly undo: Y.UndoManager;
 }
 
@@ -21,14 +23,17 @@ export function openRoom(options: ConnectOptions): Opened {
   const room = connect(options);
   const source = followGraph(room.doc);
   const presence = presenceOf(room.awareness);
+  const following = new Following(presence);
   const undo = undoOf(room.doc);
   return {
     room,
     doc: room.doc,
     source,
     presence,
+    following,
     undo,
     leave() {
+      following.close();
       presence.close();
       source.close();
       undo.destroy();

@@ -27,6 +27,13 @@ export interface View {
   readonly x: number;
   readonly y: number;
   readonly zoom: number;
+  /** The size of the canvas on their screen, in px. */
+  readonly width?: number;
+  readonly height?: number;
+}
+
+export function samePlace(a: View | null, b: View | null): boolean {
+  return a === b || (a !== null && b !== null && same(a, b));
 }
 
 /** One other page. A person with two windows is here twice, with the same `id`. */
@@ -142,10 +149,17 @@ function dragOf(value: unknown): Presence["drag"] | null {
 }
 
 function viewOf(value: unknown): View | null {
-  const { x, y, zoom } = record(value);
+  const { x, y, zoom, width, height } = record(value);
   const place = pair([x, y]);
   if (place === null || typeof zoom !== "number" || !(zoom > 0 && zoom < 1e3)) return null;
-  return { x: place[0], y: place[1], zoom };
+  const size = pair([width, height]);
+  const sized = size !== null && size[0] > 0 && size[1] > 0;
+  return {
+    x: place[0],
+    y: place[1],
+    zoom,
+    ...(sized && { width: size[0], height: size[1] }),
+  };
 }
 
 const record = (value: unknown): Readonly<Record<string, unknown>> =>

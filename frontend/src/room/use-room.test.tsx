@@ -12,6 +12,7 @@ import {
   RoomProvider,
   useChoice,
   useEditors,
+  useFollowing,
   useGraph,
   useGraphPart,
   useLink,
@@ -19,7 +20,6 @@ import {
   usePeople,
   useRoom,
   useUndo,
-  useViewOf,
 } from "./use-room";
 
 let server: FakeServer;
@@ -113,6 +113,7 @@ test("leaving and changing the graph close the room that was open", () => {
 });
 
 let choice: Choice | null;
+let goAfter: (client: number | null) => void;
 
 function Together() {
   open = useRoom();
@@ -121,8 +122,10 @@ function Together() {
   const names = useGraph().actions.map((action) => action.name);
   const editors = useEditors("k|name").map((person) => person.name);
   const waiting = useOthersWaiting().others.map(({ name, waiting }) => `${name}:${waiting}`);
-  const view = useViewOf(5);
-  const parts = [state, unsaved, ...names, ...editors, ...waiting, view ? `at ${view.x}` : ""];
+  const { whom, follow } = useFollowing();
+  goAfter = follow;
+  const place = open.following.view();
+  const parts = [state, unsaved, ...names, ...editors, ...waiting, whom && `at ${place?.x}`];
   return <p>{parts.join(" ").trim()}</p>;
 }
 
@@ -160,7 +163,10 @@ test("a page knows who edits a field, where somebody looks, and whose edits wait
   const view = { x: 7, y: 8, zoom: 1 };
   act(() => server.presence(5, 1, { user: MARI, editing: "k|name", view }));
   await flush();
+  act(() => goAfter(5));
   expect(text()).toBe("live 0 Mari Mari:1 at 7");
+  act(() => server.presence(5, 2, null));
+  expect(text()).toBe("live 0 Mari:1");
 });
 
 test("edits on a history that the server left are made again there, or dropped, as the person says", async () => {

@@ -3,6 +3,7 @@
 import {
   createContext,
   type ReactNode,
+  useCallback,
   useContext,
   useEffect,
   useMemo,
@@ -11,11 +12,12 @@ import {
   useSyncExternalStore,
 } from "react";
 import { EMPTY_GRAPH, type Graph } from "../graph/model";
+import { same } from "../graph/same";
 import type { Keep, Link } from "./connect";
 import { browser, type OtherPerson } from "./device";
 import { type Stranded, strandedOf } from "./history";
 import type { OpenRoom } from "./open-room";
-import type { Person, View } from "./presence";
+import type { Person } from "./presence";
 import { type Notice, type Stay, Visit } from "./visit";
 
 export type { OpenRoom } from "./open-room";
@@ -142,18 +144,31 @@ export function usePeople(): readonly Person[] {
   return useSyncExternalStore(presence.onPeople, presence.people);
 }
 
-/** The others who edit one field, `<key>|<field>`. */
-export function useEditors(field: string): readonly Person[] {
-  const people = usePeople();
-  return useMemo(
-    () => people.filter(({ presence }) => presence.editing === field),
-    [people, field],
-  );
+/** Somebody at a field: who they are, and nothing that changes while they are there. */
+export type Editing = Pick<Person, "client" | "id" | "name">;
+
+const NO_EDITORS: readonly Editing[] = [];
+
+/** The others who edit one field, `<key>|<field>`; draws again only when somebody comes or goes. */
+export function useEditors(field: string): readonly Editing[] {
+  const { presence } = useRoom();
+  const last = useRef(NO_EDITORS);
+  return useSyncExternalStore(presence.onPeople, () => {
+    const found = presence
+      .people()
+      .filter((person) => person.presence.editing === field)
+      .map(({ client, id, name }) => ({ client, id, name }));
+    if (!same(found, last.current)) last.current = found;
+    return last.current;
+  });
 }
 
-/** What another page shows, to go where it goes; null when it says nothing or has left. */
-export function useViewOf(client: number | null): View | null {
-  return usePeople().find((person) => person.client === client)?.presence.view ?? null;
+/** Whom this page follows, and how to begin and end that. */
+export function useFollowing() {
+  const { following } = useRoom();
+  const whom = useSyncExternalStore(following.onChange, following.whom);
+  const follow = useCallback((client: number | null) => following.follow(client), [following]);
+  return { whom, follow };
 }
 
 /** What there is to decide about edits that wait on another history; null when nothing is. */

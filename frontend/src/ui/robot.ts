@@ -28,9 +28,20 @@ export function colorsOf(ids: readonly string[]): Map<string, string> {
   return colors;
 }
 
+const letters = new Intl.Segmenter(undefined, { granularity: "grapheme" });
+
+/** The first two letters of a name, or those of its first and last word, in any script. */
 export function initials(name: string): string {
   const words = name.trim().split(/\s+/);
-  const letters =
-    words.length > 1 ? `${words[0]?.[0]}${words.at(-1)?.[0]}` : name.trim().slice(0, 2);
-  return letters.toUpperCase() || "?";
+  const [first = "", last = ""] = [words[0], words.length > 1 ? words.at(-1) : undefined];
+  const own = lettersOf(first);
+  const found =
+    last === "" ? own.slice(0, 2) : [...own.slice(0, 1), ...lettersOf(last).slice(0, 1)];
+  return found.join("").toUpperCase() || "?";
+}
+
+/** What people would call letters; of a pile of marks only the first few. */
+function lettersOf(word: string): string[] {
+  const start = word.slice(0, 64);
+  return [...letters.segment(start)].map(({ segment }) => segment.slice(0, 12));
 }

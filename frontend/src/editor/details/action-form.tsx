@@ -6,6 +6,7 @@ import type { Action, Graph } from "../../graph/model";
 import { robotColor } from "../../ui/robot";
 import { useBench } from "../bench";
 import { DraftInput } from "../draft-input";
+import { FieldOf } from "../field-of";
 import { Arrows } from "./arrows";
 import style from "./details.module.css";
 import { Parameters } from "./parameters";
@@ -45,56 +46,70 @@ export function ActionForm({ action }: { action: Action }) {
   return (
     <div className={style.form}>
       <div className={style.nameRow}>
-        <DraftInput
-          label="Name"
-          value={action.name}
-          check={(draft) => (draft.trim() === "" ? "An action has a name." : null)}
-          onCommit={(name) => rename(doc, action.key, name.trim())}
-        />
-        <DraftInput
-          label="Number"
-          value={String(action.instanceId)}
-          inputMode="decimal"
-          check={wholeNumber}
-          onCommit={(text) => setField(doc, action.key, "instanceId", Number(text))}
-        />
+        <FieldOf of={action.key} field="name">
+          <DraftInput
+            label="Name"
+            value={action.name}
+            check={(draft) => (draft.trim() === "" ? "An action has a name." : null)}
+            onCommit={(name) => rename(doc, action.key, name.trim())}
+          />
+        </FieldOf>
+        <FieldOf of={action.key} field="number">
+          <DraftInput
+            label="Number"
+            value={String(action.instanceId)}
+            inputMode="decimal"
+            check={wholeNumber}
+            onCommit={(text) => setField(doc, action.key, "instanceId", Number(text))}
+          />
+        </FieldOf>
       </div>
-      <Autocomplete
-        key={`actor-${action.actor}`}
-        label="Robot"
-        size="sm"
-        placeholder="any robot"
-        data={robots(graph)}
-        defaultValue={action.actor}
-        leftSection={
-          <i className={style.robot} style={{ background: robotColor(action.actor) }} aria-hidden />
-        }
-        onBlur={(event) => {
-          if (event.currentTarget.value !== action.actor) {
-            setField(doc, action.key, "actor", event.currentTarget.value.trim());
+      <FieldOf of={action.key} field="robot">
+        <Autocomplete
+          key={`actor-${action.actor}`}
+          label="Robot"
+          size="sm"
+          placeholder="any robot"
+          data={robots(graph)}
+          defaultValue={action.actor}
+          leftSection={
+            <i
+              className={style.robot}
+              style={{ background: robotColor(action.actor) }}
+              aria-hidden
+            />
           }
-        }}
-        onOptionSubmit={(value) => setField(doc, action.key, "actor", value)}
-      />
-      <DraftInput
-        label="Description"
-        lines
-        value={action.description}
-        placeholder="What it does, for people"
-        onCommit={(text) => setField(doc, action.key, "description", text)}
-      />
+          onBlur={(event) => {
+            if (event.currentTarget.value !== action.actor) {
+              setField(doc, action.key, "actor", event.currentTarget.value.trim());
+            }
+          }}
+          onOptionSubmit={(value) => setField(doc, action.key, "actor", value)}
+        />
+      </FieldOf>
+      <FieldOf of={action.key} field="description">
+        <DraftInput
+          label="Description"
+          lines
+          value={action.description}
+          placeholder="What it does, for people"
+          onCommit={(text) => setField(doc, action.key, "description", text)}
+        />
+      </FieldOf>
       <Parameters action={action} side="in" />
       <RunsWhen of={action.key} title="When" />
       <Arrows action={action} />
       <Parameters action={action} side="out" />
       <section className={style.section}>
-        <DraftInput
-          label="Type"
-          value={action.type}
-          description="sync and async behave alike; spontaneous may report again and again"
-          check={(draft) => (draft.trim() === "" ? "The engine wants one, usually sync." : null)}
-          onCommit={(text) => setField(doc, action.key, "type", text.trim())}
-        />
+        <FieldOf of={action.key} field="type">
+          <DraftInput
+            label="Type"
+            value={action.type}
+            description="sync and async behave alike; spontaneous may report again and again"
+            check={(draft) => (draft.trim() === "" ? "The engine wants one, usually sync." : null)}
+            onCommit={(text) => setField(doc, action.key, "type", text.trim())}
+          />
+        </FieldOf>
       </section>
     </div>
   );

@@ -3,6 +3,7 @@ import { Kbd, TagsInput } from "@mantine/core";
 import { setGraphDescription, setGraphName } from "../../graph/edit";
 import { useBench } from "../bench";
 import { DraftInput } from "../draft-input";
+import { FieldOf } from "../field-of";
 import style from "./details.module.css";
 import { labelsOf, setLabels } from "./labels";
 
@@ -11,19 +12,23 @@ export function GraphForm() {
   const arrows = graph.relations.length;
   return (
     <div className={style.form}>
-      <DraftInput
-        label="Graph"
-        value={graph.name}
-        check={(draft) => (draft.trim() === "" ? "A graph has a name." : null)}
-        onCommit={(name) => setGraphName(doc, name.trim())}
-      />
-      <DraftInput
-        label="Description"
-        lines
-        value={graph.description}
-        placeholder="What it is for"
-        onCommit={(text) => setGraphDescription(doc, text)}
-      />
+      <FieldOf of="graph" field="name">
+        <DraftInput
+          label="Graph"
+          value={graph.name}
+          check={(draft) => (draft.trim() === "" ? "A graph has a name." : null)}
+          onCommit={(name) => setGraphName(doc, name.trim())}
+        />
+      </FieldOf>
+      <FieldOf of="graph" field="description">
+        <DraftInput
+          label="Description"
+          lines
+          value={graph.description}
+          placeholder="What it is for"
+          onCommit={(text) => setGraphDescription(doc, text)}
+        />
+      </FieldOf>
       <TagsInput
         label="Labels"
         size="sm"

@@ -7,6 +7,7 @@ import type { Side } from "../../graph/layout";
 import type { Action } from "../../graph/model";
 import { pathWords } from "../../ui/canvas/value-text";
 import { useBench } from "../bench";
+import { FieldOf } from "../field-of";
 import style from "./details.module.css";
 import { ParameterField } from "./parameter-field";
 import { type Family, families, pathFrom, taken } from "./parameter-path";
@@ -81,14 +82,15 @@ export function Parameters({ action, side }: { action: Action; side: Side }) {
   const list = side === "in" ? action.inputs : action.outputs;
   const fields = ({ prefix, members }: Family) =>
     members.map((parameter) => (
-      <ParameterField
-        key={parameter.path}
-        owner={action.key}
-        side={side}
-        parameter={parameter}
-        name={pathWords(parameter.path.slice(prefix.length))}
-        others={list.filter((other) => other !== parameter)}
-      />
+      <FieldOf key={parameter.path} of={action.key} field={`${side}/${parameter.path}`}>
+        <ParameterField
+          owner={action.key}
+          side={side}
+          parameter={parameter}
+          name={pathWords(parameter.path.slice(prefix.length))}
+          others={list.filter((other) => other !== parameter)}
+        />
+      </FieldOf>
     ));
   return (
     <section className={style.section}>

@@ -1,0 +1,56 @@
+/** A field that several people may write in: who has the caret there is shown to the others. */
+import { type FocusEvent, type ReactNode, useEffect, useRef } from "react";
+import { useEditors, usePeople, useRoom } from "../room/use-room";
+import { colorsOf } from "../ui/robot";
+import style from "./field-of.module.css";
+import { Initial, onePerId } from "./people";
+
+interface Props {
+  /** The key of the action, the id of the arrow, or `graph`. */
+  of: string;
+  field: string;
+  children: ReactNode;
+}
+
+const WRITABLE = "input, textarea, [contenteditable=true]";
+
+export function FieldOf({ of, field, children }: Props) {
+  const { presence } = useRoom();
+  const id = `${of}|${field}`;
+  const here = useRef(false);
+  const leave = useRef(() => {});
+  leave.current = () => {
+    if (here.current) presence.tell({ editing: undefined });
+    here.current = false;
+  };
+  const come = (event: FocusEvent) => {
+    if (!event.target.matches(WRITABLE)) return;
+    here.current = true;
+    presence.tell({ editing: id });
+  };
+  // A field that goes while the caret is in it says nothing by itself.
+  useEffect(() => () => leave.current(), []);
+  return (
+    // biome-ignore lint/a11y/noStaticElementInteractions: only hears of the field inside
+    <div className={style.field} onFocus={come} onBlur={() => leave.current()}>
+      {children}
+      <Writers id={id} />
+    </div>
+  );
+}
+
+function Writers({ id }: { id: string }) {
+  const writers = onePerId(useEditors(id));
+  return writers.length === 0 ? null : <Signs writers={writers} />;
+}
+
+function Signs({ writers }: { writers: ReturnType<typeof useEditors> }) {
+  const colors = colorsOf(usePeople().map((person) => person.id));
+  return (
+    <span className={style.signs}>
+      {writers.map((writer) => (
+        <Initial key={writer.client} person={writer} color={colors.get(writer.id)} />
+      ))}
+    </span>
+  );
+}

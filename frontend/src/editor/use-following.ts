@@ -1,0 +1,96 @@
+/** The view of the canvas and other people: what is seen here is told, and somebody's can be followed. */
+import { type ReactFlowInstance, useOnViewportChange, type Viewport } from "@xyflow/react";
+import { type RefObject, useCallback, useEffect, useMemo, useSyncExternalStore } from "react";
+import type { View } from "../room/presence";
+import { useFollowing, useRoom } from "../room/use-room";
+import type { Arrow, CanvasNode } from "../ui/canvas/elements";
+import type { View as BenchView } from "./bench";
+
+const GLIDE = 120; // ms; views come at most every 50 ms
+
+interface Size {
+  readonly width: number;
+  readonly height: number;
+}
+
+/** What is seen through a frame of this size, to tell the others. */
+export function viewOf({ x, y, zoom }: Viewport, { width, height }: Size): View {
+  return {
+    x: Math.round(-x / zoom),
+    y: Math.round(-y / zoom),
+    zoom: Math.round(zoom * 1000) / 1000,
+    width: Math.round(width),
+    height: Math.round(height),
+  };
+}
+
+/** How to look so that all they see is seen in a frame of this size, with their middle in its middle. */
+export function lookingAt(view: View, { width, height }: Size): Viewport {
+  const theirs = { width: view.width ?? width, height: view.height ?? height };
+  const zoom = view.zoom * Math.min(1, width / theirs.width, height / theirs.height);
+  const middle = {
+    x: view.x + theirs.width / view.zoom / 2,
+    y: view.y + theirs.height / view.zoom / 2,
+  };
+  return { x: width / 2 - middle.x * zoom, y: height / 2 - middle.y * zoom, zoom };
+}
+
+interface Given {
+  flow: ReactFlowInstance<CanvasNode, Arrow>;
+  frame: RefObject<HTMLDivElement | null>;
+  view: BenchView;
+  /** Whatever else moves the view shall let it be. */
+  onPanned: () => void;
+}
+
+/** Tells what is seen here, and follows. What the person does to the view ends that. */
+export function useFollowedView({ flow, frame, view: own, onPanned }: Given) {
+  const { presence, following } = useRoom();
+  const { whom, follow } = useFollowing();
+  const view = useSyncExternalStore(following.onChange, following.view);
+  const sizeOf = useCallback((): Size | null => {
+    const room = frame.current;
+    return room && { width: room.clientWidth, height: room.clientHeight };
+  }, [frame]);
+  const tell = useCallback(
+    (viewport: Viewport) => {
+      const size = sizeOf();
+      // Who follows passes on what is followed: two who follow each other come to rest.
+      const told = following.whom() === null ? size && viewOf(viewport, size) : following.view();
+      if (told !== null) presence.tell({ view: told });
+    },
+    [presence, following, sizeOf],
+  );
+  useOnViewportChange({ onChange: tell });
+  useEffect(() => {
+    tell(flow.getViewport());
+    return () => presence.tell({ view: undefined });
+  }, [tell, flow, presence]);
+
+  useEffect(() => {
+    const size = sizeOf();
+    if (view === null || size === null) return;
+    presence.tell({ view });
+    void flow.setViewport(lookingAt(view, size), { duration: GLIDE });
+  }, [view, flow, presence, sizeOf]);
+
+  useEffect(() => {
+    if (whom === null) return;
+    onPanned();
+    const onKey = (event: KeyboardEvent) => {
+      if (event.key === "Escape" && !event.defaultPrevented) follow(null);
+    };
+    window.addEventListener("keydown", onKey);
+    return () => window.removeEventListener("keydown", onKey);
+  }, [whom, follow, onPanned]);
+
+  return useMemo(() => {
+    const end = () => following.follow(null);
+    const ending = (move: () => void) => () => {
+      end();
+      move();
+    };
+    const [fit, zoomIn, zoomOut] = [own.fit, own.zoomIn, own.zoomOut].map(ending);
+    return { end, view: { ...own, fit, zoomIn, zoomOut } as BenchView };
+  }, [following, own]);
+}
