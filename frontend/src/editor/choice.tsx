@@ -13,29 +13,23 @@ function changes(n: number): string {
   return n === 1 ? "1 change" : `${n} changes`;
 }
 
-function Value({ text }: { text: string | null }) {
-  return text ?? <i>nothing</i>;
-}
-
 function Lines({ lines }: { lines: readonly Line[] }) {
   return (
     <ul className={style.lines}>
       {lines.map((line) => (
         <li key={line.field}>
           <span className={style.field}>{line.field}</span>{" "}
-          <del>
-            <Value text={line.before} />
-          </del>{" "}
-          <span aria-hidden>→</span>
-          <span className="visually-hidden">becomes</span>{" "}
-          <ins>
-            <Value text={line.after} />
-          </ins>
-          {line.now !== undefined && (
-            <span className={style.now}>
+          {line.before !== null && <del>{line.before}</del>}
+          {line.before !== null && line.after !== null && (
+            <>
               {" "}
-              now <Value text={line.now} />
-            </span>
+              <span aria-hidden>→</span>
+              <span className="visually-hidden">becomes</span>{" "}
+            </>
+          )}
+          {line.after !== null && <ins>{line.after}</ins>}
+          {line.now !== undefined && (
+            <span className={style.now}> now {line.now ?? "nothing"}</span>
           )}
         </li>
       ))}
@@ -50,6 +44,9 @@ interface ItemProps {
 }
 
 function Item({ change, taken, onTake }: ItemProps) {
+  const { kind, lines } = change;
+  // The title says the name already.
+  const told = kind === "changed" ? lines : lines.filter(({ field }) => field !== "Name");
   return (
     <li className={style.item} data-kind={change.kind}>
       <Checkbox
@@ -69,7 +66,7 @@ function Item({ change, taken, onTake }: ItemProps) {
           </>
         }
       />
-      <Lines lines={change.lines} />
+      <Lines lines={told} />
     </li>
   );
 }
@@ -120,7 +117,7 @@ function Body({ choice, by, onLater }: BodyProps) {
         {when}) were not stored before that. Behind this dialog is the graph as it is now. Which of
         them shall be made in it?
       </Text>
-      <Group mt="xs" gap="xs">
+      <Group mt="xs" gap="xs" className={style.marks ?? ""}>
         <Button size="compact-sm" onClick={() => setLeft(new Set())}>
           Mark all
         </Button>

@@ -21,6 +21,7 @@ const whys: Record<Why, string> = {
   "other-epoch": "A backup was restored",
   "other-client": "Opening anew",
   differs: "Opening anew",
+  full: "This graph is full",
   "not-accepted": "The server refused a change",
   restarting: "The editor restarts",
   "too-slow": "Connection too slow",

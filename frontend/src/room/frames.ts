@@ -29,6 +29,7 @@ const REFUSED: ReadonlyMap<number, Why> = new Map([
   [4403, "forbidden"],
   [4404, "no-such-graph"],
   [4409, "other-epoch"],
+  [4413, "full"],
 ]);
 const FORBIDDEN = 4403;
 /** Two documents with one client id: this one has to take another. */

@@ -14,6 +14,7 @@ export type Why =
   | "other-epoch"
   | "other-client"
   | "differs"
+  | "full"
   | "not-accepted"
   | "restarting"
   | "too-slow";

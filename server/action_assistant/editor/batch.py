@@ -8,9 +8,11 @@ import msgspec
 from pycrdt import merge_updates
 
 from action_assistant.editor import wire
+from action_assistant.editor.fullness import Full
 from action_assistant.editor.member import Member
-from action_assistant.editor.replica import Replica
-from action_assistant.errors import Refused
+from action_assistant.editor.replica import Foreign, Panicked, Replica, TooMuchWaits
+from action_assistant.editor.wire import Malformed
+from action_assistant.errors import BadInput, Refused, TooLarge
 
 _BATCH: Final = 200  # items of one commit
 _BATCH_BYTES: Final = 512 * 1024
@@ -65,12 +67,39 @@ class Taken:
         self.panicked = False
 
 
-def refuse(offer: Offer, code: int, reason: Refused, said: str | None = None) -> None:
-    """Take nothing of an offer; `said` is what its socket is told beside the code."""
+class NotAllowed(Exception):
+    """The edit of somebody who may only look."""
+
+
+#: Why an edit was not taken.
+Objection: TypeAlias = Malformed | Foreign | Full | TooMuchWaits | Panicked | NotAllowed
+
+
+def refuse(offer: Offer, error: Objection) -> None:
+    """Take nothing of an offer: its socket is closed, or whoever waits for it is told."""
+    code, reason, said = _answer(error)
     if offer.member is not None:
         offer.member.refuse(code, said)
     if offer.done is not None and not offer.done.done():
         offer.done.set_exception(reason)
+
+
+def _answer(error: Objection) -> tuple[int, Refused, str | None]:
+    """The close code, the refusal, and what a socket is told beside the code."""
+    match error:
+        case Malformed():
+            return wire.MALFORMED, BadInput(f"The update cannot be read: {error}."), None
+        case Panicked():
+            return wire.MALFORMED, BadInput("The update cannot be read."), None
+        case Foreign():
+            reason = BadInput("The update speaks for somebody else.")
+            return wire.FORBIDDEN, reason, wire.OTHER_CLIENT
+        case Full():
+            return wire.FULL, TooLarge(f"The graph is full: {error}."), str(error)
+        case TooMuchWaits():
+            return wire.TOO_BIG, TooLarge("Too much waits for what never came."), None
+        case NotAllowed():
+            return wire.FORBIDDEN, BadInput("Not allowed."), None
 
 
 def batch_of(items: list[Item]) -> tuple[list[Item], list[Item]]:

@@ -9,6 +9,7 @@ from sqlalchemy import Row, Select, select
 from action_assistant.editor import edits
 from action_assistant.editor import happenings as h
 from action_assistant.editor.document import new_aid
+from action_assistant.editor.fullness import MOST_ACTIONS
 from action_assistant.editor.rooms import Rooms
 from action_assistant.editor.sights import Counts, Sights
 from action_assistant.errors import BadInput, NotFound, NotUmrf, TooLarge
@@ -154,6 +155,8 @@ class Catalogue:
 
     async def _add(self, graph: Graph, about: list[Draft], author: str) -> GraphView:
         made = new_aid()
+        if len(graph.actions) > MOST_ACTIONS:
+            raise TooLarge(f"A graph may have {MOST_ACTIONS:,} actions; here are more.")
         document = Draft(h.UPDATED, author, edits.first(graph))
         await self._journal.append_all(
             [

@@ -1,5 +1,6 @@
 """What one editor process is made of."""
 
+from action_assistant.editor.budget import Budget
 from action_assistant.editor.catalogue import Catalogue
 from action_assistant.editor.history import History
 from action_assistant.editor.invitations import Invitations
@@ -27,6 +28,7 @@ class House:
         self.people = people
         self.rooms = Rooms(journal)
         self.crowd = Crowd(limits=settings.limits)
+        self.budget = Budget(limits=settings.limits)
         self.sights = Sights(journal, self.rooms)
         self.catalogue = Catalogue(journal, self.rooms, self.sights)
         self.versions = Versions(journal, self.sights)

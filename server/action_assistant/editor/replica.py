@@ -12,6 +12,7 @@ import anyio.lowlevel
 import msgspec
 from pycrdt import Doc, get_update
 
+from action_assistant.editor.fullness import Fullness
 from action_assistant.editor.happenings import DEFERRED, UPDATED
 from action_assistant.editor.nesting import Nesting
 from action_assistant.editor.scan import Outline, outline
@@ -59,6 +60,7 @@ class Replica:
         self.doc: Final[Doc[Any]] = Doc()
         self.owners: dict[int, str] = {}
         self.nesting = Nesting()
+        self._fullness = Fullness(self.doc)
         self._known: dict[int, int] = {}
         self._fired = False
         self._waiting: dict[bytes, tuple[Outline, str]] = {}
@@ -70,7 +72,7 @@ class Replica:
     ) -> Brought:
         """Apply an update. `holder` may know whose a client is that has written nothing yet.
 
-        Raises Malformed, Foreign, TooMuchWaits, Panicked; the document is then as before.
+        Raises Malformed, Foreign, Full, TooMuchWaits, Panicked; the document is then as before.
         """
         if update in self._waiting:
             return Brought.NOTHING
@@ -79,6 +81,8 @@ class Replica:
         for client in new:
             if (self.owners.get(client) or holder(client) or author) != author:
                 raise Foreign(f"client {client} is not {author}'s")
+        if new:  # what is known is echoed by stock clients, and adds nothing
+            self._fullness.check(update, read)
         if not read.ready(self._known):
             self._check_patience(update, author)
         brought = self._took(update, read, author)
@@ -102,6 +106,7 @@ class Replica:
     def begin(self, state: bytes, owners: dict[int, str], nesting: Nesting) -> None:
         """Take up where a snapshot was made. Raises Malformed, Panicked."""
         self._apply(state)
+        self._fullness.took(len(state))
         self.owners, self.nesting = owners, nesting
         self._known = clocks(self.doc.get_state())
 
@@ -116,15 +121,15 @@ class Replica:
                 together = []
                 self._took(event.body, read, event.author)
             else:
-                self._learn(read)
+                self._learn(read, len(event.body))
                 together.append(event.body)
         self._apply(*together)
 
-    def _learn(self, read: Outline) -> None:
+    def _learn(self, read: Outline, size: int) -> None:
         """What the log holds is not judged again."""
         with suppress(Malformed):
             self.nesting.learn(self.nesting.depths(read.placed, self._known))
-        self._count(read)
+        self._count(read, size)
 
     def _check_patience(self, update: bytes, author: str) -> None:
         sizes = [len(each) for each, (_, whose) in self._waiting.items() if whose == author]
@@ -157,10 +162,11 @@ class Replica:
         depths = self.nesting.depths(read.placed, self._known)
         self._apply(update)
         self.nesting.learn(depths)
-        self._count(read)
+        self._count(read, len(update))
         return self._fired
 
-    def _count(self, read: Outline) -> None:
+    def _count(self, read: Outline, size: int) -> None:
+        self._fullness.took(size, read.actions)
         for client, _, end in read.brings:
             self._known[client] = max(end, self._known.get(client, 0))
 

@@ -15,12 +15,14 @@ from action_assistant.editor.batch import (
     Compare,
     Item,
     Look,
+    NotAllowed,
     Offer,
     Taken,
     batch_of,
     merged,
     refuse,
 )
+from action_assistant.editor.fullness import Full
 from action_assistant.editor.happenings import DEFERRED, UPDATED
 from action_assistant.editor.member import Member
 from action_assistant.editor.presence import Attendance, News
@@ -37,7 +39,7 @@ from action_assistant.editor.replica import (
 from action_assistant.editor.sameness import Fingerprint, fingerprint
 from action_assistant.editor.window import Window
 from action_assistant.editor.wire import Entry, Malformed
-from action_assistant.errors import BadInput, Conflict, Refused, TooLarge, Unavailable
+from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 
@@ -245,45 +247,39 @@ class Room:
         """Apply a batch. After a panic the rest of it waits for a sound document."""
         taken = Taken()
         for n, item in enumerate(batch):
-            if isinstance(item, Ask):
-                taken.asks.append(item)
-                continue
-            if isinstance(item, Compare):
-                taken.compares.append(item)
-                continue
-            if isinstance(item, Look):
-                taken.looks.append(item)
-                continue
-            try:
-                brought = self._brought(item)
-            except Malformed as error:
-                refuse(item, wire.MALFORMED, BadInput(f"The update cannot be read: {error}."))
-                continue
-            except Foreign as error:
-                log.warning("%s: %s forged an edit: %s", self.stream, item.author, error)
-                reason = BadInput("The update speaks for somebody else.")
-                refuse(item, wire.FORBIDDEN, reason, wire.OTHER_CLIENT)
-                continue
-            except TooMuchWaits:
-                refuse(item, wire.TOO_BIG, TooLarge("Too much waits for what never came."))
-                continue
-            except Panicked:
-                log.warning("%s: refused an update that makes the library panic", self.stream)
-                refuse(item, wire.MALFORMED, BadInput("The update cannot be read."))
-                taken.panicked = True
+            match item:
+                case Ask():
+                    taken.asks.append(item)
+                case Compare():
+                    taken.compares.append(item)
+                case Look():
+                    taken.looks.append(item)
+                case Offer():
+                    self._take_in(item, taken)
+            if taken.panicked:
                 self._waiting = [*batch[n + 1 :], *self._waiting]
                 break
-            if brought is None:
-                continue
-            taken.handled.append(item)
-            if brought is Brought.WAITS:
-                taken.news.append((item, DEFERRED))
-            elif brought is Brought.NEWS:
-                taken.news.append((item, UPDATED))
-                released = self._replica.released()
-                taken.shown += [item.update, *released]
-                taken.for_all = taken.for_all or bool(released)
         return taken
+
+    def _take_in(self, offer: Offer, taken: Taken) -> None:
+        """Apply one edit, or refuse it."""
+        try:
+            brought = self._brought(offer)
+        except (Malformed, Foreign, Full, TooMuchWaits, Panicked, NotAllowed) as error:
+            log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
+            taken.panicked = isinstance(error, Panicked)
+            refuse(offer, error)
+            return
+        if brought is None:
+            return
+        taken.handled.append(offer)
+        if brought is Brought.WAITS:
+            taken.news.append((offer, DEFERRED))
+        elif brought is Brought.NEWS:
+            taken.news.append((offer, UPDATED))
+            released = self._replica.released()
+            taken.shown += [offer.update, *released]
+            taken.for_all = taken.for_all or bool(released)
 
     def _brought(self, offer: Offer) -> Brought | None:
         """Apply one edit; None when it was refused, or comes from a socket that was."""
@@ -292,8 +288,7 @@ class Room:
             return None
         if member is not None and not member.edits:
             if not self._replica.adds_nothing(offer.update):
-                refuse(offer, wire.FORBIDDEN, BadInput("Not allowed."))
-                return None
+                raise NotAllowed
             return Brought.NOTHING
         return self._replica.take(offer.update, offer.author, self.attendance.holder)
 

@@ -25,11 +25,13 @@ _NAMED_TYPES: Final = frozenset({3, 5})
 
 class Outline(msgspec.Struct, frozen=True):
     """What an update brings, `(client, from clock, to clock)`, and what must be there before it:
-    of each client so many clocks. `placed`: what need not lie in a root."""
+    of each client so many clocks. `placed`: what need not lie in a root. `actions`: how many keys of
+    new actions are among it."""
 
     brings: tuple[tuple[int, int, int], ...]
     needs: dict[int, int]
     placed: tuple[Placed, ...] = ()
+    actions: int = 0
 
     def ready(self, known: dict[int, int]) -> bool:
         """Whether everything that it builds on is known, or comes with it."""
@@ -54,7 +56,7 @@ def outline(update: bytes) -> Outline:
     clients = reader.number()
     if clients > MOST_CLIENTS or clients * 3 > reader.left:
         raise Malformed("too many clients")
-    structs = 0
+    structs = actions = 0
     for _ in range(clients):
         count, client, clock = reader.number(), _client(reader), reader.number()
         if client in seen:
@@ -69,8 +71,9 @@ def outline(update: bytes) -> Outline:
             if info & 31 == _SKIP:
                 clock += reader.number()
                 continue
-            length, reference = _struct(reader, info, needs)
+            length, reference, action = _struct(reader, info, needs)
             clock += length
+            actions += action
             if reference is not None:
                 placed.append(Placed((client, start, clock), *reference))
             if brings and brings[-1][0] == client and brings[-1][2] == start:
@@ -82,7 +85,7 @@ def outline(update: bytes) -> Outline:
     _deletions(reader, needs)
     if reader.left:
         raise Malformed("something follows the update")
-    return Outline(tuple(brings), needs, tuple(placed))
+    return Outline(tuple(brings), needs, tuple(placed), actions)
 
 
 def _client(reader: Reader) -> int:
@@ -106,12 +109,15 @@ def _deletions(reader: Reader, needs: dict[int, int]) -> None:
 _Reference: TypeAlias = tuple[int, int, bool]
 
 
-def _struct(reader: Reader, info: int, needs: dict[int, int]) -> tuple[int, _Reference | None]:
-    """One struct; how many clocks it takes."""
+def _struct(
+    reader: Reader, info: int, needs: dict[int, int]
+) -> tuple[int, _Reference | None, bool]:
+    """One struct; how many clocks it takes, and whether it names a new action."""
     kind = info & 31
     if kind == _GC:
-        return _length(reader), None
+        return _length(reader), None, False
     reference: _Reference | None = None
+    action = False
     if info & 0x80:
         reference = *_need(reader, needs), False
     if info & 0x40:
@@ -120,14 +126,14 @@ def _struct(reader: Reader, info: int, needs: dict[int, int]) -> tuple[int, _Ref
     if not info & 0xC0:
         parent = reader.number()
         if parent == 1:
-            reader.text()
+            action = reader.text() == b"actions" and kind != _DELETED
         elif parent == 0:
             reference = *_need(reader, needs), True
         else:
             raise Malformed("a struct without a parent")
         if info & 0x20:
-            reader.text()
-    return _content(reader, kind), reference
+            action = b"|" not in reader.text() and action
+    return _content(reader, kind), reference, action
 
 
 def _need(reader: Reader, needs: dict[int, int]) -> tuple[int, int]:

@@ -26,6 +26,7 @@ SESSION_ENDED: Final = 4401
 FORBIDDEN: Final = 4403
 NO_SUCH_GRAPH: Final = 4404
 OTHER_EPOCH: Final = 4409
+FULL: Final = 4413
 
 REASONS: Final = {
     UNREADABLE: "only binary messages",
@@ -37,6 +38,7 @@ REASONS: Final = {
     FORBIDDEN: "may not change this graph",
     NO_SUCH_GRAPH: "no such graph",
     OTHER_EPOCH: "other epoch",
+    FULL: "the graph is full",
 }
 
 #: In the place of FORBIDDEN's: a page then takes another client id and goes on.

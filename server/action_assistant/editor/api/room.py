@@ -9,6 +9,7 @@ from litestar.types import ControllerRouterHandler, Receive, Send
 
 from action_assistant.editor import happenings as h
 from action_assistant.editor import wire
+from action_assistant.editor.budget import Budget
 from action_assistant.editor.house import Door
 from action_assistant.editor.member import Member
 from action_assistant.editor.room import Room
@@ -43,7 +44,7 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
                     edits = allowed(person.role, "edit")
                     member = Member(person, edits=edits, acks=_wants_acks(socket))
                     member.post_epoch(house.epoch)
-                    await _converse(socket, found, member)
+                    await _converse(socket, found, member, house.budget)
         except Refused as refused:
             await _refuse(socket, refused)
 
@@ -72,13 +73,13 @@ async def _part(socket: Socket, epoch: str) -> None:
         await socket.close(wire.OTHER_EPOCH, wire.REASONS[wire.OTHER_EPOCH])
 
 
-async def _converse(socket: Socket, room: Room, member: Member) -> None:
+async def _converse(socket: Socket, room: Room, member: Member, budget: Budget) -> None:
     """Until one side ends it."""
     receive, send = plain(socket)
     room.join(member)
     try:
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(_listen, receive, room, member)
+            tasks.start_soon(_listen, receive, room, member, budget)
             tasks.start_soon(_speak, send, member)
             code = await member.ended()
             tasks.cancel_scope.cancel()
@@ -89,7 +90,7 @@ async def _converse(socket: Socket, room: Room, member: Member) -> None:
             await socket.close(code, member.said or wire.REASONS.get(code))
 
 
-async def _listen(receive: Receive, room: Room, member: Member) -> None:
+async def _listen(receive: Receive, room: Room, member: Member, budget: Budget) -> None:
     """What the client says. Ends the member when the client goes, or says what cannot be read."""
     while True:
         event: Any = await receive()
@@ -110,6 +111,10 @@ async def _listen(receive: Receive, room: Room, member: Member) -> None:
             room.hear(member, message)
             if member.far_ahead:
                 await member.until_heard()
+            if isinstance(message, wire.Edit):
+                wait = budget.spend(member.person.id, len(data))
+                if wait > 0:
+                    await anyio.sleep(wait)
 
 
 async def _speak(send: Send, member: Member) -> None:

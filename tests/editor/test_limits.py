@@ -1,0 +1,202 @@
+"""How large a graph may become, and how fast a person may make it so."""
+
+import asyncio
+from typing import Any
+
+import httpx
+import pytest
+from pycrdt import Doc, Map
+
+from action_assistant.editor import fullness, wire
+from action_assistant.editor.budget import AT_ONCE, PER_MINUTE, Budget
+from action_assistant.editor.room import Room
+from action_assistant.editor.rooms import Rooms
+from action_assistant.errors import TooLarge
+from action_assistant.journal.journal import Journal
+from editor.client import Client, settle
+from editor.process import Editor
+from editor.test_sockets import closed, got
+
+STREAM = "graph/g"
+
+
+async def end_of(client: Client) -> int:
+    assert client.member is not None
+    return await client.member.ended()
+
+
+def actions_of(client: Client) -> Any:
+    return client.doc.get("actions", type=Map)
+
+
+def add(client: Client, *aids: str) -> None:
+    with client.doc.transaction():
+        for aid in aids:
+            actions_of(client)[aid] = "Go"
+            actions_of(client)[f"{aid}|type"] = "sync"
+
+
+async def seen(room: Room) -> int:
+    return await room.look(lambda replica, _: fullness.actions_in(replica.doc))
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten actions, 64 KiB."""
+    monkeypatch.setattr(fullness, "MOST_ACTIONS", 10)
+    monkeypatch.setattr(fullness, "MOST_BYTES", 1 << 16)
+    monkeypatch.setattr(fullness, "_WORTH", 1 << 10)
+
+
+@pytest.mark.usefixtures("small")
+async def test_one_action_too_many_is_refused_to_its_maker_and_others_go_on(rooms: Rooms) -> None:
+    ada, eve, vic = Client("ada"), Client("eve"), Client("vic")
+    async with rooms.enter(STREAM) as room:
+        for client in (ada, eve, vic):
+            client.join(room, edits=client is not vic)
+        add(ada, *(f"a{n}" for n in range(10)))
+        await settle(ada, eve, vic)
+        assert await seen(room) == 10
+        add(eve, "e0")
+        await settle(ada, eve, vic)
+        assert await end_of(eve) == wire.FULL
+        assert eve.member is not None
+        assert eve.member.said == "a graph may have 10 actions"
+        # Ada renames, deletes, and has room for one more; Vic sees all of it.
+        actions_of(ada)["a0"] = "Renamed"
+        del actions_of(ada)["a1"]
+        await settle(ada, vic)
+        add(ada, "a10")
+        await settle(ada, vic)
+        assert await seen(room) == 10
+        assert ada.durable == ada.sent
+        shown = vic.doc.get("actions", type=Map).to_py() or {}
+        assert shown["a0"] == "Renamed"
+        assert "a1" not in shown
+        assert shown["a10"] == "Go"
+        with pytest.raises(TooLarge, match="full"):
+            await room.submit(difference(ada, "more"), "server")
+
+
+def difference(client: Client, aid: str) -> bytes:
+    """The edit of somebody else who has what this client has."""
+    doc: Doc[Any] = Doc()
+    doc.apply_update(client.doc.get_update())
+    before = doc.get_state()
+    doc.get("actions", type=Map)[aid] = "Go"
+    return doc.get_update(before)
+
+
+@pytest.mark.usefixtures("small")
+async def test_who_takes_back_what_was_too_much_comes_in_again_with_everything_else(
+    rooms: Rooms,
+) -> None:
+    ada = Client("ada")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        add(ada, *(f"a{n}" for n in range(11)))
+        actions_of(ada)["a0|description"] = "kept"
+        await settle(ada)
+        assert await end_of(ada) == wire.FULL
+        assert await seen(room) == 0
+        for key in ("a10", "a10|type"):
+            del actions_of(ada)[key]
+        ada.join(room)
+        await settle(ada)
+        assert ada.member is not None
+        assert not ada.member.closed
+        assert await seen(room) == 10
+
+
+@pytest.mark.usefixtures("small")
+async def test_a_document_of_too_many_bytes_takes_deletions_and_then_edits_again(
+    rooms: Rooms,
+) -> None:
+    ada, eve = Client("ada"), Client("eve")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        eve.join(room)
+        for n in range(7):
+            ada.map[f"k{n}"] = "x" * 8_000
+        await settle(ada, eve)
+        eve.map["more"] = "y" * 20_000
+        await settle(ada, eve)
+        assert await end_of(eve) == wire.FULL
+        assert "more" not in ada.things
+        del ada.map["k0"]
+        del ada.map["k1"]
+        ada.map["fits"] = "z" * 8_000
+        await settle(ada)
+        assert ada.durable == ada.sent
+        bob = Client("bob")
+        bob.join(room)
+        await settle(bob)
+        assert bob.things == ada.things
+
+
+async def test_an_old_graph_that_is_too_large_opens_and_can_be_made_smaller(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ada = Client("ada")
+    before = Rooms(journal)
+    async with before.enter(STREAM) as room:
+        ada.join(room)
+        add(ada, *(f"a{n}" for n in range(15)))
+        await settle(ada)
+        ada.leave()
+    await before.close()
+    monkeypatch.setattr(fullness, "MOST_ACTIONS", 10)
+    rooms = Rooms(journal)
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        actions_of(ada)["a3"] = "Renamed"
+        del actions_of(ada)["a4"]
+        await settle(ada)
+        assert await seen(room) == 14
+        add(ada, "another")
+        await settle(ada)
+        assert ada.member is not None
+        assert ada.member.closed
+        assert await end_of(ada) == wire.FULL
+    await rooms.close()
+
+
+async def test_the_limit_is_5000_actions_on_every_way_in(
+    editor: Editor, http: httpx.Client, graph: str
+) -> None:
+    def file(count: int) -> dict[str, object]:
+        actions = [{"name": "A", "instance_id": n, "type": "sync"} for n in range(count)]
+        return {"graph_name": "g", "actions": actions}
+
+    refused = await asyncio.to_thread(http.post, "/api/graphs", json=file(5_001))
+    assert (refused.status_code, refused.json()["type"]) == (413, "too-large")
+    doc: Doc[Any] = Doc()
+    with doc.transaction():
+        for n in range(5_001):
+            doc.get("actions", type=Map)[f"a{n:011}"] = "A"
+    async with editor.socket(graph) as session:
+        await session.send_bytes(wire.answer(doc.get_update()))
+        assert await closed(session) == wire.FULL
+    assert (await got(http, f"/api/graphs/{graph}/umrf")).json()["actions"] == []
+
+
+def test_a_person_brings_so_many_bytes_a_minute_and_nobody_else_waits_for_that() -> None:
+    now = 0.0
+    budget = Budget(limits=True, clock=lambda: now)
+    assert budget.spend("ada", AT_ONCE) == 0
+    assert budget.spend("ada", PER_MINUTE) == 60
+    assert budget.spend("mari", 1000) == 0
+    now = 60.0
+    assert budget.spend("ada", PER_MINUTE // 60) == pytest.approx(1)
+    now = 600.0
+    assert budget.spend("ada", AT_ONCE) == 0
+    assert Budget(limits=False).spend("ada", 10 * AT_ONCE) == 0
+
+
+def test_a_crowd_of_people_is_not_remembered_for_ever() -> None:
+    now = 0.0
+    budget = Budget(limits=True, clock=lambda: now)
+    for n in range(5_000):
+        now += 1.0
+        budget.spend(f"person {n}", 1)
+    assert len(budget._left) <= 1_001
