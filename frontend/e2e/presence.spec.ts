@@ -12,7 +12,7 @@ let mari: Person;
 let third: Person;
 
 test.beforeAll(async ({ browser }) => {
-  test.setTimeout(90_000);
+  test.setTimeout(180_000);
   await product.start();
   graph = await product.chain(3);
   ada = await product.person(browser, "Ada");
@@ -20,7 +20,7 @@ test.beforeAll(async ({ browser }) => {
   third = await product.person(browser, HOSTILE, { viewport: { width: 1200, height: 700 } });
   for (const { page } of [ada, mari, third]) {
     await page.goto(`${product.url}/graphs/${graph}`);
-    await saved(page);
+    await expect(page.getByText("Saved", { exact: true })).toBeVisible({ timeout: 45_000 });
   }
   await expect(face(ada.page, "名前 さん")).toBeVisible();
 });
