@@ -58,12 +58,12 @@ EVERYTHING = Override(
     codes=("proof", "quiet", "others", "actions", "actors", "H3", "H8", "H12"), reason="practice"
 )
 
-Step = tuple[float, str, Any]
+Step = tuple[str, Any]
 
 
 def plot(chance: random.Random) -> list[Step]:
     """What happens, by chance: (how often, what, with what)."""
-    steps: list[Step] = [
+    steps: list[tuple[float, str, Callable[[], Any]]] = [
         (12, "wait", lambda: chance.choice([0.01, 0.05, 0.2, 1.0, 4.0])),
         (7, "start", lambda: chance.choice(list(GRAPHS))),
         (1, "start at once", lambda: chance.choice(list(GRAPHS))),
@@ -83,7 +83,25 @@ def plot(chance: random.Random) -> list[Step]:
         (1.5, "well", lambda: None),
     ]  # fmt: skip
     drawn = chance.choices(steps, [each[0] for each in steps], k=chance.randint(8, 40))
-    return [(0.0, "start", chance.choice(list(GRAPHS)))] + [(w, s, v()) for w, s, v in drawn]
+    return opening(chance) + [(what, value()) for _, what, value in drawn]
+
+
+def opening(chance: random.Random) -> list[Step]:
+    """How it begins: in one of the ways in which things have gone wrong before, or just so."""
+    name = chance.choice(list(GRAPHS))
+    a_moment = ("wait", chance.choice([0.05, 0.2, 0.5, 1.0]))
+    match chance.choice(["twins", "late", "loading", "any", "any"]):
+        case "twins":  # both hear the start, one may not hear the stop
+            lost = ("loss", ("stop", 0.5))
+            return [("second engine", NAME), ("wait", 0.3), ("start", name), a_moment, lost,
+                    ("stop", None), ("wait", 1.0)]  # fmt: skip
+        case "late":  # somebody else's graph of that name comes first
+            late = ("late", chance.choice([5.0, 60.0]))
+            return [late, ("start", name), a_moment, ("their start", name), ("wait", 4.0)]
+        case "loading":
+            return [("start", name), a_moment, ("stop", None), ("wait", 1.0)]
+        case _:
+            return [("start", name)]
 
 
 class Story:
@@ -127,7 +145,7 @@ class Story:
                 async with self.world.runner() as control, anyio.create_task_group() as people:
                     control.watch(self.judge)
                     while rest:
-                        _, step, value = rest.pop(0)
+                        step, value = rest.pop(0)
                         if step == "crash":
                             break
                         await self.do(control, people, step, value)
@@ -180,6 +198,9 @@ class Story:
                 self.wind.start_soon(self.thaw_later, node, value)
             case "stranger":
                 self.stranger(value)
+            case "their start":
+                text = codec.write(GRAPHS[value])
+                self.air.carry(Start(graph_name=value, targets=(NAME,), graph_json=text), "cli")
             case "made up":
                 self.make_up(value)
             case "journal":
@@ -233,7 +254,7 @@ class Story:
 
     async def start(self, control: Control, name: str) -> None:
         """A start, which may be refused; some people override what can be."""
-        override = {"override": EVERYTHING} if self.chance.random() < 0.6 else {}
+        override = {"override": EVERYTHING} if self.chance.random() < 0.7 else {}
         with suppress(Refused):
             await control.start(order(GRAPHS[name], engine=NAME, **override), ANN)
 
@@ -330,4 +351,4 @@ def test_nothing_is_called_stopped_or_finished_that_moves() -> None:
         stuck += [f"seed {seed}: {each}" for each in story.stuck]
     assert false == []
     assert stuck == []  # what is at rest is also said to be, once everything works again
-    assert confirmed > HISTORIES / 2
+    assert confirmed > HISTORIES / 3
