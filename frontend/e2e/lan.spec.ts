@@ -9,6 +9,12 @@ import { type Person, Product, TOKEN } from "./product";
 
 const LAB = "lab.test";
 
+/** A picture for who looks, when a folder for them is named. */
+async function picture(page: Page, name: string): Promise<void> {
+  const folder = process.env.LAN_PICTURES;
+  if (folder !== undefined) await page.screenshot({ path: `${folder}/${name}.png` });
+}
+
 interface Invitation {
   id: string;
   path: string;
@@ -41,6 +47,7 @@ async function arrive(
   page.on("pageerror", (error) => failures.push(error.message));
   await page.goto(lab(product) + link);
   await page.getByRole("textbox", { name: /others see you/ }).fill(name);
+  await picture(page, `arrive-${name}`);
   await page.getByRole("button", { name: "Come in" }).click();
   await expect(page.getByRole("button", { name: /^Stop / })).toBeVisible();
   return { context, page, failures };
@@ -84,10 +91,18 @@ test.describe("on plain http", () => {
     expect(await mari.page.evaluate(() => window.isSecureContext)).toBe(false);
     expect(mari.page.url()).not.toContain("#");
     await expect(dialog.getByText("Mari came in")).toBeVisible();
+    await picture(ada.page, "share-light");
+    await ada.page.emulateMedia({ colorScheme: "dark" });
+    await picture(ada.page, "share-dark");
+    await ada.page.setViewportSize({ width: 390, height: 844 });
+    await picture(ada.page, "share-phone-dark");
+    await ada.page.emulateMedia({ colorScheme: "light" });
+    await picture(ada.page, "share-phone");
+    await ada.page.setViewportSize({ width: 1440, height: 900 });
     await dialog.getByRole("button", { name: "Close" }).click();
 
     // Both draw one graph.
-    const graph = await product.chain(30);
+    const graph = await product.chain(60);
     await mari.page.goto(`${lab(product)}/graphs/${graph}`);
     await saved(mari.page);
     await add(mari.page, "Sooner");
@@ -117,7 +132,7 @@ test.describe("on plain http", () => {
 
   test("a viewer sees and stops, changes nothing, and is put out at once", async ({ browser }) => {
     test.setTimeout(120_000);
-    const graph = await product.chain(40);
+    const graph = await product.chain(60);
     const invitation = await invite(product, "viewer");
     const ada = await product.person(browser, "Ada");
     await ada.page.goto(`${product.url}/graphs/${graph}`);
@@ -125,10 +140,12 @@ test.describe("on plain http", () => {
     const { page, failures, context } = await arrive(product, browser, invitation.path, "Vic");
     await expect(page.getByRole("button", { name: "New graph" })).toHaveCount(0);
     await page.goto(`${lab(product)}/graphs/${graph}`);
-    await expect(page.getByText("View only", { exact: true })).toBeVisible();
+    await expect(page.getByText("View only", { exact: true })).toBeVisible({ timeout: 40_000 });
     await expect(page.getByRole("button", { name: /^Start / })).toHaveCount(0);
     await expect(page.getByRole("button", { name: /^Share/ })).toHaveCount(0);
     await expect(page.getByRole("button", { name: "Add an action" }).first()).toBeDisabled();
+
+    await picture(page, "viewer");
 
     // Keys, a drag and the form change nothing.
     const first = card(page, "Wait");
@@ -152,6 +169,7 @@ test.describe("on plain http", () => {
 
     await product.ask(`/api/invitations/${invitation.id}/revoke`, { method: "POST" });
     await expect(page.getByText(/Your link was revoked/)).toBeVisible({ timeout: 5_000 });
+    await picture(page, "revoked");
     await expect(page.getByRole("button", { name: /^Stop/ })).toHaveCount(0);
     await page.goto(lab(product) + invitation.path);
     await expect(page.getByText(/revoked/)).toBeVisible();
@@ -172,7 +190,7 @@ test.describe("under TLS", () => {
   });
 
   test("the page is a secure context, edits and Stop go encrypted", async ({ browser }) => {
-    const graph = await product.chain(30);
+    const graph = await product.chain(60);
     const invitation = await invite(product, "editor");
     const options = { ignoreHTTPSErrors: true };
     const mari = await arrive(product, browser, invitation.path, "Mari", options);

@@ -40,6 +40,7 @@ class Product:
         self.data = data
         self._flags = flags
         self._hosts = hosts
+        self._scheme = "https" if "--tls" in flags else "http"
         self.port = free_ports()
         self.log = data.parent / f"{data.name}.log"
         self._process: subprocess.Popen[bytes] | None = None
@@ -47,12 +48,12 @@ class Product:
     @property
     def url(self) -> str:
         """Of the editor."""
-        return f"http://127.0.0.1:{self.port}"
+        return f"{self._scheme}://127.0.0.1:{self.port}"
 
     @property
     def runner_url(self) -> str:
         """Of the runner."""
-        return f"http://127.0.0.1:{self.port + 1}"
+        return f"{self._scheme}://127.0.0.1:{self.port + 1}"
 
     @property
     def environment(self) -> dict[str, str]:
@@ -153,7 +154,9 @@ def _client(url: str) -> httpx.Client:
 
 def _ready(url: str) -> bool:
     try:
-        return httpx.get(f"{url}/readyz", trust_env=False, timeout=2).status_code == 200
+        return (
+            httpx.get(f"{url}/readyz", trust_env=False, timeout=2, verify=False).status_code == 200
+        )
     except httpx.TransportError:
         return False
 

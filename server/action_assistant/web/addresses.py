@@ -66,6 +66,7 @@ class Addresses:
         hosts: Iterable[str] = (),
         secure: bool = False,
         lan: Callable[[], tuple[str, ...]] | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._named = tuple(name.lower() for name in hosts)
         self._hosts = LOOPBACK | set(self._named) | ({host.lower()} - _ANYWHERE)
@@ -75,7 +76,8 @@ class Addresses:
         self._scheme: Final = "https" if secure else "http"
         self._lan = lan
         self._found: tuple[str, ...] = lan() if lan is not None else ()
-        self._looked = time.monotonic()
+        self._clock = clock
+        self._looked = clock()
 
     def allows_host(self, header: str | None) -> bool:
         """Whether a request may name this host (DNS rebinding comes with another)."""
@@ -115,7 +117,7 @@ class Addresses:
     def _knows(self, name: str) -> bool:
         if name in self._hosts or name in self._found:
             return True
-        now = time.monotonic()
+        now = self._clock()
         if not name or self._lan is None or now - self._looked < _LOOK_AGAIN_S:
             return False
         self._looked = now  # the network may be another by now
