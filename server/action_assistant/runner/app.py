@@ -16,6 +16,7 @@ from action_assistant.runner.control import Control
 from action_assistant.runner.links import ros2_reach
 from action_assistant.runner.links.port import Reach
 from action_assistant.runner.live import Hub
+from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.robots import Robots
 from action_assistant.settings import RunnerSettings
@@ -39,7 +40,8 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
     journal = await Journal.open(_database(settings), branch="runner", fold=archive.fold)
     try:
         reach = ros2_reach(wall_clock)
-        robots = Robots(reach=reach)
+        recordings = Recordings(settings.data / "recordings", anyio.to_thread.run_sync)
+        robots = Robots(reach=reach, recordings=recordings)
         async with _kept(reach), Control.opened(journal, robots, wall=wall_clock) as control:
             house.control, house.hub = control, Hub(control, wall_clock)
             house.crowd = Crowd(limits=settings.limits, keeps_one=True)

@@ -16,6 +16,7 @@ from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
     EngineState,
+    Feedback,
     ForeignCommand,
     Link,
     NoAnswer,
@@ -24,6 +25,7 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
+from action_assistant.runner.recordings import Recordings
 from action_assistant.umrf import codec
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph, Signature
@@ -66,6 +68,7 @@ class KnownEngine:
         changed: Callable[[], None] = lambda: None,
         became: "Callable[[KnownEngine], None]" = lambda _: None,
         foreign: "Callable[[KnownEngine, ForeignCommand], None]" = lambda _, __: None,
+        recordings: Recordings | None = None,
     ) -> None:
         self.registration = registration
         self.facts = facts
@@ -80,6 +83,7 @@ class KnownEngine:
         self._changed = changed
         self._became = became
         self._foreign = foreign
+        self._recordings = recordings
         self._look = anyio.Event()
         self._tried_at = -_IDLE_S
         self._restarted: float | None = None
@@ -195,6 +199,8 @@ class KnownEngine:
                 self._turn(state, why)
             case EngineChanged():
                 self._look.set()
+            case Feedback() if self._recordings is not None:
+                self._recordings.fed(self.registration.name, report)
             case ForeignCommand():
                 self._foreign(self, report)
                 self._look.set()
@@ -202,6 +208,8 @@ class KnownEngine:
                 return
 
     def _heard(self, answer: Answer, took: float) -> None:
+        if self._recordings is not None:
+            self._recordings.heard(self.registration.name, answer)
         known = self.answer
         now = anyio.current_time()
         lives = {answer.incarnation} | ({known.incarnation} if known is not None else set())

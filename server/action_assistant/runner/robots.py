@@ -17,6 +17,7 @@ from action_assistant.runner.events import Author
 from action_assistant.runner.flight import Commanded, EngineBecame, FlightRecorder
 from action_assistant.runner.history import Aside, Ledger
 from action_assistant.runner.links.port import Candidate, ForeignCommand, Link, Reach, Registration
+from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.registered import (
     STREAM,
     Registered,
@@ -45,11 +46,16 @@ class Ground(msgspec.Struct, frozen=True):
 
 
 class Robots:
-    """The registry. `reach` makes links, or says why there are none; `links` are there already."""
+    """The registry. `reach` makes links, or says why there are none; `links` are there already.
+    `recordings` keep what engines say, where they are kept."""
 
     def __init__(
-        self, links: Mapping[str, Link] | None = None, reach: Reach | str | None = None
+        self,
+        links: Mapping[str, Link] | None = None,
+        reach: Reach | str | None = None,
+        recordings: Recordings | None = None,
     ) -> None:
+        self.recordings: Final = recordings
         self._given: Final = dict(links or {})
         self._reach: Final = reach if reach is not None else "No link to robots was made."
         self._registered: dict[str, Registration] = {}
@@ -66,6 +72,8 @@ class Robots:
         self._silencing = Silencing(
             ground.tasks, ground.wall, self._flight.note, lambda: ground.changed()
         )
+        if self.recordings is not None:
+            ground.tasks.start_soon(self.recordings.run)
         for name in self._given:
             self.add(Registration(name=name))
 
@@ -112,6 +120,7 @@ class Robots:
             changed=ground.changed,
             became=self._note_state,
             foreign=self._note_command,
+            recordings=self.recordings,
         )
         self._engines[name] = engine
         scope = self._scopes[name] = anyio.CancelScope()

@@ -23,6 +23,7 @@ from action_assistant.runner.flight import (
 )
 from action_assistant.runner.links.port import Candidate, Registration
 from action_assistant.runner.preflight import Preflight
+from action_assistant.runner.recordings import Recording
 from action_assistant.runner.registered import Robot
 from action_assistant.runner.starting import read_group
 from action_assistant.umrf import codec
@@ -172,6 +173,20 @@ def _one_robot(house: Has) -> list[ControllerRouterHandler]:
         """Without its run state: a graph that carries one must not be sent again."""
         return _umrf(house.control.robots.held(name, graph))
 
+    @get("/api/robots/{name:str}/recordings", summary="What an engine said, hour by hour")
+    async def recorded(name: str) -> list[Recording]:
+        house.control.robots.registration(name)
+        kept = house.control.robots.recordings
+        return [] if kept is None else await kept.listed(name)
+
+    @get("/api/robots/{name:str}/recordings/{file:str}", summary="An hour, as JSON lines, gzipped")
+    async def recording(name: str, file: str) -> Response[bytes]:
+        house.control.robots.registration(name)
+        kept = house.control.robots.recordings
+        if kept is None:
+            raise NotFound("Nothing is recorded here.")
+        return Response(await kept.file(name, file), media_type="application/gzip")
+
     @post(
         "/api/robots/{name:str}/stop",
         status_code=202,
@@ -181,7 +196,7 @@ def _one_robot(house: Has) -> list[ControllerRouterHandler]:
     async def stop(name: str, request: _Asking) -> Stopped:
         return Stopped(*house.control.stop_robot(name, author_of(request)))
 
-    return [robot, known, events, commanded, held, stop]
+    return [robot, known, events, commanded, held, recorded, recording, stop]
 
 
 def _starts(house: Has) -> list[ControllerRouterHandler]:

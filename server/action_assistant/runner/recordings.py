@@ -1,0 +1,150 @@
+"""What engines said, as they said it: for people who want to know more than a run tells.
+
+Beside the journal and with its own retention: one folder per robot, one file of JSON lines per hour,
+compressed. Of an answer only the graphs that are otherwise than in the one before are kept. A file is
+a row of gzip members, so that a crash costs the last seconds and nothing else.
+"""
+
+import gzip
+import logging
+from collections import deque
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import anyio
+import msgspec
+
+from action_assistant.errors import NotFound
+from action_assistant.runner.history import Aside
+from action_assistant.runner.links.port import Answer, Feedback
+from action_assistant.runner.seen import Snapshot
+
+log: Final = logging.getLogger(__name__)
+
+_EVERY_S: Final = 2.0
+_WAITING: Final = 2_000  # lines in memory; then the oldest go
+_KEPT_DAYS: Final = 7
+_KEPT_BYTES: Final = 500_000_000
+_ENDING: Final = ".jsonl.gz"
+
+
+class GetLine(msgspec.Struct, frozen=True, omit_defaults=True, tag="get", tag_field="kind"):
+    """An answer: graphs that are not as before, as the engine wrote them, and those that have gone."""
+
+    at: int
+    asked_at: int
+    incarnation: str
+    changed: dict[str, str] = {}
+    gone: tuple[str, ...] = ()
+
+
+class FeedbackLine(msgspec.Struct, frozen=True, tag="feedback", tag_field="kind"):
+    """What came by itself, oldest first."""
+
+    at: int
+    actor: str
+    snapshots: tuple[Snapshot, ...]
+
+
+class Recording(msgspec.Struct, frozen=True):
+    """A file: its name (the hour, UTC) and its size in bytes."""
+
+    name: str
+    bytes: int
+
+
+class Recordings:
+    """Writes while `run` goes. `kept_bytes` bounds all robots together."""
+
+    def __init__(
+        self,
+        folder: Path,
+        aside: Aside,
+        *,
+        kept_days: int = _KEPT_DAYS,
+        kept_bytes: int = _KEPT_BYTES,
+    ) -> None:
+        self._folder = folder
+        self._aside = aside
+        self._kept_days = kept_days
+        self._kept_bytes = kept_bytes
+        self._waiting: deque[tuple[str, int, bytes]] = deque(maxlen=_WAITING)
+        self._texts: dict[str, dict[str, str]] = {}
+
+    def heard(self, robot: str, answer: Answer) -> None:
+        """An answer has come."""
+        before = self._texts.get(robot, {})
+        changed = {name: text for name, text in answer.texts.items() if before.get(name) != text}
+        gone = tuple(sorted(before.keys() - answer.texts.keys()))
+        if not changed and not gone:
+            return
+        self._texts[robot] = answer.texts
+        line = GetLine(answer.at, answer.asked_at, answer.incarnation, changed, gone)
+        self._waiting.append((robot, answer.at, msgspec.json.encode(line)))
+
+    def fed(self, robot: str, feedback: Feedback) -> None:
+        """Feedback has come."""
+        if feedback.snapshots:
+            at = feedback.snapshots[-1].at
+            line = FeedbackLine(at, feedback.actor, feedback.snapshots)
+            self._waiting.append((robot, at, msgspec.json.encode(line)))
+
+    async def run(self) -> None:
+        """Write until cancelled. A full disk loses recordings, never a run."""
+        told = False
+        while True:
+            await anyio.sleep(_EVERY_S)
+            lines, self._waiting = self._waiting, deque(maxlen=_WAITING)
+            if not lines:
+                continue
+            try:
+                await self._aside(partial(self._write, lines))
+                told = False
+            except OSError as error:
+                if not told:
+                    log.warning("recordings of robots cannot be written: %s", error)
+                told = True
+
+    def _write(self, lines: Iterable[tuple[str, int, bytes]]) -> None:
+        files: dict[Path, list[bytes]] = {}
+        for robot, at, line in lines:
+            hour = datetime.fromtimestamp(at / 1e6, UTC).strftime("%Y-%m-%dT%H")
+            files.setdefault(self._folder / robot / f"{hour}{_ENDING}", []).append(line)
+        for path, found in files.items():
+            is_new = not path.exists()
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("ab") as file:
+                file.write(gzip.compress(b"\n".join(found) + b"\n"))
+            if is_new:
+                self._prune()
+
+    def _prune(self) -> None:
+        """The oldest go: by age, then by what all of it takes."""
+        found = sorted(self._folder.glob(f"*/*{_ENDING}"), key=lambda path: path.name)
+        sizes = {path: path.stat().st_size for path in found}
+        newest = datetime.strptime(found[-1].name, f"%Y-%m-%dT%H{_ENDING}")  # noqa: DTZ007 - an hour of UTC
+        total = sum(sizes.values())
+        for path in found[:-1]:
+            age = newest - datetime.strptime(path.name, f"%Y-%m-%dT%H{_ENDING}")  # noqa: DTZ007
+            if age.days >= self._kept_days or total > self._kept_bytes:
+                path.unlink()
+                total -= sizes[path]
+
+    async def listed(self, robot: str) -> list[Recording]:
+        """The files of a robot, newest first."""
+        folder = self._folder / robot
+
+        def read() -> list[Recording]:
+            found = sorted(folder.glob(f"*{_ENDING}"), reverse=True)
+            return [Recording(path.name, path.stat().st_size) for path in found]
+
+        return await self._aside(read)
+
+    async def file(self, robot: str, name: str) -> bytes:
+        """One of them, compressed. Raises NotFound."""
+        if name not in {each.name for each in await self.listed(robot)}:
+            raise NotFound("There is no such recording.")
+        return await self._aside((self._folder / robot / name).read_bytes)
