@@ -68,6 +68,75 @@ class Reception(Protocol):
         """Remember who came in by it."""
 
 
+class Desk:
+    """Where tokens and invitations are traded for sessions."""
+
+    def __init__(
+        self,
+        keys: Keys,
+        page_port: int,
+        reception: Callable[[], Reception],
+        *,
+        secure: bool,
+        limits: bool,
+    ) -> None:
+        self._keys = keys
+        self._cookie = cookie_name(page_port)
+        self._reception = reception
+        self._secure = secure
+        self._pace = Pace(_TRIES_AT_ONCE, _TRIES_PER_MINUTE) if limits else None
+
+    async def look(self, invitation: str, request: _Asking) -> Invited:
+        """What a link leads to. Raises Unauthenticated, TooMany."""
+        self._admit(request)
+        return await self._reception().look(invitation)
+
+    async def session(self, data: SignIn, request: _Asking) -> Session:
+        """What somebody gets who signs in. Raises Unauthenticated, TooMany, BadInput."""
+        name = " ".join((data.name or "").split())
+        match data:
+            case SignIn(token=None, invitation=None):
+                return _renamed(self._keys, _live(request), name)
+            case SignIn(token=str(token), invitation=None):
+                if not self._keys.opens(token):
+                    self._admit(request)
+                    raise Unauthenticated("This is not the token of this server.")
+                # The link again, in a browser that is or was signed in: the same person, since what
+                # older tabs have written belongs to them.
+                known = known_person(request)
+                id_ = known.id if known else None
+                return self._keys.new_session(name or _name(known), person_id=id_)
+            case SignIn(token=None, invitation=str(proof)):
+                self._admit(request)
+                return await _invited(self._keys, self._reception(), proof, name, request)
+            case _:
+                raise BadInput("Send the token or an invitation, not both.")
+
+    def answer(self, session: Session) -> Response[SignedIn]:
+        """The session as a cookie."""
+        cookie = Cookie(
+            key=self._cookie,
+            value=self._keys.sealed(session),
+            max_age=SESSION_SECONDS,
+            httponly=True,
+            samesite="strict",
+            secure=self._secure,
+            path="/",
+        )
+        return Response(_signed_in(session), status_code=200, cookies=[cookie])
+
+    def farewell(self) -> Response[None]:
+        """No cookie any more."""
+        response: Response[None] = Response(None, status_code=204)
+        response.delete_cookie(self._cookie, path="/")
+        return response
+
+    def _admit(self, request: _Asking) -> None:
+        address = request.client.host if request.client is not None else ""
+        if self._pace is not None and not self._pace.takes(address):
+            raise TooMany("Too many tries from your address; wait a minute.")
+
+
 def session_routes(
     keys: Keys,
     page_port: int,
@@ -77,61 +146,23 @@ def session_routes(
     limits: bool = True,
 ) -> list[ControllerRouterHandler]:
     """The routes under `/api/session`."""
-    pace = Pace(_TRIES_AT_ONCE, _TRIES_PER_MINUTE)
-
-    def admit(request: _Asking) -> None:
-        if limits and not pace.takes(request.client.host if request.client else ""):
-            raise TooMany("Too many tries from your address; wait a minute.")
-
-    def signed_in(session: Session) -> Response[SignedIn]:
-        body = SignedIn(session.person, bool(session.person.name))
-        cookie = Cookie(
-            key=cookie_name(page_port),
-            value=keys.sealed(session),
-            max_age=SESSION_SECONDS,
-            httponly=True,
-            samesite="strict",
-            secure=secure,
-            path="/",
-        )
-        return Response(body, status_code=200, cookies=[cookie])
+    desk = Desk(keys, page_port, reception, secure=secure, limits=limits)
 
     @get("/api/session", summary="Who is signed in")
     async def who(request: _Asking) -> SignedIn:
-        session = _live(request)
-        return SignedIn(session.person, bool(session.person.name))
+        return _signed_in(_live(request))
 
     @post("/api/session", status_code=200, summary="Sign in, or change one's name")
     async def sign_in(data: JSONBody[SignIn], request: _Asking) -> Response[SignedIn]:
-        name = " ".join((data.name or "").split())
-        match data:
-            case SignIn(token=None, invitation=None):
-                return signed_in(_renamed(keys, _live(request), name))
-            case SignIn(token=str(token), invitation=None):
-                if not keys.opens(token):
-                    admit(request)
-                    raise Unauthenticated("This is not the token of this server.")
-                # The link again, in a browser that is or was signed in: the same person, since what
-                # older tabs have written belongs to them.
-                known = known_person(request)
-                id_ = known.id if known else None
-                return signed_in(keys.new_session(name or _name(known), person_id=id_))
-            case SignIn(token=None, invitation=str(proof)):
-                admit(request)
-                return signed_in(await _invited(keys, reception(), proof, name, request))
-            case _:
-                raise BadInput("Send the token or an invitation, not both.")
+        return desk.answer(await desk.session(data, request))
 
     @post("/api/session/invitation", status_code=200, summary="What an invitation leads to")
     async def look(data: JSONBody[Looking], request: _Asking) -> Invited:
-        admit(request)
-        return await reception().look(data.invitation)
+        return await desk.look(data.invitation, request)
 
     @delete("/api/session", summary="Sign out")
     async def sign_out() -> Response[None]:
-        response: Response[None] = Response(None, status_code=204)
-        response.delete_cookie(cookie_name(page_port), path="/")
-        return response
+        return desk.farewell()
 
     return [who, sign_in, look, sign_out]
 
@@ -172,6 +203,10 @@ async def _invited(
     )
     await reception.welcome(invited.id, session.person)
     return session
+
+
+def _signed_in(session: Session) -> SignedIn:
+    return SignedIn(session.person, bool(session.person.name))
 
 
 def _renamed(keys: Keys, session: Session, name: str) -> Session:

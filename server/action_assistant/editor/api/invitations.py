@@ -36,7 +36,10 @@ class Inviting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
     """Everything under `/api/invitations`."""
+    return [*_links(door, addresses), *_one(door, addresses)]
 
+
+def _links(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
     @get(
         "/api/invitations",
         summary="All links, the newest first, with who came in by them",
@@ -60,6 +63,10 @@ def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         location = f"/api/invitations/{made.id}"
         return Response(made, status_code=201, headers={"location": location})
 
+    return [list_invitations, invite]
+
+
+def _one(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
     @post(
         "/api/invitations/{invitation:str}/revoke",
         status_code=200,
@@ -87,7 +94,7 @@ def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         headers = {"cache-control": "no-store"}
         return Response(_svg(origin + found.path), media_type="image/svg+xml", headers=headers)
 
-    return [list_invitations, invite, revoke, code]
+    return [revoke, code]
 
 
 def _svg(link: str) -> bytes:
