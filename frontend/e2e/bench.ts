@@ -87,7 +87,7 @@ async function drag(page: Page, from: Locator, to: Locator): Promise<void> {
 }
 
 /** Where something is once it has come to rest: the canvas glides when it shows all. */
-async function boxOf(locator: Locator) {
+export async function boxOf(locator: Locator) {
   await locator.scrollIntoViewIfNeeded();
   let before = "";
   for (;;) {

@@ -94,9 +94,9 @@ export interface StartOrder {
   /** One engine, or several robots that start together. */
   engines: readonly string[];
   request: string;
-  override?: { codes: readonly string[]; reason: string };
-  /** What simulated actions do. */
+  /** What actions do; only the simulator follows one. */
   script?: unknown;
+  override?: { codes: readonly string[]; reason: string };
 }
 
 export interface Started {

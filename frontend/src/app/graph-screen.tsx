@@ -15,6 +15,7 @@ import { roomUrl } from "../room/connect";
 import { RoomProvider, useLink, useRoom } from "../room/use-room";
 import { DraftWord } from "../runs/draft-word";
 import { LiveWord } from "../runs/live-word";
+import { RecordRehearsed } from "../runs/record-rehearsed";
 import { RunStrip } from "../runs/run-strip";
 import { StartControl } from "../runs/start-control";
 import { Empty } from "../ui/empty";
@@ -79,6 +80,17 @@ function Inside({ id }: { id: string }) {
             seq={shown.seq}
             obstacle={shown.obstacle}
             compact={shown.compact}
+          />
+        )
+      }
+      record={(shown, script, onStarted) =>
+        mayStart && (
+          <RecordRehearsed
+            graph={id}
+            seq={shown.seq}
+            obstacle={shown.obstacle}
+            script={script}
+            onStarted={onStarted}
           />
         )
       }

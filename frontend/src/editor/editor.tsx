@@ -5,6 +5,7 @@ import { IconLayoutSidebar, IconLayoutSidebarRight } from "@tabler/icons-react";
 import { type ReactNode, useCallback, useMemo, useState, useSyncExternalStore } from "react";
 import { type Problems, useProblems } from "../api/graphs";
 import type { Progress } from "../api/progress";
+import type { Script } from "../api/rehearsal";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import { useLink } from "../room/use-room";
@@ -15,6 +16,7 @@ import type { Crumb } from "../ui/top-bar";
 import { type Bench, BenchContext, freePlace, type Panel, placeAction } from "./bench";
 import { useShortcuts } from "./deeds/keys";
 import { Details } from "./details/details";
+import { scriptOf } from "./dry-run/script";
 import style from "./editor.module.css";
 import { FindBar } from "./find/find-bar";
 import { Notices } from "./notices";
@@ -62,6 +64,8 @@ interface Props {
   strip: (shown: Shown) => ReactNode;
   start: (shown: Shown) => ReactNode;
   status: (shown: Shown) => ReactNode;
+  /** Makes the dry-run that is open a run. */
+  record: (shown: Shown, script: Script, onStarted: () => void) => ReactNode;
   corner: ReactNode;
 }
 
@@ -180,6 +184,9 @@ export function Editor(props: Props) {
       compact={!wide}
       phone={phone}
       run={props.run}
+      record={
+        bench.dryRun && props.record(shown, scriptOf(bench.dryRun.decided), bench.dryRun.close)
+      }
       writing={surface?.kind === "note" ? surface.key : null}
       corner={phone ? null : props.corner}
     />

@@ -30,13 +30,26 @@ interface Props {
   phone: boolean;
   /** The run that goes, if one does: the view follows it. */
   run: string | null;
+  /** Beside the dry-run, if one is open: how it becomes a run. */
+  record: ReactNode;
   /** The note whose text is being written. */
   writing: string | null;
   /** In the lower right corner. */
   corner: ReactNode;
 }
 
-function Inside({ me, sight, progress, marks, compact, phone, run, writing, corner }: Props) {
+function Inside({
+  me,
+  sight,
+  progress,
+  marks,
+  compact,
+  phone,
+  run,
+  writing,
+  record,
+  corner,
+}: Props) {
   const bench = useBench();
   const link = useLink();
   const canvas = useCanvas({
@@ -133,7 +146,7 @@ function Inside({ me, sight, progress, marks, compact, phone, run, writing, corn
           {!bench.dryRun && corner}
         </div>
       </div>
-      {bench.dryRun && <DryRunBar bench={bench} run={bench.dryRun} start={null} />}
+      {bench.dryRun && <DryRunBar bench={bench} run={bench.dryRun} record={record} />}
     </div>
   );
 }

@@ -54,8 +54,31 @@ const GROUPS: readonly Group[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"]
 /** Walking and nudging would be eight lines that nobody clicks. */
 const KEYS_ONLY = /^(nudge|walk)-/;
 
-export function DeedMenu() {
+/** Rendered while the menu is open only: what is enabled depends on everything. */
+function DeedItems() {
   const bench = useBench();
+  return GROUPS.map((group) => (
+    <Fragment key={group}>
+      <Menu.Label>{group}</Menu.Label>
+      {DEEDS.filter((deed) => deed.group === group && !KEYS_ONLY.test(deed.name)).map((deed) => {
+        const Sign = deed.icon;
+        return (
+          <Menu.Item
+            key={deed.name}
+            leftSection={<Sign size={16} aria-hidden />}
+            rightSection={<Shortcut deed={deed} />}
+            disabled={!isEnabled(deed, bench)}
+            onClick={() => deed.run(bench)}
+          >
+            {labelOf(deed, bench)}
+          </Menu.Item>
+        );
+      })}
+    </Fragment>
+  ));
+}
+
+export function DeedMenu() {
   return (
     <Menu position="top-start" width={290}>
       <Menu.Target>
@@ -69,27 +92,7 @@ export function DeedMenu() {
         </ActionIcon>
       </Menu.Target>
       <Menu.Dropdown className={style.menu ?? ""}>
-        {GROUPS.map((group) => (
-          <Fragment key={group}>
-            <Menu.Label>{group}</Menu.Label>
-            {DEEDS.filter((deed) => deed.group === group && !KEYS_ONLY.test(deed.name)).map(
-              (deed) => {
-                const Sign = deed.icon;
-                return (
-                  <Menu.Item
-                    key={deed.name}
-                    leftSection={<Sign size={16} aria-hidden />}
-                    rightSection={<Shortcut deed={deed} />}
-                    disabled={!isEnabled(deed, bench)}
-                    onClick={() => deed.run(bench)}
-                  >
-                    {labelOf(deed, bench)}
-                  </Menu.Item>
-                );
-              },
-            )}
-          </Fragment>
-        ))}
+        <DeedItems />
       </Menu.Dropdown>
     </Menu>
   );

@@ -4,6 +4,7 @@ import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { keys, publish, type Version, versionName } from "../api/graphs";
 import { place, sentence } from "../api/http";
 import { memberText } from "../api/member";
+import type { Script } from "../api/rehearsal";
 import { startRun } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { newAid } from "../graph/ids";
@@ -13,6 +14,8 @@ export interface Order {
   engines: readonly string[];
   /** Of the graph that was looked at; null when nobody looked. */
   digest: string | null;
+  /** What actions do in the simulator. */
+  script?: Script;
   override?: { codes: readonly string[]; reason: string };
 }
 
@@ -30,7 +33,7 @@ export function useStart(graph: string) {
   const { live, runner } = useLive();
   const client = useQueryClient();
   return useMutation({
-    mutationFn: async ({ seq, engines, digest, override }: Order) => {
+    mutationFn: async ({ seq, engines, digest, script, override }: Order) => {
       if (runner === undefined) throw new Error("The runner is not known yet.");
       const text = await publish(graph, seq);
       const version = JSON.parse(text) as Version;
@@ -48,6 +51,7 @@ export function useStart(graph: string) {
         graph,
         engines,
         request: newAid(),
+        ...(script === undefined ? {} : { script }),
         ...(override === undefined ? {} : { override }),
       });
       for (const run of started.runs) live?.learn(run);

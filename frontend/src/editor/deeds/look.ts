@@ -131,7 +131,8 @@ export const marquee: Deed = {
   shortcuts: ["v"],
   icon: IconMarquee2,
   also: "marquee frame several",
-  run: (bench) => bench.setTool("select"),
+  // Pressed once more it is over: small screens show no other way back.
+  run: (bench) => bench.setTool(bench.tool === "select" ? "pan" : "select"),
 };
 
 export const showJson: Deed = {

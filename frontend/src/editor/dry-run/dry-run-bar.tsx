@@ -168,7 +168,15 @@ function Said({ run }: { run: DryRun }) {
   );
 }
 
-export function DryRunBar({ bench, run, start }: { bench: Bench; run: DryRun; start: ReactNode }) {
+export function DryRunBar({
+  bench,
+  run,
+  record,
+}: {
+  bench: Bench;
+  run: DryRun;
+  record: ReactNode;
+}) {
   const at = run.moments[run.index]?.at ?? 0;
   return (
     <section className={style.bar} aria-label="Dry-run">
@@ -233,7 +241,10 @@ export function DryRunBar({ bench, run, start }: { bench: Bench; run: DryRun; st
         </p>
         <Choices bench={bench} run={run} />
       </div>
-      <p className={style.note}>Nothing of this is recorded. {start}</p>
+      <div className={style.note}>
+        <span>Nothing of this is recorded.</span>
+        {record}
+      </div>
     </section>
   );
 }
