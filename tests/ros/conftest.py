@@ -1,6 +1,7 @@
 """Tests over real rclpy: on loopback only, each on a domain that nobody else uses."""
 
 import fcntl
+import importlib.util
 import os
 import random
 import tempfile
@@ -16,6 +17,15 @@ AT_ONCE = 4
 if not os.environ.get("TEST_ENGINE_NAME"):  # a real engine may be on another computer
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ.pop("ROS_DOMAIN_ID", None)
+
+
+@pytest.fixture(autouse=True)
+def soon_settled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On loopback a second is enough to see who was there before, and a test knows who will come."""
+    if importlib.util.find_spec("rclpy"):
+        from action_assistant.runner.links import ros2_domain
+
+        monkeypatch.setattr(ros2_domain, "DISCOVERY_S", 0.5)
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from support.product import running
 
 
 def doctor(data: Path, domain: int, **more: str) -> tuple[int, dict[str, dict[str, Any]]]:
-    """The exit code, and the last finding of each topic."""
+    """The exit code, and one finding of each topic: what is wrong before anything else."""
     command = [sys.executable, "-m", "action_assistant", "doctor", "--only", "ros", "--json"]
     answer = subprocess.run(
         [*command, "--data", str(data)],
@@ -27,60 +27,59 @@ def doctor(data: Path, domain: int, **more: str) -> tuple[int, dict[str, dict[st
         check=False,
         timeout=60,
     )
-    return answer.returncode, {each["topic"]: each for each in json.loads(answer.stdout)}
+    found = sorted(json.loads(answer.stdout), key=lambda each: bool(each["verdict"] == "wrong"))
+    return answer.returncode, {each["topic"]: each for each in found}
 
 
-@pytest.fixture
-def registered(tmp_path: Path, domain: int) -> Path:
-    """A data folder in which robot `ada` is registered."""
-    with running(tmp_path / "data") as product, product.runner() as runner:
-        ada = {"name": "ada", "domain": domain}
-        runner.post("/api/robots", json=ada).raise_for_status()
-        assert runner.get("/api/reach").json()["no_reach"] == ""
+def registered(folder: Path, robots: list[dict[str, object]]) -> Path:
+    """A data folder in whose registry these robots are."""
+    with running(folder / "data") as product, product.runner() as runner:
+        assert runner.get("/api/reach").json()["no_reach"] == "", "serve has found this Python"
+        for each in robots:
+            runner.post("/api/robots", json=each).raise_for_status()
         return product.data
 
 
-def test_what_it_says_of_a_robot_follows_the_robot(registered: Path, domain: int) -> None:
-    code, found = doctor(registered, domain)
-    assert (code, found["ada"]["verdict"]) == (1, "wrong")
-    assert "Nobody answers on umrf_graph_get" in found["ada"]["what"]
-
-    with engine(domain):
-        code, found = doctor(registered, domain)
-        assert (code, found["ada"]["verdict"]) == (0, "fine"), found
-        with engine(domain):
-            code, found = doctor(registered, domain)
-            assert code == 1
-            assert "2 engines answer" in found["ada"]["what"]
-            assert "2 engines answer" in found["engines"]["what"]
-
-    with engine(domain, deaf=True):
-        code, found = doctor(registered, domain)
-        assert (code, found["ada"]["what"]) == (
-            1,
-            "It answers, but nobody listens to start and stop.",
-        )
-
-    with engine(domain) as frozen:
+def test_what_is_wrong_with_each_robot_is_told_apart(tmp_path: Path, domains: list[int]) -> None:
+    one, two, three, four = domains
+    robots: list[dict[str, object]] = [
+        {"name": "sound", "domain": one, "get_service": "/sound/umrf_graph_get"},
+        {"name": "elsewhere", "domain": one},
+        {"name": "twin", "domain": two},
+        {"name": "deaf", "domain": three},
+        {"name": "frozen", "domain": four},
+        {"name": "foreign", "domain": one, "rmw": "rmw_cyclonedds_cpp"},
+    ]
+    data = registered(tmp_path, robots)
+    with (
+        engine(one, namespace="sound"),
+        engine(one, namespace="stranger"),
+        engine(two),
+        engine(two),
+        engine(three, deaf=True),
+        engine(four) as frozen,
+    ):
         frozen.holding.set()
-        code, found = doctor(registered, domain)
-        assert code == 1
-        assert "another middleware" in found["ada"]["advice"]
-
-    with engine(domain, namespace="r1"):
-        code, found = doctor(registered, domain)
-        assert code == 1
-        assert "/r1/umrf_graph_get" in found["ada"]["what"]
-        assert "is not registered" in found["engines"]["what"]
-
-
-def test_a_middleware_that_is_not_installed_is_named(registered: Path, domain: int) -> None:
-    code, found = doctor(registered, domain, RMW_IMPLEMENTATION="rmw_cyclonedds_cpp")
+        code, found = doctor(data, one)
     assert code == 1
-    assert found["rclpy"]["what"].startswith("RMW_IMPLEMENTATION is 'rmw_cyclonedds_cpp'")
+    assert (found["sound"]["verdict"], found["deaf"]["verdict"]) == ("fine", "wrong")
+    assert "Engines answer on /sound/umrf_graph_get, /stranger" in found["elsewhere"]["what"]
+    assert "2 engines answer" in found["twin"]["what"]
+    assert found["deaf"]["what"] == "It answers, but nobody listens to start and stop."
+    assert found["frozen"]["what"] == "It is there, but does not answer."
+    assert "RMW_IMPLEMENTATION" in found["foreign"]["what"]
+    assert "2 engines answer" in found["engines"]["what"]
 
 
-def test_a_domain_that_is_no_number_is_named(registered: Path) -> None:
-    code, found = doctor(registered, 0, ROS_DOMAIN_ID="lab")
-    assert code == 1
-    assert found["rclpy"]["what"].startswith("ROS_DOMAIN_ID is 'lab'")
+@pytest.mark.parametrize(
+    ("setting", "value", "said"),
+    [
+        ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp", "RMW_IMPLEMENTATION is 'rmw_cyclonedds_cpp'"),
+        ("ROS_DOMAIN_ID", "lab", "ROS_DOMAIN_ID is 'lab'"),
+    ],
+)
+def test_a_setting_that_cannot_be_is_named(
+    tmp_path: Path, setting: str, value: str, said: str
+) -> None:
+    _, found = doctor(tmp_path, 1, **{setting: value})
+    assert found["rclpy"]["what"].startswith(said)

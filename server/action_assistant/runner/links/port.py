@@ -220,7 +220,7 @@ class Reach(Protocol):
 
     async def candidates(self) -> tuple[Candidate, ...]:
         """Engines that can be seen now: on the domain of this process's environment and on those
-        of links. Takes up to a second."""
+        of links. Takes some seconds at first."""
         ...
 
     async def aclose(self) -> None:

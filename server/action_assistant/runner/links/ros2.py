@@ -14,7 +14,7 @@ import rclpy
 from action_assistant.runner.links.absent import AbsentLink
 from action_assistant.runner.links.port import Candidate, Link, Registration
 from action_assistant.runner.links.ros2_domain import Domain
-from action_assistant.runner.links.ros2_link import DISCOVERY_S, Ros2Link
+from action_assistant.runner.links.ros2_link import Ros2Link
 from action_assistant.runner.links.ros2_outlets import Topics
 from action_assistant.runner.links.ros2_peers import OLDER, generation_of, topics_of, two_servers
 from action_assistant.umrf.facts import PINNED, EngineFacts
@@ -61,8 +61,8 @@ class Ros2:
         """Whoever answers as engines do, on the domains of links and the one of the environment."""
         await self.domain(self._home, topics_of(PINNED))
         domains = tuple(self._domains.values())
-        youngest = max(each.joined_at for each in domains)
-        await anyio.sleep(max(0.0, DISCOVERY_S - (time.monotonic() - youngest)))
+        youngest = max(each.settled_at for each in domains)
+        await anyio.sleep(max(0.0, youngest - time.monotonic()))
         found = {
             (domain.number, path): self._candidate(domain, path)
             for domain in domains

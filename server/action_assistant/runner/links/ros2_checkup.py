@@ -21,7 +21,7 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.umrf.facts import BadProfile, facts_of
 
-_PATIENCE_S: Final = 4.0
+_PATIENCE_S: Final = 6.0
 _SAFE_DOMAIN: Final = 101
 _SHM: Final = Path("/dev/shm")
 _CONTAINER: Final = (Path("/.dockerenv"), Path("/run/.containerenv"))

@@ -40,6 +40,9 @@ from action_assistant.runner.seen import Snapshot
 
 log: Final = logging.getLogger(__name__)
 
+#: Seconds until who has joined a domain sees everybody there: Fast DDS announces itself every three,
+#: and of two engines the second was seen up to two seconds after the first (measured, loaded machine).
+DISCOVERY_S: Final = 3.5
 _KEPT: Final = 512  # sounds that may wait for the event loop; then the oldest goes
 _PROCESS: Final = 12  # bytes of a gid that all endpoints of one process share
 _KIND: Final = "temoto_msgs/srv/UmrfGraphGet"
@@ -101,7 +104,7 @@ class Domain:
         self.number = number
         self.topics = topics
         self.actors: set[str] = set()  # who was heard
-        self.joined_at = time.monotonic()
+        self.settled_at = time.monotonic() + DISCOVERY_S
         self._loop = loop
         self._wall = wall
         self._ears: list[Ear] = []
@@ -135,6 +138,11 @@ class Domain:
         self._node.destroy_node()
         self._context.try_shutdown()
         self._context.destroy()
+
+    @property
+    def settled(self) -> bool:
+        """Whether everybody who is there must have been seen."""
+        return time.monotonic() >= self.settled_at
 
     # --- the one question ---------------------------------------------------------------------
 

@@ -41,7 +41,6 @@ from action_assistant.runner.links.ros2_peers import (
 )
 from action_assistant.umrf.facts import EngineFacts
 
-DISCOVERY_S: Final = 1.0  # until who has joined a domain sees everybody there
 _LOOK_S: Final = 1.0
 _IDLE_GET_S: Final = 10.0
 _BUSY_S: Final = 1.0  # an engine that is not busy answers within milliseconds
@@ -162,11 +161,9 @@ class Ros2Link:
         if self._domain is None:
             raise NoAnswer(self._standing.why)
         domain = self._domain
-        # Who has just joined does not see everybody yet, and a second server would go unnoticed.
-        await anyio.sleep(max(0.0, domain.joined_at + DISCOVERY_S - time.monotonic()))
         servers = domain.servers(self._path)
         self._look()
-        if len(servers) != 1:
+        if len(servers) != 1 or not domain.settled:
             raise NoAnswer(self._standing.why)
         began = self._asked_at = time.monotonic()
         asked_at = self._wall()
@@ -205,7 +202,8 @@ class Ros2Link:
                     self._look()
                     if self._due():
                         await self._ask_by_ourselves()
-                    await anyio.sleep(_LOOK_S)
+                    left = domain.settled_at - time.monotonic()
+                    await anyio.sleep(left if 0 < left < _LOOK_S else _LOOK_S)
         finally:
             self._domain = None
             self._become(Standing(state="gone", why="it is not being looked for any more"))
@@ -279,12 +277,17 @@ class Ros2Link:
 
     def _judged(self, domain: Domain, servers: tuple[Endpoint, ...]) -> tuple[EngineState, str]:
         place = f"{self._path} on domain {self._number}"
+        joined = f"This runner has just joined domain {self._number} and looks around."
+        if not servers and not domain.settled:
+            return "gone", joined
         if not servers:
             others = domain.paths()
             hint = f" Engines answer on {', '.join(others)}." if others else ""
             return "gone", f"Nobody answers on {place}.{hint}"
         if len(servers) > 1:
             return "busy", two_servers(place, len(servers))
+        if not domain.settled:  # a second server on this path would go unnoticed
+            return "busy", joined
         since = self._unanswered_since
         if since is not None and time.monotonic() - since >= _BUSY_S:
             other = foreign_middleware(domain, servers[0])
