@@ -1,5 +1,6 @@
 /** Work without a server: edits wait on the device, for one person, and are merged on return. */
 
+import { readFileSync } from "node:fs";
 import { expect, type Page, test } from "@playwright/test";
 import { add, card, saved } from "./bench";
 import { Product } from "./product";
@@ -116,6 +117,15 @@ test("on a shared tablet nobody's edits are sent under another name", async ({ b
   await expect(card(other, "OfAda")).toHaveCount(0);
   expect(await stored(graph)).toEqual(["First", "OfMari"]);
   expect(Object.values(await waiting(other))).toEqual([1]);
+  // She is told whose it is, and may save it for Ada.
+  await expect(other.getByText("1 change of Ada waits on this device")).toBeVisible();
+  await other.getByRole("button", { name: "Look", exact: true }).click();
+  const dialog = other.getByRole("dialog", { name: /Changes of others/ });
+  const downloading = other.waitForEvent("download");
+  await dialog.getByRole("button", { name: "Save as a file" }).click();
+  const file = JSON.parse(readFileSync(await (await downloading).path(), "utf8"));
+  expect(file).toMatchObject({ made_by: "Ada", changes: [{ what: "added action OfAda" }] });
+  await other.screenshot({ path: test.info().outputPath("others.png") });
   await other.close();
   await ada.page.close();
 

@@ -193,6 +193,17 @@ def test_a_person_brings_so_many_bytes_a_minute_and_nobody_else_waits_for_that()
     assert Budget(limits=False).spend("ada", 10 * AT_ONCE) == 0
 
 
+def test_a_cursor_may_move_two_hundred_times_a_second_for_ever_and_not_faster() -> None:
+    now = 0.0
+    budget = Budget(limits=True, clock=lambda: now)
+    for n in range(200 * 60 * 10):
+        now = n / 200
+        assert budget.speak("ada", 100) == 0
+    waits = [budget.speak("eve", 100) for _ in range(60_000)]
+    assert waits[0] == 0
+    assert waits[-1] > 100
+
+
 def test_a_crowd_of_people_is_not_remembered_for_ever() -> None:
     now = 0.0
     budget = Budget(limits=True, clock=lambda: now)

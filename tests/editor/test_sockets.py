@@ -230,8 +230,25 @@ async def test_a_frozen_reader_is_dropped_while_others_go_on(editor: Editor, gra
     assert received < 40 * 500_000
 
 
-def upgraded(editor: Editor, graph: str, *, receive_buffer: int | None = None) -> socket.socket:
-    """A bare socket that has become a WebSocket."""
+def test_no_compression_is_agreed_on(editor: Editor, graph: str) -> None:
+    """A frame of some bytes could otherwise unfold into a hundred mebibytes."""
+    offer = "Sec-WebSocket-Extensions: permessage-deflate; client_max_window_bits\r\n"
+    raw = upgraded(editor, graph, more=offer)
+    try:
+        raw.sendall(masked(b"\x00\x00\x01\x00").replace(b"\x82", b"\xc2", 1))  # says it is packed
+        raw.settimeout(5)
+        answer = b""
+        while chunk := raw.recv(1 << 16):
+            answer += chunk
+        assert b"permessage" not in answer
+    finally:
+        raw.close()
+
+
+def upgraded(
+    editor: Editor, graph: str, *, receive_buffer: int | None = None, more: str = ""
+) -> socket.socket:
+    """A bare socket that has become a WebSocket, with no extension whatever `more` asks for."""
     raw = socket.socket()
     if receive_buffer is not None:
         raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
@@ -240,12 +257,13 @@ def upgraded(editor: Editor, graph: str, *, receive_buffer: int | None = None) -
         f"GET /api/graphs/{graph}/room HTTP/1.1\r\nHost: 127.0.0.1:{editor.port}\r\n"
         f"Authorization: {BEARER['authorization']}\r\nUpgrade: websocket\r\n"
         "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+        f"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n{more}\r\n".encode()
     )
     answer = b""
     while b"\r\n\r\n" not in answer:
         answer += raw.recv(1)
     assert b" 101 " in answer
+    assert b"extensions" not in answer.lower()
     return raw
 
 

@@ -9,6 +9,7 @@ import { FakeServer } from "./fake-server";
 import {
   type Choice,
   type OpenRoom,
+  type OthersWaiting,
   RoomProvider,
   useChoice,
   useEditors,
@@ -113,6 +114,7 @@ test("leaving and changing the graph close the room that was open", () => {
 });
 
 let choice: Choice | null;
+let left: OthersWaiting;
 let goAfter: (client: number | null) => void;
 
 function Together() {
@@ -121,7 +123,8 @@ function Together() {
   const { state, unsaved } = useLink();
   const names = useGraph().actions.map((action) => action.name);
   const editors = useEditors("k|name").map((person) => person.name);
-  const waiting = useOthersWaiting().others.map(({ name, waiting }) => `${name}:${waiting}`);
+  left = useOthersWaiting();
+  const waiting = left.others.map(({ name, waiting }) => `${name}:${waiting}`);
   const { whom, follow } = useFollowing();
   goAfter = follow;
   const place = open.following.view();
@@ -167,6 +170,23 @@ test("a page knows who edits a field, where somebody looks, and whose edits wait
   expect(text()).toBe("live 0 Mari Mari:1 at 7");
   act(() => server.presence(5, 2, null));
   expect(text()).toBe("live 0 Mari:1");
+});
+
+test("what another person left on this device can be read and let go, and is never sent", async () => {
+  const device = new FakeDevice();
+  await showKept({ graph: "g", person: MARI, device });
+  act(() => void addAction(open.doc, { name: "Scan" }));
+  await leave();
+  await showKept({ graph: "g", person: ADA, device });
+  act(() => void server.accept());
+  await flush();
+  const [stranded] = await left.read("m");
+  expect([...(stranded?.difference.actions.values() ?? [])]).toContain("Scan");
+  expect(text()).toBe("live 0 Mari:1");
+  await act(() => left.forget("m"));
+  expect(text()).toBe("live 0");
+  expect(device.waiting).toBe(0);
+  expect(server.doc.getMap("actions").size).toBe(0);
 });
 
 test("edits on a history that the server left are made again there, or dropped, as the person says", async () => {

@@ -35,4 +35,7 @@ test("whose edits wait on a shared device is said by name", () => {
   expect(othersWait(others)).toBe(
     "1 change of Ülle and 3 changes of a guest wait on this device until they sign in again.",
   );
+  expect(othersWait(others.slice(0, 1))).toBe(
+    "1 change of Ülle waits on this device until they sign in again.",
+  );
 });

@@ -26,7 +26,9 @@ export function whyNot(link: Link): string | null {
 export function othersWait(others: readonly OtherPerson[]): string | null {
   if (others.length === 0) return null;
   const parts = others.map(({ name, waiting }) => `${changes(waiting)} of ${name || "a guest"}`);
-  return `${parts.join(" and ")} wait on this device until they sign in again.`;
+  const [only] = others;
+  const one = others.length === 1 && only?.waiting === 1;
+  return `${parts.join(" and ")} ${one ? "waits" : "wait"} on this device until they sign in again.`;
 }
 
 const refusals: Readonly<Record<Why, string>> = {

@@ -1,4 +1,4 @@
-"""How many bytes of edits one person may bring in a minute. Who brings more waits; nobody else does."""
+"""How much one person may bring in a minute. Who brings more waits; nobody else does."""
 
 import time
 from collections.abc import Callable
@@ -7,6 +7,8 @@ from typing import Final
 PER_MINUTE: Final = 16 << 20  # bytes, of all sockets of a person
 AT_ONCE: Final = 32 << 20  # bytes: a large graph after a day without a network
 _REMEMBERED: Final = 1000  # people
+#: What a word about oneself costs at least: so that two hundred a second may go on for ever.
+_WORD: Final = PER_MINUTE // (60 * 200)
 
 
 class Budget:
@@ -16,6 +18,10 @@ class Budget:
         self._limits = limits
         self._clock = clock
         self._left: dict[str, tuple[float, float]] = {}  # bytes, and when that was
+
+    def speak(self, person: str, size: int) -> float:
+        """Somebody said so many bytes about themselves: as `spend`."""
+        return self.spend(person, max(size, _WORD))
 
     def spend(self, person: str, size: int) -> float:
         """Somebody brought so many bytes: the seconds to wait before more of theirs is read."""

@@ -111,10 +111,10 @@ async def _listen(receive: Receive, room: Room, member: Member, budget: Budget) 
             room.hear(member, message)
             if member.far_ahead:
                 await member.until_heard()
-            if isinstance(message, wire.Edit):
-                wait = budget.spend(member.person.id, len(data))
-                if wait > 0:
-                    await anyio.sleep(wait)
+            spend = budget.spend if isinstance(message, wire.Edit) else budget.speak
+            wait = spend(member.person.id, len(data))
+            if wait > 0:
+                await anyio.sleep(wait)
 
 
 async def _speak(send: Send, member: Member) -> None:
