@@ -1,0 +1,158 @@
+/** How fast the page is: opening, typing, dragging, tidying, and frames while 20 others edit. */
+
+import { spawn } from "node:child_process";
+import { mkdirSync, writeFileSync } from "node:fs";
+import { resolve } from "node:path";
+import { expect, type Page, test } from "@playwright/test";
+import { saved } from "./bench";
+import { Product, pause, TOKEN } from "./product";
+
+const ROOT = resolve(import.meta.dirname, "../..");
+const SIZES = [300, 1000, 3000];
+const OTHERS = 20;
+const product = new Product();
+const rows: string[][] = [];
+const frames: string[][] = [];
+
+test.skip(process.env.SPEED === undefined, "measures; started by `make performance`");
+test.describe.configure({ mode: "serial", timeout: 300_000 });
+test.beforeAll(() => product.start());
+test.afterAll(async () => {
+  await product.dispose();
+  mkdirSync(resolve(ROOT, "frontend/test-results"), { recursive: true });
+  const tables = [
+    { head: ["actions", "open", "key to paint", "drag: frame", "longest", "tidy"], rows },
+    { head: ["1,000 actions", "frame (median)", "95 %", "99 %", "longest"], rows: frames },
+  ];
+  writeFileSync(resolve(ROOT, "frontend/test-results/speed.json"), JSON.stringify(tables));
+});
+
+/** A field of actions, each led to from the one above it. */
+async function field(size: number): Promise<string> {
+  const named = (n: number) => ({ name: "Step", instance_id: n });
+  const wide = Math.ceil(Math.sqrt(size));
+  const graph = {
+    graph_name: `field_${size}`,
+    graph_entry: Array.from({ length: wide }, (_, n) => named(n)),
+    graph_exit: [named(size - 1)],
+    actions: Array.from({ length: size }, (_, n) => ({
+      ...named(n),
+      type: "sync",
+      input_parameters: { speed: { pvf_type: "number", pvf_value: n } },
+      parents: n < wide ? [] : [named(n - wide)],
+      children: n + wide < size ? [named(n + wide)] : [],
+      gui_attributes: { position: { x: (n % wide) * 260, y: 200 + Math.floor(n / wide) * 190 } },
+    })),
+  };
+  const body = JSON.stringify(graph);
+  const headers = { "content-type": "application/json" };
+  return (await product.ask<{ id: string }>("/api/graphs", { method: "POST", body, headers })).id;
+}
+
+/** The times between frames from now on, in ms, until they are asked for. */
+async function watchFrames(page: Page): Promise<() => Promise<number[]>> {
+  const gaps = await page.evaluateHandle(() => {
+    const gaps: number[] = [];
+    let last = performance.now();
+    const look = (now: number) => {
+      gaps.push(now - last);
+      last = now;
+      requestAnimationFrame(look);
+    };
+    requestAnimationFrame(look);
+    return gaps;
+  });
+  return async () => (await gaps.jsonValue()).slice(1).sort((a, b) => a - b);
+}
+
+const share = (sorted: number[], part: number): number =>
+  sorted[Math.min(sorted.length - 1, Math.floor(sorted.length * part))] ?? Number.NaN;
+const ms = (value: number): string => `${value.toFixed(value < 100 ? 1 : 0)} ms`;
+
+/** From each key to the frame that shows it: the median, as the browser itself tells. */
+async function type(page: Page): Promise<number> {
+  const name = page.getByRole("textbox", { name: "Name", exact: true }).first();
+  await name.click();
+  const seen = await page.evaluateHandle(() => {
+    const durations: number[] = [];
+    const options = { type: "event", durationThreshold: 16 } as PerformanceObserverInit;
+    new PerformanceObserver((list) => {
+      for (const entry of list.getEntries())
+        if (entry.name === "keydown") durations.push(entry.duration);
+    }).observe(options);
+    return durations;
+  });
+  await page.keyboard.type("abcdefghijklmnopqrst", { delay: 60 });
+  await pause(500);
+  const durations = (await seen.jsonValue()).sort((a, b) => a - b);
+  return durations.length === 0 ? 16 : share(durations, 0.5);
+}
+
+async function dragACard(page: Page): Promise<number[]> {
+  const box = await page.locator(".react-flow__node-action").nth(3).boundingBox();
+  if (box === null) throw new Error("no card");
+  const [x, y] = [box.x + box.width / 4, box.y + box.height / 2];
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  const gaps = await watchFrames(page);
+  for (let step = 1; step <= 60; step += 1) {
+    await page.mouse.move(x + step * 2, y + step);
+    await pause(10);
+  }
+  await page.mouse.up();
+  return gaps();
+}
+
+for (const size of SIZES) {
+  test(`${size} actions`, async ({ browser }) => {
+    const { page, context } = await product.person(browser, "Ada");
+    const id = await field(size);
+    const before = Date.now();
+    await page.goto(`${product.url}/graphs/${id}`);
+    await page.locator(".react-flow__node-action").first().waitFor();
+    await saved(page);
+    const opened = Date.now() - before;
+    const drag = await dragACard(page);
+    await page.locator(".react-flow__node-action").nth(4).click();
+    const key = await type(page);
+    const tidy = Date.now();
+    await page.getByRole("button", { name: /^Tidy/ }).first().click();
+    await saved(page);
+    const tidied = Date.now() - tidy;
+    const figures = [ms(opened), ms(key), ms(share(drag, 0.5)), ms(share(drag, 1)), ms(tidied)];
+    rows.push([size.toLocaleString("en"), ...figures]);
+    expect(drag.length).toBeGreaterThan(0);
+    await context.close();
+  });
+}
+
+test(`a graph of 1,000 actions while ${OTHERS} people edit it`, async ({ browser }) => {
+  const { page, context } = await product.person(browser, "Ada");
+  const id = await field(1000);
+  await page.goto(`${product.url}/graphs/${id}`);
+  await page.locator(".react-flow__node-action").first().waitFor();
+  await saved(page);
+  const alone = await watchFrames(page);
+  await pause(4000);
+  note("alone", await alone());
+  const plan = {
+    ...{ port: product.port, pid: process.pid, dialect: "plain", deed: "idle" },
+    ...{ path: "/api/graphs/{room}/room", rooms: [id], people: OTHERS, rate: 2, seconds: 9 },
+    headers: [`Authorization: Bearer ${TOKEN}`],
+  };
+  const others = spawn(resolve(ROOT, ".venv/bin/python"), [
+    resolve(ROOT, "bench/editors.py"),
+    JSON.stringify(plan),
+  ]);
+  const ended = new Promise((done) => others.once("exit", done));
+  await pause(3000);
+  const together = await watchFrames(page);
+  await pause(5000);
+  note(`${OTHERS} people, 40 edits/s`, await together());
+  expect(await ended).toBe(0);
+  await context.close();
+});
+
+function note(what: string, sorted: number[]): void {
+  frames.push([what, ...[0.5, 0.95, 0.99, 1].map((part) => ms(share(sorted, part)))]);
+}
