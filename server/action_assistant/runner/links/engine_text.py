@@ -58,7 +58,7 @@ def snapshot(
     """One graph as an engine shows it, seen at `at` (microseconds UTC). Raises NotAGraph."""
     try:
         graph = _GRAPH.decode(text)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
         raise NotAGraph(f"This is no graph as engines write them: {error}") from error
     nodes = {f"{each.name}_{each.instance_id}": each for each in graph.actions}
     messages = {name: _messages(each) for name, each in nodes.items()}
@@ -78,7 +78,7 @@ def name_of(text: str) -> str:
     """The name inside a graph's text; empty where there is none."""
     try:
         return _NAMED.decode(text).graph_name
-    except (msgspec.DecodeError, RecursionError):
+    except (msgspec.DecodeError, RecursionError, UnicodeError):
         return ""
 
 
