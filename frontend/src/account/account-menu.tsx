@@ -48,7 +48,7 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
           title={person.name || "Guest"}
         >
           <Avatar size={28} radius="xl" variant="filled" color={personColor(person.id)}>
-            <Text span size="xs" fw={650} c="var(--on-accent)">
+            <Text span size="xs" fw={650} c="var(--on-accent)" aria-hidden>
               {initials(person.name || "Guest")}
             </Text>
           </Avatar>

@@ -71,8 +71,12 @@ export function StopButton({ graph }: Props) {
         title={`Stop ${target}.\n${SOFT}`}
       >
         <IconSquareFilled size={13} aria-hidden style={{ flex: "none" }} />
-        <span className={style.word}>{meant || all === 0 ? "STOP" : "STOP ALL"}</span>
-        <span className={style.count}>{words(now.link, meant ? here.length : all)}</span>
+        <span className={style.word}>
+          STOP<span aria-hidden>{meant || all === 0 ? "" : " ALL"}</span>
+        </span>
+        <span className={style.count} aria-hidden>
+          {words(now.link, meant ? here.length : all)}
+        </span>
       </button>
       {beside && (
         <button
@@ -82,7 +86,7 @@ export function StopButton({ graph }: Props) {
           aria-label="Stop everything that runs, everywhere. Software stop, no emergency stop"
           title={`Stop everything that runs (Ctrl+.).\n${SOFT}`}
         >
-          ALL {all}
+          <span aria-hidden>ALL {all}</span>
         </button>
       )}
     </span>

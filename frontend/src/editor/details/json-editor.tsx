@@ -110,6 +110,7 @@ function extensions(now: { readonly current: Props }): Extension {
     EditorView.contentAttributes.of({
       "aria-label": "JSON of the graph",
       "aria-multiline": "true",
+      tabindex: "0",
       "data-own-keys": "true",
       spellcheck: "false",
     }),

@@ -51,6 +51,7 @@ export const ActionCard = memo(function ActionCard({
         position={Position.Top}
         className={style.input ?? ""}
         isConnectable={isConnectable}
+        role="img"
         aria-label={`Input of ${action.name} ${action.instanceId}`}
       />
       {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
@@ -95,6 +96,7 @@ export const ActionCard = memo(function ActionCard({
           className={style.outcome ?? ""}
           isConnectable={isConnectable}
           data-outcome={outcome}
+          role="img"
           aria-label={`When ${outcomeWord[outcome]}`}
           title={`When ${action.name} ${action.instanceId} is ${outcomeWord[outcome]}`}
           style={{ left: `${14 + i * 24}%`, color: outcomeColor[outcome] }}

@@ -26,6 +26,7 @@ export const EndPill = memo(function EndPill({
           position={entry ? Position.Bottom : Position.Top}
           className={style.handle ?? ""}
           isConnectable={isConnectable}
+          role="img"
           aria-label={entry ? "Start with" : "End with"}
         />
       </div>
