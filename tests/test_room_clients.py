@@ -151,6 +151,25 @@ def test_an_idle_client_is_not_dropped(page: Page, product: Product, graph_id: s
     until(lambda: names(seen(page, "page")), ["StillHere_0"])
 
 
+def test_a_page_that_shows_something_else_notices_and_the_server_counts_it(
+    page: Page, product: Product, graph_id: str
+) -> None:
+    def counted() -> float:
+        with product.editor() as client:
+            lines = client.get("/metrics").text.splitlines()
+        return sum(float(each.split()[1]) for each in lines if "divergences" in each[:35])
+
+    for name in ("sound", "twisted"):
+        join(page, product, graph_id, name)
+    page("twist", name="twisted", text="something else")
+    page("act", name="sound", edit=["setGraphDescription", "moved on"])
+    until(lambda: page("look", name="twisted")["link"].get("why"), "differs", seconds=20)
+    assert page("look", name="sound")["link"]["state"] == "live"
+    assert counted() == 1
+    for name in ("sound", "twisted"):
+        page("leave", name=name)
+
+
 def test_edits_made_while_the_server_was_gone_are_saved_when_it_is_back(
     page: Page, tmp_path: Path
 ) -> None:

@@ -142,6 +142,12 @@ const operations = {
     return { answer: page.edit[edit](rooms.get(name).doc, ...values) ?? null };
   },
 
+  /** Makes the page show another name than it has, as no message would: its memory is at fault. */
+  twist({ name, text }) {
+    rooms.get(name).doc.getMap("meta")._map.get("name").content.arr[0] = text;
+    return {};
+  },
+
   /** How an open room stands. */
   look({ name }) {
     const { doc, room, provider, drops } = rooms.get(name);

@@ -117,6 +117,6 @@ def _measures(house: House) -> dict[str, float]:
     rooms = house.rooms.open_rooms()
     return {
         "action_assistant_rooms": len(rooms),
-        "action_assistant_divergences": sum(room.divergences for room in rooms),
+        "action_assistant_divergences": house.rooms.divergences,
         "action_assistant_sockets": sum(len(room.members) for room in rooms),
     }

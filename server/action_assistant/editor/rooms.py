@@ -32,6 +32,7 @@ class Rooms:
         self._tasks: set[asyncio.Task[None]] = set()
         self._timers: dict[str, asyncio.TimerHandle] = {}
         self._closed = False
+        self._divergences = 0
         self._heart = asyncio.create_task(self._beat(), name="heart")
 
     @asynccontextmanager
@@ -58,6 +59,11 @@ class Rooms:
     def open_rooms(self) -> list[Room]:
         """All that are open."""
         return list(self._rooms.values())
+
+    @property
+    def divergences(self) -> int:
+        """How often a page showed something else than its room, since this process began."""
+        return self._divergences + sum(room.divergences for room in self.open_rooms())
 
     def expel(self, stream: str) -> None:
         """Send everyone away from a graph that is no more."""
@@ -107,6 +113,7 @@ class Rooms:
     def _forget(self, room: Room) -> None:
         if self._rooms.get(room.stream) is room:
             del self._rooms[room.stream]
+            self._divergences += room.divergences
 
     def _unload(self, stream: str) -> None:
         self._timers.pop(stream, None)
