@@ -28,7 +28,8 @@ from action_assistant.runner.standin_wire import Pause, Quirks, Start, Stop
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
-from runner.air import Air, AirLink, Node, now, now_ms
+from runner.air import Air, Node, now, now_ms
+from runner.air_link import AirLink
 from runner.world import ANN, BEN, World, carousel, live_through, order, sequence, two_ends
 
 HISTORIES = int(os.environ.get("TEST_HISTORIES", "40"))

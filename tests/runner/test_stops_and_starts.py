@@ -24,7 +24,8 @@ from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Quirks, Start, Stop
 from action_assistant.umrf import codec
 from action_assistant.umrf.semantics import script_from
-from runner.air import Air, AirLink, Node, now, now_ms
+from runner.air import Air, Node, now, now_ms
+from runner.air_link import AirLink
 from runner.world import ANN, BEN, World, live_through, order, sequence, until, virtual
 
 STOPS = int(os.environ.get("TEST_STOPS", "20"))
@@ -221,6 +222,21 @@ async def test_a_killed_engine_is_shown_as_unknown_and_its_stop_as_unconfirmed()
         told = shown(control, run)
         assert (told.state, told.desired) == ("unknown", "stopped")
         assert any(each.code == "stop_unconfirmed" for each in control.open[run].run.alarms)
+
+
+@virtual
+async def test_an_action_that_begins_after_the_stop_keeps_the_run_from_being_called_stopped() -> (
+    None
+):
+    scene = Scene(7, quirks=Quirks(loading_ms=700.0))
+    async with scene.played() as control:
+        run = (await control.start(asked(), ANN)).run.id
+        await anyio.sleep(0.3)
+        await control.stop(run, BEN)
+        await until(lambda: scene.nodes["David"].robot.moving == ("patrol",))
+        await anyio.sleep(10)  # in a graph that is STOPPED the engine ignores every further stop
+        assert shown(control, run).state == "stopping"
+        assert any("Work_0" in each.text for each in control.open[run].run.alarms)
 
 
 @virtual

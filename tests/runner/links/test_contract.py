@@ -23,7 +23,8 @@ from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Stop
 from action_assistant.umrf import codec
 from action_assistant.umrf.semantics import script_from
-from runner.air import Air, AirLink, now_ms
+from runner.air import Air, now_ms
+from runner.air_link import AirLink
 from runner.links.contract import PROMISES, Bench, Promise, keep
 from runner.world import engine, live_through, sequence, virtual
 
