@@ -81,13 +81,9 @@ function Body({ choice, by, onLater }: BodyProps) {
   const { stranded } = choice;
   const { doc } = useRoom();
   const graph = useGraph();
-  const { state } = useLink();
   // biome-ignore lint/correctness/useExhaustiveDependencies: the document changes with the graph
   const all = useMemo(() => changesOf(stranded, mapsOf(doc)), [stranded, doc, graph]);
   const [left, setLeft] = useState<ReadonlySet<string>>(new Set());
-  const [busy, setBusy] = useState(false);
-  const [dropping, setDropping] = useState(false);
-  const [trouble, setTrouble] = useState<string | null>(null);
   const taken = all.filter(({ id }) => !left.has(id));
   const take = (id: string, on: boolean) => {
     const next = new Set(left);
@@ -95,21 +91,10 @@ function Body({ choice, by, onLater }: BodyProps) {
     else next.add(id);
     setLeft(next);
   };
-  const work = async (deed: () => Promise<unknown>) => {
-    setBusy(true);
-    setTrouble(null);
-    try {
-      await deed();
-    } catch (error) {
-      setBusy(false);
-      setTrouble(error instanceof Error ? error.message : String(error));
-    }
-  };
   const when = new Date(stranded.at).toLocaleString([], {
     dateStyle: "medium",
     timeStyle: "short",
   });
-  const some = taken.length < all.length ? `${taken.length} of ${all.length}` : "all";
   return (
     <>
       <Text>
@@ -135,13 +120,40 @@ function Body({ choice, by, onLater }: BodyProps) {
           />
         ))}
       </ul>
+      <Answers
+        choice={choice}
+        taken={taken}
+        some={taken.length < all.length ? `${taken.length} of ${all.length}` : "all"}
+        onLater={onLater}
+        onSave={() => saveChanges(graph.name, by, [stranded])}
+      />
+    </>
+  );
+}
+
+interface AnswersProps {
+  choice: Choice;
+  taken: readonly Change[];
+  /** How many that is, in words. */
+  some: string;
+  onLater: () => void;
+  onSave: () => void;
+}
+
+function Answers({ choice, taken, some, onLater, onSave }: AnswersProps) {
+  const { state } = useLink();
+  const [dropping, setDropping] = useState(false);
+  const { busy, trouble, work } = useWork();
+  const { difference } = choice.stranded;
+  return (
+    <>
       {trouble !== null && (
         <p className={style.trouble} role="alert">
           That did not work: {trouble}. Your changes are still here.
         </p>
       )}
       <div className={style.answers}>
-        <Button onClick={() => saveChanges(graph.name, by, [stranded])}>Save as a file</Button>
+        <Button onClick={onSave}>Save as a file</Button>
         <span className={style.space} />
         <Button onClick={onLater}>Decide later</Button>
         {dropping ? (
@@ -158,13 +170,30 @@ function Body({ choice, by, onLater }: BodyProps) {
           data-autofocus
           loading={busy}
           disabled={taken.length === 0 || state !== "live"}
-          onClick={() => work(() => choice.apply(chosen(stranded.difference, taken)))}
+          onClick={() => work(() => choice.apply(chosen(difference, taken)))}
         >
           Apply {some}
         </Button>
       </div>
     </>
   );
+}
+
+/** A deed that takes its time and may fail. When it succeeds the dialog is gone. */
+function useWork() {
+  const [busy, setBusy] = useState(false);
+  const [trouble, setTrouble] = useState<string | null>(null);
+  const work = async (deed: () => Promise<unknown>) => {
+    setBusy(true);
+    setTrouble(null);
+    try {
+      await deed();
+    } catch (error) {
+      setBusy(false);
+      setTrouble(error instanceof Error ? error.message : String(error));
+    }
+  };
+  return { busy, trouble, work };
 }
 
 /** The dialog; `onLater` leaves a word on the page that leads back to it. */
