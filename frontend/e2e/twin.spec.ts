@@ -1,0 +1,88 @@
+/** The twin of the canvas: outline and search by keyboard alone, comments between two people. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { card, saved } from "./bench";
+import { Product } from "./product";
+
+const product = new Product();
+
+test.beforeAll(() => product.start());
+test.afterAll(() => product.dispose());
+
+async function example(page: Page, name: string): Promise<string> {
+  const graphs = await product.ask<{ id: string; name: string }[]>("/api/graphs");
+  const id = graphs.find((graph) => graph.name === name)?.id ?? "";
+  await page.goto(`${product.url}/graphs/${id}`);
+  await saved(page);
+  return id;
+}
+
+test("hits are stepped through by keyboard and shown on the canvas; one robot stands out", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await example(page, "morning_round");
+  await page.keyboard.press("ControlOrMeta+f");
+  const field = page.getByRole("combobox", { name: "Find in graph" });
+  await expect(field).toBeFocused();
+  await page.keyboard.type("DriveTo");
+  const count = page.getByRole("status").filter({ hasText: / of / });
+  await expect(count).toHaveText(/^1 of \d+/);
+  await page.keyboard.press("Enter");
+  const first = page.locator(".react-flow__node-action.selected");
+  await expect(first).toHaveCount(1);
+  await page.keyboard.press("Enter");
+  await expect(count).toHaveText(/^2 of \d+/);
+  await page.keyboard.press("Shift+Enter");
+  await expect(count).toHaveText(/^1 of \d+/);
+  await field.fill("type:nothing_is_of_this");
+  await expect(page.getByText("Nothing says that.")).toBeVisible();
+  await page.keyboard.press("Escape");
+  await expect(field).toHaveCount(0);
+
+  const robots = page.getByRole("group", { name: "Show the actions of one robot" });
+  if ((await robots.count()) > 0) {
+    const button = robots.getByRole("button").first();
+    await button.click();
+    await expect(button).toHaveAttribute("aria-pressed", "true");
+    await expect(page.locator("[data-dim]").first()).toBeAttached();
+  }
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("a comment is answered by somebody else, escaped, counted on the card, and resolved", async ({
+  browser,
+}) => {
+  const ada = await product.person(browser, "Ada");
+  const mari = await product.person(browser, "<b>Mari</b>");
+  const id = await example(ada.page, "search_aisles");
+  await mari.page.goto(`${product.url}/graphs/${id}`);
+  await saved(mari.page);
+  const [{ name }] = (await product.ask<{ actions: [{ name: string }] }>(`/api/graphs/${id}/umrf`))
+    .actions;
+
+  await card(ada.page, name)
+    .first()
+    .click({ position: { x: 50, y: 30 } });
+  await ada.page.keyboard.press("m");
+  await ada.page.getByRole("textbox", { name: /^Comment on/ }).fill("<img src=x onerror=alert(1)>");
+  await ada.page.keyboard.press("ControlOrMeta+Enter");
+  await expect(card(mari.page, name).first().getByTitle("Open comments")).toHaveText(/^ ?1/);
+
+  await mari.page.getByRole("tab", { name: /Comments, 1 open/ }).click();
+  await expect(mari.page.getByText("<img src=x onerror=alert(1)>")).toBeVisible();
+  await mari.page.getByRole("button", { name: "Answer" }).click();
+  await mari.page.getByRole("textbox", { name: "Answer" }).fill("No.");
+  await mari.page.getByRole("button", { name: "Answer" }).click();
+  await expect(ada.page.getByText("<b>Mari</b>").first()).toBeVisible();
+  await expect(ada.page.getByText("No.", { exact: true })).toBeVisible();
+
+  await ada.page.getByRole("button", { name: "Resolve" }).click();
+  await expect(card(mari.page, name).first().getByTitle("Open comments")).toHaveCount(0);
+  await mari.page.getByRole("button", { name: "Show 1 resolved" }).click();
+  await expect(mari.page.getByRole("button", { name: "Open again" })).toBeVisible();
+  expect([...ada.failures, ...mari.failures]).toEqual([]);
+  await ada.context.close();
+  await mari.context.close();
+});
