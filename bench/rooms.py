@@ -1,5 +1,6 @@
 """Rooms under load, against Hocuspocus with SQLite: cost, delay and memory."""
 
+import os
 import statistics
 from collections.abc import Iterator
 from typing import Any, Final
@@ -8,7 +9,7 @@ from peers import Hocuspocus, Ours, running
 from table import Table
 
 TITLE = "Rooms: ours at full durability, Hocuspocus with SQLite (which stores seconds later)"
-RUNS: Final = 3  # of each, in turn
+RUNS: Final = int(os.environ.get("BENCH_RUNS", "3"))  # of each, in turn
 LOADS: Final[dict[str, dict[str, Any]]] = {
     "50 people, one graph, 10 edits/s each": {"people": 50, "rate": 10},
     "100 people, 20 graphs, 10 edits/s each": {"people": 100, "rate": 10, "graphs": 20},

@@ -1,7 +1,6 @@
 """One socket in a room: what waits to be sent to it, and when it is too slow (rule R5)."""
 
 import asyncio
-from collections import deque
 from enum import Enum
 from typing import Final
 
@@ -36,14 +35,14 @@ class Member:
         self.said: str | None = None  # why, where the close code does not tell enough
         self.handled = 0  # edits of this socket that the room has dealt with
         self._heard = 0  # edits that the socket brought
-        self._frames: deque[bytes] = deque()
+        self._frames: list[bytes] = []
         self._bytes = 0
         self._answer = _Answer.NONE
         self._presence: News | None = None
         self._ack: bytes | None = None
         self._said = -1, -1  # with the last acknowledgement
         self._news = asyncio.Event()
-        self._room_again = asyncio.Event()
+        self._room_again: asyncio.Event | None = None  # few sockets are ever far ahead
         self._loop = asyncio.get_running_loop()
         self._taken_at = self._loop.time()
         self._closed: asyncio.Future[int] = self._loop.create_future()
@@ -106,8 +105,7 @@ class Member:
         await self._news.wait()
         self._news.clear()
         self._taken_at = self._loop.time()
-        frames = list(self._frames)
-        self._frames.clear()
+        frames, self._frames = self._frames, []
         self._bytes = 0
         if self._answer is _Answer.WAITS:
             self._answer = _Answer.LEFT
@@ -131,7 +129,7 @@ class Member:
     def edit_handled(self) -> None:
         """The room has dealt with the next edit of this socket, for good."""
         self.handled += 1
-        self._room_again.set()
+        self._let_on()
 
     @property
     def far_ahead(self) -> bool:
@@ -141,14 +139,18 @@ class Member:
     async def until_heard(self) -> None:
         """Wait while this socket is far ahead of the room."""
         while self.far_ahead:
-            self._room_again.clear()
-            await self._room_again.wait()
+            again = self._room_again = asyncio.Event()
+            await again.wait()
+
+    def _let_on(self) -> None:
+        if self._room_again is not None:
+            self._room_again.set()
 
     def close(self, code: int) -> None:
         """End this socket. The first reason counts."""
         if not self._closed.done():
             self._closed.set_result(code)
-            self._room_again.set()
+            self._let_on()
             self._news.set()
 
     def refuse(self, code: int, said: str | None = None) -> None:

@@ -24,7 +24,7 @@ log: Final = logging.getLogger(__name__)
 WEBSOCKET_LIMIT: Final = 1_114_112  # bytes; an update of 1 MiB and its frame
 GRACE: Final = 5  # seconds that open requests get when the process is told to end
 _LOOK_S: Final = 60.0  # between two looks at the certificate
-_GARBAGE: Final = (10_000, 20, 20)  # objects, and collections of the younger generations
+_GARBAGE: Final = (10_000, 10, 10)  # objects, and collections of the younger generations
 UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it was sent is gone
 
 

@@ -1,5 +1,6 @@
 """The socket of a room (DESIGN 3)."""
 
+import asyncio
 import logging
 from typing import Any, Final
 
@@ -77,14 +78,23 @@ async def _converse(socket: Socket, room: Room, member: Member, budget: Budget) 
     """Until one side ends it."""
     receive, send = plain(socket)
     room.join(member)
+    # Two plain tasks: a thousand idle sockets are a thousand times what stands around each.
+    tasks = [
+        asyncio.create_task(_listen(receive, room, member, budget)),
+        asyncio.create_task(_speak(send, member)),
+    ]
+    for task in tasks:
+        task.add_done_callback(lambda _: member.close(_NORMAL))
     try:
-        async with anyio.create_task_group() as tasks:
-            tasks.start_soon(_listen, receive, room, member, budget)
-            tasks.start_soon(_speak, send, member)
-            code = await member.ended()
-            tasks.cancel_scope.cancel()
+        code = await member.ended()
     finally:
         room.leave(member)
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
+    for task in tasks:
+        if not task.cancelled():
+            task.result()  # raises what went wrong
     if code != _NORMAL:
         with anyio.move_on_after(_GOODBYE):
             await socket.close(code, member.said or wire.REASONS.get(code))
