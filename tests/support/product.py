@@ -165,8 +165,8 @@ def _ready(url: str) -> bool:
 def running(data: Path, *flags: str, hosts: str = "") -> Iterator[Product]:
     """A product that runs inside the block."""
     product = Product(data, *flags, hosts=hosts)
-    product.start()
     try:
+        product.start()
         yield product
     finally:
         if product.end() != 0:
