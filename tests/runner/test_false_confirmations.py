@@ -118,7 +118,7 @@ class Story:
         self.false: list[str] = []
         self.still: dict[str, float] = {}
         self.judged: set[str] = set()
-        self.rest_s = 12.0  # beyond the lease, and any freeze
+        self.rest_s = 18.0  # beyond the lease, any freeze, and the last to come up
         self.stuck: list[str] = []
         self.replayed: set[str] = set()  # runs that a stranger's copy of our start may begin again
 

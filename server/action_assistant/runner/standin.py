@@ -3,6 +3,7 @@
 All of what it does is `standin_engine`; here are the topics, the service and the clock around it.
 """
 
+import logging
 import time
 from collections.abc import Callable
 from typing import Final, assert_never
@@ -40,6 +41,8 @@ from action_assistant.runner.standin_wire import (
     Stop,
 )
 from action_assistant.umrf.facts import EngineFacts
+
+log: Final = logging.getLogger(__name__)
 
 _INFO: Final = 20
 _LONGEST_S: Final = 0.5  # between two looks at whether it shall end
@@ -125,7 +128,7 @@ class StandInNode:
                 due = self.robot.due
                 now = self._now()
                 wait = _LONGEST_S if due is None else min(_LONGEST_S, max(0.0, due - now) / 1000)
-                self._executor.spin_once(timeout_sec=wait)
+                self._turn(wait)
                 for said in self.robot.advance(self._now()):
                     self._say(said)
         finally:
@@ -133,6 +136,15 @@ class StandInNode:
             self._node.destroy_node()
             self._context.try_shutdown()
         return self.robot.gone
+
+    def _turn(self, wait_s: float) -> None:
+        """Take in a message, if one comes."""
+        try:
+            self._executor.spin_once(timeout_sec=wait_s)
+        except (RuntimeError, SystemError) as error:  # whoever asked has left before the answer
+            if not self._context.ok():
+                raise
+            log.warning("an answer could not be sent: %s", error.__cause__ or error)
 
     def end(self) -> None:
         """Leave; may be called on any thread."""
