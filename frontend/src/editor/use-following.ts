@@ -8,6 +8,9 @@ import type { View as BenchView } from "./bench";
 
 const GLIDE = 120; // ms; views come at most every 50 ms
 
+/** What Esc leaves first. */
+const OWN_ESCAPE = "input, textarea, select, [role=dialog], [role=menu], [role=listbox]";
+
 interface Size {
   readonly width: number;
   readonly height: number;
@@ -78,10 +81,12 @@ export function useFollowedView({ flow, frame, view: own, onPanned }: Given) {
     if (whom === null) return;
     onPanned();
     const onKey = (event: KeyboardEvent) => {
-      if (event.key === "Escape" && !event.defaultPrevented) follow(null);
+      if (event.key !== "Escape" || (event.target as Element | null)?.closest?.(OWN_ESCAPE)) return;
+      event.preventDefault(); // it has done its work
+      follow(null);
     };
-    window.addEventListener("keydown", onKey);
-    return () => window.removeEventListener("keydown", onKey);
+    window.addEventListener("keydown", onKey, true); // before the shortcuts, of which Esc is one
+    return () => window.removeEventListener("keydown", onKey, true);
   }, [whom, follow, onPanned]);
 
   return useMemo(() => {
