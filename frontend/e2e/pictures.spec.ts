@@ -4,10 +4,13 @@ import { resolve } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
 import { card, saved, start } from "./bench";
 import { Product } from "./product";
+import { DOMAIN, NO_ROS, StandIn } from "./robot";
 
 test.skip(process.env.PICTURES !== "1", "takes pictures for the documentation: make pictures");
 
-const FOLDER = resolve(import.meta.dirname, "../../docs/pictures");
+const FOLDER = resolve(
+  process.env.PICTURES_TO ?? resolve(import.meta.dirname, "../../docs/pictures"),
+);
 const product = new Product();
 
 test.beforeAll(() => product.start());
@@ -121,3 +124,91 @@ for (const [name, width, height] of [
     await context.close();
   });
 }
+
+test.describe("robots", () => {
+  test.skip(NO_ROS !== "", NO_ROS);
+  test.skip(process.env.E2E_ALL !== "1", "takes minutes on a busy machine: E2E_ALL=1");
+  const david = new StandIn("David");
+  const eve = new StandIn("Eve");
+
+  test.beforeAll(async () => {
+    for (const robot of [david, eve]) robot.start(product.data, { after_s: 20, stop_s: 0.05 });
+    for (const { name, path } of [david, eve, new StandIn("Rover")]) {
+      await product.ask(
+        "/api/robots",
+        {
+          method: "POST",
+          body: JSON.stringify({ name, domain: DOMAIN, get_service: path }),
+          headers: { "content-type": "application/json" },
+        },
+        product.runnerUrl,
+      );
+    }
+  });
+  test.afterAll(() => Promise.all([david.end(), eve.kill()]));
+
+  async function chosen(page: Page, url: string, robots: string[]): Promise<void> {
+    await page.goto(url);
+    await saved(page);
+    const phone = page.getByRole("radiogroup").getByText("Run", { exact: true });
+    if (await phone.isVisible()) await phone.tap();
+    await page.getByRole("button", { name: "Choose where to start" }).click();
+    for (const robot of robots) {
+      await page.getByRole("checkbox", { name: new RegExp(`^${robot}`) }).check();
+    }
+    await expect(page.getByText(/^David answered after/)).toBeVisible();
+  }
+
+  for (const scheme of ["light", "dark"] as const) {
+    test(`are watched and looked at, ${scheme}`, async ({ browser }) => {
+      const options = { colorScheme: scheme, viewport: { width: 1440, height: 900 } };
+      const { page, context } = await product.person(browser, "Ada", options);
+      const url = `${product.url}/graphs/${await product.chain(3)}`;
+      await page.goto(`${product.url}/robots`);
+      await expect(page.getByText("answers", { exact: true })).toHaveCount(2, { timeout: 40_000 });
+      await chosen(page, url, ["David", "Rover"]);
+      await page.waitForTimeout(2_500);
+      await picture(page, `start-${scheme}`);
+      await page.getByRole("checkbox", { name: /^Rover/ }).uncheck();
+      const begin = page.getByRole("button", { name: /^Start v\d+ on David/ });
+      await expect(begin).toBeEnabled();
+      await begin.focus();
+      await page.keyboard.down("Enter");
+      await page.waitForTimeout(900);
+      await page.keyboard.up("Enter");
+      await expect(page.getByText(/proof \d/)).toBeVisible();
+      await page.goto(`${product.url}/robots`);
+      await page.getByRole("tab", { name: "What others told it" }).first().click();
+      await page.waitForTimeout(1_200);
+      await picture(page, `robots-${scheme}`);
+      await page.keyboard.press("Control+.");
+      await expect(page.getByText(/Run \d+: stopped/)).toBeVisible();
+      await context.close();
+    });
+  }
+
+  test("on a phone, and one that dies", async ({ browser }) => {
+    const options = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
+    const { page, context } = await product.person(browser, "Ada", options);
+    await page.goto(`${product.url}/robots`);
+    await page.waitForTimeout(1_200);
+    await picture(page, "robots-phone");
+    await chosen(page, `${product.url}/graphs/${await product.chain(3)}`, ["David", "Eve"]);
+    await page.waitForTimeout(600);
+    await picture(page, "start-phone");
+    await page.getByRole("checkbox", { name: /^David/ }).uncheck();
+    const begin = page.getByRole("button", { name: /^Start v\d+ on Eve/ });
+    await expect(begin).toBeEnabled();
+    await begin.focus();
+    await page.keyboard.down("Enter");
+    await page.waitForTimeout(900);
+    await page.keyboard.up("Enter");
+    await expect(page.getByRole("button", { name: /^Stop run/ })).toBeVisible();
+    await eve.kill();
+    await page.getByRole("button", { name: /^Stop run/ }).tap();
+    await expect(page.getByRole("alert")).toContainText("STOP UNCONFIRMED");
+    await page.waitForTimeout(1_500);
+    await picture(page, "stop-unconfirmed-phone");
+    await context.close();
+  });
+});

@@ -85,6 +85,17 @@ export class Product {
     this.process = undefined;
   }
 
+  /** The process id of the editor or the runner. */
+  pid(which: "editor" | "runner"): number {
+    const parent = this.process?.pid;
+    const children = readFileSync(`/proc/${parent}/task/${parent}/children`, "utf8");
+    for (const child of children.trim().split(" ")) {
+      const words = readFileSync(`/proc/${child}/cmdline`, "utf8").split("\0");
+      if (words.includes(which)) return Number(child);
+    }
+    throw new Error(`no ${which}`);
+  }
+
   /** Kills it and throws its data away. */
   async dispose(): Promise<void> {
     await this.kill();

@@ -1,0 +1,93 @@
+/** Stop whatever else is broken: the editor frozen or dead, ten tabs, the runner out of reach. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { saved, start } from "./bench";
+import { Product } from "./product";
+
+test.skip(process.env.E2E_ALL !== "1", "takes minutes on a busy machine: E2E_ALL=1");
+
+const product = new Product();
+
+test.beforeAll(() => product.start());
+test.afterAll(() => product.dispose());
+
+interface Run {
+  state: string;
+  ended_at: string | null;
+}
+
+const states = async () => {
+  const runs = await product.ask<Run[]>("/api/runs", {}, product.runnerUrl);
+  return runs.map((run) => run.state);
+};
+
+/** A run that goes on for a minute, seen by a page. */
+async function running(page: Page): Promise<void> {
+  await page.goto(`${product.url}/graphs/${await product.chain(60)}`);
+  await saved(page);
+  await start(page);
+  await expect.poll(async () => (await states())[0]).toBe("running");
+  await expect(page.getByRole("button", { name: /^Stop run/ })).toBeVisible();
+}
+
+test("while the editor is frozen, and after it has died", async ({ browser }) => {
+  const { page, failures } = await product.person(browser, "Ada");
+  await running(page);
+  const editor = product.pid("editor");
+  process.kill(editor, "SIGSTOP");
+  try {
+    await page.getByRole("button", { name: /^Stop run/ }).click();
+    await expect.poll(async () => (await states())[0]).toBe("stopped");
+    await expect(page.getByText(/Run \d+: stopped/)).toBeVisible();
+  } finally {
+    process.kill(editor, "SIGCONT");
+  }
+  await running(page);
+  process.kill(product.pid("editor"), "SIGKILL");
+  await page.keyboard.press("Control+.");
+  await expect.poll(async () => (await states())[0]).toBe("stopped");
+  expect(failures).toEqual([]);
+  await product.untilReady();
+  await page.context().close();
+});
+
+test("with ten tabs open, from the tenth, while a dialog is open and somebody types", async ({
+  browser,
+}) => {
+  const { page, context } = await product.person(browser, "Ada");
+  await running(page);
+  for (let i = 0; i < 8; i += 1) await (await context.newPage()).goto(`${product.url}/robots`);
+  const tenth = await context.newPage();
+  await tenth.goto(`${product.url}/robots`);
+  await tenth.getByRole("button", { name: "Register a robot" }).click();
+  await tenth.getByRole("textbox", { name: "Name" }).pressSequentially("Da");
+  await tenth.keyboard.press("Control+.");
+  await expect.poll(async () => (await states())[0]).toBe("stopped");
+  await expect(tenth.getByRole("textbox", { name: "Name" })).toHaveValue("Da");
+  await expect(page.getByText("stopped by Ada").first()).toBeVisible();
+  await context.close();
+});
+
+test("while it cannot be sent the page says so, and goes on trying until it is proven", async ({
+  browser,
+}) => {
+  const { page, context } = await product.person(browser, "Ada");
+  await running(page);
+  const runner = product.pid("runner");
+  process.kill(runner, "SIGSTOP");
+  try {
+    await page
+      .getByRole("button", { name: /^Stop / })
+      .first()
+      .click();
+    const alert = page.getByRole("alert").filter({ hasText: "NOT SENT: use the hardware stop" });
+    await expect(alert).toBeVisible();
+    await page.waitForTimeout(3_000); // longer than one try may take
+    await expect(alert).toBeVisible();
+  } finally {
+    process.kill(runner, "SIGCONT");
+  }
+  await expect.poll(async () => (await states())[0], { timeout: 20_000 }).toBe("stopped");
+  await expect(page.getByText("stopped by Ada").first()).toBeVisible();
+  await context.close();
+});
