@@ -47,11 +47,19 @@ export function hold(held: Held): void {
   }
 }
 
+/** Another version of this page may have left something else. */
+function isHeld(value: unknown): value is Held {
+  if (typeof value !== "object" || value === null) return false;
+  const { text, clip } = value as { text?: unknown; clip?: Partial<Record<keyof Clip, unknown>> };
+  const maps = [clip?.actions, clip?.relations, clip?.positions];
+  return typeof text === "string" && maps.every((map) => typeof map === "object" && map !== null);
+}
+
 /** What was copied last in this browser. */
 export function held(): Held | null {
   try {
-    const text = localStorage.getItem(SHELF);
-    if (text !== null) return JSON.parse(text) as Held;
+    const kept: unknown = JSON.parse(localStorage.getItem(SHELF) ?? "null");
+    if (isHeld(kept)) return kept;
   } catch {
     // as above
   }

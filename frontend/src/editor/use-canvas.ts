@@ -4,6 +4,7 @@ import {
   type NodeChange,
   type ReactFlowInstance,
   useReactFlow,
+  useStoreApi,
 } from "@xyflow/react";
 import {
   type MouseEvent as ReactMouseEvent,
@@ -16,7 +17,7 @@ import {
 import type { Progress } from "../api/progress";
 import { insertInto, moveActions, together } from "../graph/edit";
 import type { Graph, Key, Position } from "../graph/model";
-import { type Note, placeNotes, withContents } from "../graph/notes";
+import { type Note, notesOf, placeNotes, withContents } from "../graph/notes";
 import type { Person } from "../room/presence";
 import { usePeople, useRoom } from "../room/use-room";
 import { type Places, placesOf, unplaced } from "../ui/canvas/arrange";
@@ -79,6 +80,7 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
   const { doc, presence } = useRoom();
   const people = usePeople();
   const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
+  const store = useStoreApi();
   const [sizes, setSizes] = useState<ReadonlyMap<Key, Size>>(new Map());
   const [drag, setDrag] = useState<Places | null>(null);
   const [resized, setResized] = useState<Note | null>(null);
@@ -115,8 +117,15 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
 
   const now = useRef({ graph, rest, sizes });
   now.current = { graph, rest, sizes };
+  // Drawing a marquee within a frame is about what lies in it.
+  const isNoFrame = useCallback((change: NodeChange<CanvasNode>) => {
+    if (change.type !== "select" || !change.selected) return true;
+    const note = notesOf(now.current.graph).find(({ key }) => key === change.id);
+    return note?.kind !== "frame";
+  }, []);
   const onNodesChange = useCallback(
-    (changes: NodeChange<CanvasNode>[]) => {
+    (all: NodeChange<CanvasNode>[]) => {
+      const changes = store.getState().userSelectionActive ? all.filter(isNoFrame) : all;
       const sized = changes.filter((change) => change.type === "dimensions");
       if (sized.length > 0) {
         setSizes((before) => {
@@ -150,7 +159,7 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
         select(after);
       }
     },
-    [select],
+    [select, store, isNoFrame],
   );
 
   const onEdgesChange = useCallback(
