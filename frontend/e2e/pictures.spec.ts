@@ -57,6 +57,16 @@ for (const scheme of ["light", "dark"] as const) {
     await page.goto(`${product.url}/runs`);
     await page.waitForTimeout(800);
     await picture(page, `runs-${scheme}`);
+    await page.goto(await graph("valve_inspection"));
+    await saved(page);
+    await page.getByRole("button", { name: "Dry-run" }).click();
+    const bar = page.getByRole("region", { name: "Dry-run" });
+    await expect(bar).toContainText("runs");
+    await bar.getByRole("button", { name: "Next moment" }).click();
+    await bar.getByRole("button", { name: /^error/ }).click();
+    await expect(bar).toContainText("ends with an error");
+    await page.waitForTimeout(600);
+    await picture(page, `dry-run-${scheme}`);
     await context.close();
     await mari.context.close();
   });

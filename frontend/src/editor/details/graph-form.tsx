@@ -2,6 +2,7 @@
 import { Kbd, TagsInput } from "@mantine/core";
 import { setGraphDescription, setGraphName } from "../../graph/edit";
 import { useBench } from "../bench";
+import { keysOf } from "../deeds/deed";
 import { DraftInput } from "../draft-input";
 import { FieldOf } from "../field-of";
 import style from "./details.module.css";
@@ -52,9 +53,16 @@ export function GraphForm() {
           <li>Drag from an outcome under a card to what shall follow it</li>
           <li>Drop on empty canvas to add the next action there</li>
           <li>
+            <Kbd>C</Kbd> draws an arrow by keys alone
+          </li>
+          <li>
             <Kbd>Del</Kbd> deletes, <Kbd>Ctrl</Kbd> <Kbd>Z</Kbd> takes back what you did
           </li>
           <li>Select a card or an arrow to see what it says</li>
+          <li>
+            <Kbd>{keysOf("Mod+k")[0]}</Kbd> <Kbd>K</Kbd> finds every command, <Kbd>?</Kbd> shows the
+            keys
+          </li>
         </ul>
       </section>
     </div>
