@@ -6,7 +6,17 @@ from typing import Any
 import httpx
 
 from editor.process import Editor
-from editor.test_api import NAV, assert_problem, imported
+from editor.test_api import NAV as ODD
+from editor.test_api import assert_problem
+from editor.test_api import imported as imported_odd
+
+#: There and back, with conditions as the engine wants them.
+NAV: dict[str, Any] = json.loads(json.dumps(ODD))
+NAV["actions"][1]["parents"][0]["conditions"] = ["on_true -> run", "on_error -> bypass"]
+
+
+def imported(http: httpx.Client, **changes: Any) -> dict[str, Any]:
+    return imported_odd(http, **{**NAV, **changes})
 
 
 def rehearse(http: httpx.Client, graph: str, **wanted: Any) -> dict[str, Any]:
@@ -77,6 +87,15 @@ def test_what_cannot_be_rehearsed_says_why(editor: Editor) -> None:
         assert_problem(http.post(path, json={"seq": 99}), 409)
         assert_problem(http.post(path, json={"for_ms": -1}), 400)
         assert_problem(http.post("/api/graphs/nowhere/rehearsal", json={}), 404)
+
+
+def test_what_the_engine_refuses_is_not_played(editor: Editor) -> None:
+    ghost = json.loads(json.dumps(NAV))
+    ghost["graph_entry"] = [{"name": "Nobody", "instance_id": 0}]
+    with editor.client() as http:
+        graph = imported(http, **ghost)
+        problem = assert_problem(http.post(f"/api/graphs/{graph['id']}/rehearsal", json={}), 409)
+        assert "The engine would refuse this graph" in problem["detail"]
 
 
 def test_umrf_text_becomes_pieces_and_stores_nothing(editor: Editor) -> None:

@@ -5,8 +5,9 @@ from typing import Any, Final, Literal
 
 import msgspec
 
-from action_assistant.errors import BadInput, TooMany
-from action_assistant.umrf import semantics
+from action_assistant.errors import BadInput, Conflict, TooMany
+from action_assistant.umrf import codec, semantics
+from action_assistant.umrf.check import refused_by_parser
 from action_assistant.umrf.model import Graph
 
 EVENTS: Final = 4_000  # of one rehearsal; the page shows no more
@@ -49,7 +50,7 @@ class Stage:
         self._waiting = 0
 
     async def play(self, seq: int, graph: Graph, wanted: Rehearsing) -> Rehearsal:
-        """Play a graph to its end, or as far as limits let it. Raises BadInput, TooMany."""
+        """Play a graph to its end, or as far as limits let it. Raises BadInput, Conflict, TooMany."""
         script = _script(wanted.script)
         if not 0 < wanted.for_ms <= 24 * HOUR_MS:
             raise BadInput("A rehearsal lasts up to a day.", where={"path": "/for_ms"})
@@ -80,7 +81,15 @@ def _script(value: Any) -> semantics.Script:
     return script
 
 
+def _refuse_unreadable(graph: Graph) -> None:
+    """What the engine's parser refuses cannot be played by any rule."""
+    refusals = refused_by_parser(codec.Reading(graph, "D3"))
+    if refusals:
+        raise Conflict(f"The engine would refuse this graph: {refusals[0].message}")
+
+
 def _played(seq: int, graph: Graph, script: semantics.Script, wanted: Rehearsing) -> Rehearsal:
+    _refuse_unreadable(graph)
     trace = tuple(
         semantics.simulate(
             graph,
