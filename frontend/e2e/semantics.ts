@@ -60,11 +60,11 @@ const only = (outcome: string, response = "run") =>
     (each) => `${each} -> ${each === outcome ? response : "ignore"}`,
   );
 
-/** Look for a thing, fetch what was found under another name, and begin again; else call somebody. */
+/** Look for a thing, fetch what was found under another name, and begin again; else tell somebody. */
 export const fetching = {
   graph_name: "fetch_all",
   graph_entry: [{ name: "Look", instance_id: 0 }],
-  graph_exit: [{ name: "Call", instance_id: 0, conditions: only("on_true") }],
+  graph_exit: [{ name: "Tell", instance_id: 0, conditions: only("on_true") }],
   actions: [
     {
       name: "Look",
@@ -74,7 +74,7 @@ export const fetching = {
       parents: [{ name: "Fetch", instance_id: 0, required: false, conditions: only("on_true") }],
       children: [
         { name: "Fetch", instance_id: 0, remap: [{ from: "found", to: "thing" }] },
-        { name: "Call", instance_id: 0 },
+        { name: "Tell", instance_id: 0 },
       ],
     },
     {
@@ -86,7 +86,7 @@ export const fetching = {
       children: [{ name: "Look", instance_id: 0 }],
     },
     {
-      name: "Call",
+      name: "Tell",
       instance_id: 0,
       type: "sync",
       input_parameters: { text: { pvf_type: "string", pvf_value: "nothing left" } },
