@@ -50,7 +50,7 @@ PARTS: Final[dict[str, Part]] = {
         ("tests/journal/test_verify.py",),
     ),
     "reconnects": Part(
-        "10,000 reconnects, floods of upgrades",
+        "10,000 reconnects, a thousand at once; floods of upgrades",
         {"TEST_RECONNECTS": "10000"},
         ("tests/editor/test_floods.py",),
     ),
