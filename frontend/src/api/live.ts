@@ -26,8 +26,6 @@ export interface LiveNow {
   since: number;
   engines: readonly Robot[];
   runs: ReadonlyMap<string, Run>;
-  /** When each open run was last shown by its engine, ms. */
-  seen: ReadonlyMap<string, number>;
   stops: readonly StopAsked[];
 }
 
@@ -52,9 +50,11 @@ export class Live {
     since: Date.now(),
     engines: [],
     runs: new Map(),
-    seen: new Map(),
     stops: [],
   };
+  /** When each open run was last shown by its engine, ms. Apart from `now`: it changes each second. */
+  seen: ReadonlyMap<string, number> = new Map();
+  readonly #seers = new Set<() => void>();
   readonly #runner: string;
   readonly #listeners = new Set<() => void>();
   #socket: WebSocket | null = null;
@@ -92,6 +92,11 @@ export class Live {
   subscribe = (listener: () => void): (() => void) => {
     this.#listeners.add(listener);
     return () => this.#listeners.delete(listener);
+  };
+
+  subscribeSeen = (seer: () => void): (() => void) => {
+    this.#seers.add(seer);
+    return () => this.#seers.delete(seer);
   };
 
   /**
@@ -205,7 +210,9 @@ export class Live {
         const seen = Object.entries(message.seen ?? {}).map(
           ([run, at]) => [run, Date.parse(at)] as const,
         );
-        this.#set({ seen: new Map(seen) });
+        if (seen.length === 0 && this.seen.size === 0) break;
+        this.seen = new Map(seen);
+        for (const seer of this.#seers) seer();
         break;
       }
     }

@@ -45,7 +45,6 @@ const NOTHING: LiveNow = {
   since: 0,
   engines: [],
   runs: new Map(),
-  seen: new Map(),
   stops: [],
 };
 const never = () => () => {};
@@ -55,6 +54,12 @@ export function useLive(): LiveHold & { now: LiveNow } {
   const { live } = hold;
   const now = useSyncExternalStore(live?.subscribe ?? never, () => live?.now ?? NOTHING);
   return { ...hold, now };
+}
+
+/** When the engine itself last showed a run, ms; only who asks is rendered again each second. */
+export function useSeen(run: string): number | undefined {
+  const { live } = use(Context);
+  return useSyncExternalStore(live?.subscribeSeen ?? never, () => live?.seen.get(run));
 }
 
 /** The runs that go on, newest first, as far as this page knows. */

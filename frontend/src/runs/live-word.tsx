@@ -1,7 +1,7 @@
 /** Whether the page hears the runner, and how old what it shows of a run is, in words. */
 import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
 import type { Run } from "../api/runs";
-import { useLive } from "../api/use-live";
+import { useLive, useSeen } from "../api/use-live";
 import { clock, duration, useNow } from "../ui/when";
 import style from "./live-word.module.css";
 
@@ -9,8 +9,7 @@ const OLD = 2_500; // ms; a run is looked at each second
 
 /** "proof 0.4 s ago": when the engine itself last showed this run. */
 export function Proof({ run }: { run: Run }) {
-  const { now } = useLive();
-  const seen = now.seen.get(run.id);
+  const seen = useSeen(run.id);
   const goes = run.ended_at === null;
   const present = useNow(500, goes);
   if (!goes) return null;

@@ -17,7 +17,7 @@ function now(part: Partial<Run> | null, link: LiveNow["link"] = "live"): LiveNow
     ...part,
   } as Run;
   const runs = new Map(part ? [["r", run]] : []);
-  return { link, since: 0, engines: [], stops: [stop], runs, seen: new Map() };
+  return { link, since: 0, engines: [], stops: [stop], runs };
 }
 
 test("a Stop that nothing proves becomes loud", () => {
