@@ -53,6 +53,12 @@ async function arrive(
   return { context, page, failures };
 }
 
+/** Opens a graph: a busy machine takes its time for the first sight of one. */
+async function visit(page: Page, url: string): Promise<void> {
+  await page.goto(url);
+  await expect(card(page, "Wait")).toBeVisible({ timeout: 45_000 });
+}
+
 async function stateOf(product: Product, graph: string): Promise<string | undefined> {
   const runs = `/api/runs?graph=${graph}`;
   return (await product.ask<{ state: string }[]>(runs, {}, product.runnerUrl))[0]?.state;
@@ -103,10 +109,10 @@ test.describe("on plain http", () => {
 
     // Both draw one graph.
     const graph = await product.chain(60);
-    await mari.page.goto(`${lab(product)}/graphs/${graph}`);
+    await visit(mari.page, `${lab(product)}/graphs/${graph}`);
     await saved(mari.page);
     await add(mari.page, "Sooner");
-    await ada.page.goto(mari.page.url());
+    await visit(ada.page, mari.page.url());
     await expect(card(ada.page, "Sooner")).toBeVisible();
     await mari.context.setOffline(true);
     await add(mari.page, "Later");
@@ -132,14 +138,14 @@ test.describe("on plain http", () => {
 
   test("a viewer sees and stops, changes nothing, and is put out at once", async ({ browser }) => {
     test.setTimeout(120_000);
-    const graph = await product.chain(60);
+    const graph = await product.chain(40);
     const invitation = await invite(product, "viewer");
     const ada = await product.person(browser, "Ada");
-    await ada.page.goto(`${product.url}/graphs/${graph}`);
+    await visit(ada.page, `${product.url}/graphs/${graph}`);
     await saved(ada.page);
     const { page, failures, context } = await arrive(product, browser, invitation.path, "Vic");
     await expect(page.getByRole("button", { name: "New graph" })).toHaveCount(0);
-    await page.goto(`${lab(product)}/graphs/${graph}`);
+    await visit(page, `${lab(product)}/graphs/${graph}`);
     await expect(page.getByText("View only", { exact: true })).toBeVisible({ timeout: 40_000 });
     await expect(page.getByRole("button", { name: /^Start / })).toHaveCount(0);
     await expect(page.getByRole("button", { name: /^Share/ })).toHaveCount(0);
@@ -147,18 +153,16 @@ test.describe("on plain http", () => {
 
     await picture(page, "viewer");
 
-    // Keys, a drag and the form change nothing.
+    // Keys and the form change nothing, and no card can be dragged.
     const first = card(page, "Wait");
     await first.click({ position: { x: 50, y: 30 } });
     await page.keyboard.press("Delete");
     await page.keyboard.press("a");
     await expect(page.getByRole("combobox", { name: "Name of an action" })).toHaveCount(0);
     await expect(page.getByRole("textbox", { name: "Name", exact: true }).first()).toBeDisabled();
-    const place = await first.boundingBox();
-    await first.dragTo(page.locator(".react-flow__pane"), { targetPosition: { x: 30, y: 30 } });
+    await expect(page.locator(".react-flow__node-action.draggable")).toHaveCount(0);
     const change = await product.ask<{ seq: number }>(`/api/graphs/${graph}`);
     expect(change.seq).toBe(1);
-    expect(place).not.toBeNull();
 
     // What the others start is seen, and stopped.
     await start(ada.page);
@@ -197,7 +201,7 @@ test.describe("under TLS", () => {
     expect(await mari.page.evaluate(() => window.isSecureContext)).toBe(true);
     const [cookie] = await mari.context.cookies();
     expect(cookie).toMatchObject({ secure: true, httpOnly: true, sameSite: "Strict" });
-    await mari.page.goto(`${lab(product)}/graphs/${graph}`);
+    await visit(mari.page, `${lab(product)}/graphs/${graph}`);
     await saved(mari.page);
     await add(mari.page, "More");
     await saved(mari.page);

@@ -74,6 +74,7 @@ export function ShareLink({ invitation, origin }: { invitation: Invitation; orig
         <Button
           color="red"
           variant="subtle"
+          className={style.revoke ?? ""}
           aria-label={`Revoke the link for ${label}`}
           onClick={() => setAsking(true)}
         >
