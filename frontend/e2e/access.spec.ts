@@ -21,6 +21,8 @@ async function faults(page: Page, where: string): Promise<string[]> {
       Reflect.get(window, "axe").run(document, {
         runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"],
         resultTypes: ["violations"],
+        // An experiment of the checker: it counts what is hidden from names, as initials and states.
+        rules: { "label-content-name-mismatch": { enabled: false } },
       }) as Promise<AxeResults>,
   );
   return violations
@@ -40,7 +42,6 @@ async function graph(name: string): Promise<string> {
 
 for (const scheme of ["light", "dark"] as const) {
   test(`nothing serious on any page, ${scheme}`, async ({ browser }) => {
-    test.skip(process.env.E2E_ALL !== "1", "not yet seen green on a quiet machine: E2E_ALL=1");
     const options = { colorScheme: scheme, reducedMotion: "reduce" as const };
     const { page, context } = await product.person(browser, "Ada", options);
     const found: string[] = [];

@@ -4,8 +4,6 @@ import { expect, type Locator, type Page, test } from "@playwright/test";
 import { saved } from "./bench";
 import { Product } from "./product";
 
-test.skip(process.env.E2E_ALL !== "1", "not yet seen green on a quiet machine: E2E_ALL=1");
-
 const product = new Product();
 
 test.beforeAll(() => product.start());
@@ -45,6 +43,7 @@ async function add(page: Page, name: string): Promise<void> {
 }
 
 test("a graph is made in the outline", async ({ browser }) => {
+  test.skip(process.env.E2E_ALL !== "1", "not yet seen green on a quiet machine: E2E_ALL=1");
   const { page, context, failures } = await product.person(browser, "Ada", PHONE);
   await page.getByRole("button", { name: "New graph" }).first().tap();
   await page.waitForURL(/\/graphs\/.+/);
