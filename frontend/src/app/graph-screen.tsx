@@ -23,6 +23,13 @@ import { useNewGraphs } from "./files";
 import { Bar, Frame } from "./frame";
 import { useTitle } from "./title";
 
+/** How long a start waits for the name of the moment on screen, ms. */
+const NAMED_MS = 3_000;
+
+function unnamed(): never {
+  throw new Error("The editor has not named the moment on screen. Nothing was started.");
+}
+
 interface RunHere {
   /** What goes on, or has ended while this page was open: shown on the canvas. */
   live: Run | null;
@@ -78,6 +85,7 @@ function Inside({ id }: { id: string }) {
             graph={id}
             name={shown.graph.name || "untitled"}
             seq={shown.seq}
+            settle={() => room.settled(AbortSignal.timeout(NAMED_MS)).catch(unnamed)}
             obstacle={shown.obstacle}
             compact={shown.compact}
           />

@@ -3,24 +3,27 @@ import { ActionIcon, Button } from "@mantine/core";
 import { IconChevronDown, IconPlayerPlayFilled } from "@tabler/icons-react";
 import { useState } from "react";
 import { useVersions } from "../api/graphs";
+import { sentence } from "../api/http";
 import { SIMULATOR } from "../api/robots";
 import { openRuns, useLive } from "../api/use-live";
 import { HoldButton } from "../ui/hold-button";
 import style from "./start-control.module.css";
 import { StartDialog } from "./start-dialog";
-import { lastEngines, nextLabel, useStart } from "./use-start";
+import { complain, lastEngines, nextLabel, useStart } from "./use-start";
 
 interface Props {
   graph: string;
   name: string;
-  /** The moment that the page shows. */
+  /** The moment that the page shows, as far as it has been named. */
   seq: number;
+  /** The name of the moment on screen: others' edits show a little before they are named. */
+  settle: () => Promise<number>;
   /** Why this moment cannot be started; null when it can. */
   obstacle: string | null;
   compact?: boolean;
 }
 
-export function StartControl({ graph, name, seq, obstacle, compact = false }: Props) {
+export function StartControl({ graph, name, seq, settle, obstacle, compact = false }: Props) {
   const versions = useVersions(graph).data ?? [];
   const { now } = useLive();
   const start = useStart(graph);
@@ -37,6 +40,8 @@ export function StartControl({ graph, name, seq, obstacle, compact = false }: Pr
   const icon = <IconPlayerPlayFilled size={13} aria-hidden />;
   const words = start.isPending ? "Starting …" : `Start ${label}`;
   const where = engines.join(", ");
+  const ask = () =>
+    void settle().then(setAsking, (error) => complain("Not started", sentence(error)));
   return (
     <span className={style.start}>
       {simulated ? (
@@ -50,7 +55,7 @@ export function StartControl({ graph, name, seq, obstacle, compact = false }: Pr
               : `Start exactly ${label}, as it is on screen, in the simulator?`
           }
           disabled={why !== null}
-          onHeld={() => start.mutate({ seq, engines: [SIMULATOR], digest: null })}
+          onHeld={() => start.mutate({ seq: settle(), engines: [SIMULATOR], digest: null })}
         />
       ) : (
         <Button
@@ -59,7 +64,7 @@ export function StartControl({ graph, name, seq, obstacle, compact = false }: Pr
           disabled={why !== null}
           aria-label={why === null ? `Start ${label} on ${where} …` : `Start ${label}: ${why}`}
           title={why ?? `Look at ${where} before starting`}
-          onClick={() => setAsking(seq)}
+          onClick={ask}
         >
           {compact ? words : `${words} on ${where} …`}
         </Button>
@@ -70,7 +75,7 @@ export function StartControl({ graph, name, seq, obstacle, compact = false }: Pr
         aria-label="Choose where to start"
         title="Choose where to start"
         disabled={why !== null}
-        onClick={() => setAsking(seq)}
+        onClick={ask}
       >
         <IconChevronDown size={16} aria-hidden />
       </ActionIcon>

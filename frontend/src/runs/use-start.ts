@@ -10,7 +10,8 @@ import { useLive } from "../api/use-live";
 import { newAid } from "../graph/ids";
 
 export interface Order {
-  seq: number;
+  /** The moment that shall run; awaited when the page has yet to hear its name. */
+  seq: number | Promise<number>;
   engines: readonly string[];
   /** Of the graph that was looked at; null when nobody looked. */
   digest: string | null;
@@ -25,7 +26,7 @@ export function nextLabel(versions: readonly Version[], seq: number): string {
   return same ? versionName(versions, same.id) : `v${versions.length + 1}`;
 }
 
-function complain(title: string, message: string): void {
+export function complain(title: string, message: string): void {
   notifications.show({ color: "red", title, message, autoClose: 15_000 });
 }
 
@@ -35,7 +36,7 @@ export function useStart(graph: string) {
   return useMutation({
     mutationFn: async ({ seq, engines, digest, script, override }: Order) => {
       if (runner === undefined) throw new Error("The runner is not known yet.");
-      const text = await publish(graph, seq);
+      const text = await publish(graph, await seq);
       const version = JSON.parse(text) as Version;
       void client.invalidateQueries({ queryKey: keys.versions(graph) });
       const umrf = memberText(text, "umrf");
