@@ -1,5 +1,6 @@
 /** The canvas on which a graph is drawn. */
 import { Button } from "@mantine/core";
+import { useMediaQuery } from "@mantine/hooks";
 import {
   Background,
   BackgroundVariant,
@@ -107,6 +108,8 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
   const { flow, setOver } = canvas;
   const frame = useRef<HTMLDivElement>(null);
   const store = useStoreApi();
+  // A finger has one button: it moves the view or draws a marquee.
+  const coarse = useMediaQuery("(pointer: coarse)") ?? false;
 
   useEffect(
     () =>
@@ -212,7 +215,7 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
             if (!connecting.onClick(event)) bench.select([]);
           }}
           selectionOnDrag={bench.tool === "select"}
-          panOnDrag={bench.tool === "pan" ? true : [1, 2]}
+          panOnDrag={bench.tool === "pan" ? true : coarse ? false : [1, 2]}
           panOnScroll={false}
           panOnScrollMode={PanOnScrollMode.Free}
           selectionMode={SelectionMode.Partial}
