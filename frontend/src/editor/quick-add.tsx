@@ -29,10 +29,13 @@ export function candidates(known: readonly NewAction[], search: string): NewActi
     .map((action) => ({ action, rank: rank(action.name) }))
     .filter(({ action, rank: r }) => r < 2 || action.description?.toLowerCase().includes(wanted))
     .sort((a, b) => a.rank - b.rank || a.action.name.localeCompare(b.action.name))
-    .map(({ action }) => action)
     .slice(0, MOST);
-  const exact = fitting.some((action) => action.name.toLowerCase() === wanted);
-  return wanted === "" || exact ? fitting : [...fitting, { name: search.trim() }];
+  const exact = fitting.some(({ action }) => action.name.toLowerCase() === wanted);
+  const fresh = wanted === "" || exact ? [] : [{ name: search.trim() }];
+  // What is only described so comes after what was typed.
+  const named = fitting.filter(({ rank: r }) => r < 2).map(({ action }) => action);
+  const described = fitting.filter(({ rank: r }) => r === 2).map(({ action }) => action);
+  return [...named, ...fresh, ...described];
 }
 
 function placed(bench: Bench, request: AddRequest, template: NewAction): string {

@@ -59,18 +59,20 @@ export function usePress(bench: Bench) {
   }, []);
 }
 
-/** What a finger leaves behind when the menu is open already: its click would close it. */
+/** What a finger leaves behind when the menu is open already: its tap would close the menu. */
 function swallowClick(): void {
-  const swallow = (event: MouseEvent) => {
+  const kinds = ["mousedown", "mouseup", "click"] as const;
+  const swallow = (event: Event) => {
     event.stopPropagation();
     event.preventDefault();
   };
-  const stop = () => {
-    setTimeout(() => window.removeEventListener("click", swallow, { capture: true }), 60);
-    window.removeEventListener("pointerup", stop);
-    window.removeEventListener("pointercancel", stop);
+  const lift = (event: Event) => {
+    if (event.cancelable) event.preventDefault();
+    setTimeout(() => {
+      for (const kind of kinds) window.removeEventListener(kind, swallow, { capture: true });
+    }, 40);
   };
-  window.addEventListener("click", swallow, { capture: true });
-  window.addEventListener("pointerup", stop);
-  window.addEventListener("pointercancel", stop);
+  for (const kind of kinds) window.addEventListener(kind, swallow, { capture: true });
+  window.addEventListener("touchend", lift, { capture: true, passive: false, once: true });
+  window.addEventListener("touchcancel", lift, { capture: true, once: true });
 }
