@@ -2,7 +2,7 @@
 import { Button, Modal } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconFlag, IconPlayerPlay, IconPlus, IconSquareRounded } from "@tabler/icons-react";
-import { useRef, useState } from "react";
+import { useEffect, useRef, useState } from "react";
 import { connect, moveRelation, together } from "../graph/edit";
 import { endsOf } from "../graph/layout";
 import { ENTRY, EXIT, type Key, type Precondition } from "../graph/model";
@@ -49,13 +49,25 @@ const LETTERS: Readonly<Record<string, Precondition>> = {
 
 function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) {
   const row = useRef<HTMLDivElement>(null);
+  const pick = useRef(onPick);
+  pick.current = onPick;
+  // Heard at once, also before the dialog has the focus: people type faster than it opens.
+  useEffect(() => {
+    const onKey = (event: KeyboardEvent) => {
+      const chosen = LETTERS[event.key.toLowerCase()];
+      if (!chosen || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      event.stopPropagation();
+      pick.current(chosen);
+    };
+    window.addEventListener("keydown", onKey, { capture: true });
+    return () => window.removeEventListener("keydown", onKey, { capture: true });
+  }, []);
   const onKeyDown = (event: React.KeyboardEvent) => {
-    const chosen = LETTERS[event.key.toLowerCase()];
     const buttons = [...(row.current?.querySelectorAll("button") ?? [])];
     const at = buttons.indexOf(document.activeElement as HTMLButtonElement);
     const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
-    if (chosen) onPick(chosen);
-    else if (step) buttons[(at + step + buttons.length) % buttons.length]?.focus();
+    if (step) buttons[(at + step + buttons.length) % buttons.length]?.focus();
     else return;
     event.preventDefault();
     event.stopPropagation();
