@@ -329,4 +329,10 @@ def test_the_library_is_there_to_be_asked(http: httpx.Client) -> None:
     made = imported(http)
     go = next(each for each in http.get("/api/actions").json() if each["name"] == "Go")
     assert made["id"] in go["used_in"]
-    assert {"path": "speed", "pvf_type": "number", "required": True} in go["inputs"]
+    speed = {
+        "path": "speed",
+        "pvf_type": "number",
+        "required": True,
+        "text": '{"pvf_type":"number"}',
+    }
+    assert speed in go["inputs"]
