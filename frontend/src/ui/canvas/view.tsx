@@ -60,6 +60,7 @@ export function GraphView({ graph, progress, selected = NONE, label, onSelect }:
       onPaneClick={() => onSelect?.(null)}
       nodesDraggable={false}
       nodesConnectable={false}
+      panActivationKeyCode={null} // Space plays the replay
       edgesFocusable={false}
       fitView
       fitViewOptions={{ maxZoom: 1, padding: 0.12 }}
