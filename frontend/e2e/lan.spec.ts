@@ -64,8 +64,9 @@ async function stateOf(product: Product, graph: string): Promise<string | undefi
   return (await product.ask<{ state: string }[]>(runs, {}, product.runnerUrl))[0]?.state;
 }
 
-const running = (page: Page) =>
-  page.locator(".react-flow__node-action").filter({ hasText: "running" });
+/** The strip below the canvas says so, wherever the canvas looks. */
+const goes = (page: Page) =>
+  page.getByRole("region", { name: "Run" }).getByText("running", { exact: true }).first();
 
 test.describe("on plain http", () => {
   const product = new Product(["--share", "--host", "127.0.0.1"], LAB);
@@ -128,7 +129,7 @@ test.describe("on plain http", () => {
     expect(file.suggestedFilename()).toContain(".umrf.graph.json");
 
     await start(mari.page);
-    await expect(running(ada.page).first()).toBeVisible();
+    await expect(goes(ada.page)).toBeVisible();
     await mari.page.getByRole("button", { name: /^Stop run/ }).click();
     await expect.poll(() => stateOf(product, graph)).toBe("stopped");
     expect([...ada.failures, ...mari.failures]).toEqual([]);
@@ -137,7 +138,6 @@ test.describe("on plain http", () => {
   });
 
   test("a viewer sees and stops, changes nothing, and is put out at once", async ({ browser }) => {
-    test.skip(process.env.E2E_ALL !== "1", "not yet seen green on a quiet machine: E2E_ALL=1");
     test.setTimeout(120_000);
     const graph = await product.chain(40);
     const invitation = await invite(product, "viewer");
@@ -173,7 +173,7 @@ test.describe("on plain http", () => {
     await expect.poll(() => stateOf(product, graph)).toBe("stopped");
 
     await product.ask(`/api/invitations/${invitation.id}/revoke`, { method: "POST" });
-    await expect(page.getByText(/Your link was revoked/)).toBeVisible({ timeout: 5_000 });
+    await expect(page.getByText(/Your link was revoked/)).toBeVisible({ timeout: 15_000 });
     await picture(page, "revoked");
     await expect(page.getByRole("button", { name: /^Stop/ })).toHaveCount(0);
     await page.goto(lab(product) + invitation.path);

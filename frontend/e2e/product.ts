@@ -40,7 +40,22 @@ export class Product {
 
   /** Starts both processes and waits until they answer. */
   async start(): Promise<void> {
-    if (this.port === 0) this.port = await freePorts();
+    const known = this.port !== 0;
+    for (let tries = 0; ; tries += 1) {
+      if (!known) this.port = await freePorts();
+      this.spawn();
+      try {
+        await this.untilReady();
+        return;
+      } catch (error) {
+        // Between being found free and being bound, a port may be taken by anybody.
+        if (known || tries > 2 || !String(error).includes("is taken")) throw error;
+        await this.kill();
+      }
+    }
+  }
+
+  private spawn(): void {
     const log = openSync(this.log, "a");
     this.process = spawn(
       COMMAND,
@@ -55,7 +70,6 @@ export class Product {
         },
       },
     );
-    await this.untilReady();
   }
 
   /** Waits until both processes can do their work. */
@@ -63,7 +77,8 @@ export class Product {
     const deadline = Date.now() + 60_000;
     for (const url of [this.url, this.runnerUrl]) {
       while (!(await answers(`${url}/readyz`))) {
-        if (Date.now() > deadline) throw new Error(readFileSync(this.log, "utf8"));
+        const over = this.process === undefined || this.process.exitCode !== null;
+        if (over || Date.now() > deadline) throw new Error(readFileSync(this.log, "utf8"));
         await pause(50);
       }
     }
@@ -79,10 +94,11 @@ export class Product {
   async kill(): Promise<void> {
     const { process: child } = this;
     if (child?.pid === undefined) return;
+    this.process = undefined;
+    if (child.exitCode !== null || child.signalCode !== null) return;
     const gone = new Promise((done) => child.once("exit", done));
     process.kill(-child.pid, "SIGKILL");
     await gone;
-    this.process = undefined;
   }
 
   /** The process id of the editor or the runner. */

@@ -97,7 +97,11 @@ test("two robots run together, and one press of keys stops both until it is prov
   await david.end();
   david.start(product.data, SLOW);
   await page.goto(`${product.url}/robots`);
-  await expect(card(page, "David").getByText(/answers|restarted/).first()).toBeVisible({
+  await expect(
+    card(page, "David")
+      .getByText(/answers|restarted/)
+      .first(),
+  ).toBeVisible({
     timeout: 40_000,
   });
   await startOn(page, await product.chain(3), ["David", "Eve"]);

@@ -85,6 +85,16 @@ def known_person(connection: ASGIConnection[Any, Any, Any, Any]) -> Person | Non
     return session.person if session is not None else None
 
 
+def live_session(connection: ASGIConnection[Any, Any, Any, Any]) -> Session:
+    """The browser's session. Raises, where the door is open to anybody, why there is none."""
+    state = connection.scope["state"]
+    session: Session | None = state.get("session")
+    if session is None:
+        ended: Refused = state.get("ended") or _ended(None)
+        raise ended
+    return session
+
+
 class Plain(NamedTuple):
     """A connection as the server below gave it: for sockets whose every message counts."""
 
@@ -220,8 +230,9 @@ class Access:
             return
         if session is not None:  # genuine, yet good for nothing but being the same person again
             state["expired"] = session
+        state["ended"] = _ended(session)
         if not self._is_open(path, "text/html" in headers.get("accept", "")):
-            raise _ended(session)
+            raise state["ended"]
 
     def _session(self, headers: dict[str, str]) -> Session | None:
         try:

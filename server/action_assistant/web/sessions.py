@@ -10,7 +10,7 @@ from litestar.params import JSONBody
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, TooMany, Unauthenticated
-from action_assistant.web.access import Needs, cookie_name, known_person, session_of
+from action_assistant.web.access import Needs, cookie_name, known_person, live_session, session_of
 from action_assistant.web.crowd import Pace
 from action_assistant.web.keys import SESSION_SECONDS, Author, Keys, Person, Session
 from action_assistant.web.revoked import Revoked
@@ -96,7 +96,7 @@ class Desk:
         name = " ".join((data.name or "").split())
         match data:
             case SignIn(token=None, invitation=None):
-                return _renamed(self._keys, _live(request), name)
+                return _renamed(self._keys, live_session(request), name)
             case SignIn(token=str(token), invitation=None):
                 if not self._keys.opens(token):
                     self._admit(request)
@@ -150,7 +150,7 @@ def session_routes(
 
     @get("/api/session", summary="Who is signed in")
     async def who(request: _Asking) -> SignedIn:
-        return _signed_in(_live(request))
+        return _signed_in(live_session(request))
 
     @post("/api/session", status_code=200, summary="Sign in, or change one's name")
     async def sign_in(data: JSONBody[SignIn], request: _Asking) -> Response[SignedIn]:
@@ -221,10 +221,3 @@ def _renamed(keys: Keys, session: Session, name: str) -> Session:
 
 def _name(known: Person | None) -> str:
     return known.name if known is not None else ""
-
-
-def _live(request: _Asking) -> Session:
-    session = session_of(request)
-    if session is None:
-        raise Unauthenticated("Open the link that the server printed.")
-    return session
