@@ -4,7 +4,6 @@ import { expect, type Page, test } from "@playwright/test";
 import { saved, start } from "./bench";
 import { Product } from "./product";
 
-test.skip(process.env.E2E_ALL !== "1", "takes minutes on a busy machine: E2E_ALL=1");
 
 const product = new Product();
 
