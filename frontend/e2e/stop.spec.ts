@@ -4,7 +4,6 @@ import { expect, type Page, test } from "@playwright/test";
 import { saved, start } from "./bench";
 import { Product } from "./product";
 
-
 const product = new Product();
 
 test.beforeAll(() => product.start());
