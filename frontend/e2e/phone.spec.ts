@@ -43,7 +43,10 @@ async function add(page: Page, name: string): Promise<void> {
 }
 
 test("a graph is made in the outline", async ({ browser }) => {
-  test.skip(process.env.E2E_ALL !== "1", "not yet seen green on a quiet machine: E2E_ALL=1");
+  test.skip(
+    process.env.E2E_ALL !== "1",
+    "fails: what was added in the outline is not found there again; E2E_ALL=1 tries it",
+  );
   const { page, context, failures } = await product.person(browser, "Ada", PHONE);
   await page.getByRole("button", { name: "New graph" }).first().tap();
   await page.waitForURL(/\/graphs\/.+/);

@@ -137,7 +137,7 @@ for (const [name, width, height] of [
 
 test.describe("robots", () => {
   test.skip(NO_ROS !== "", NO_ROS);
-  test.skip(process.env.E2E_ALL !== "1", "takes minutes on a busy machine: E2E_ALL=1");
+  test.skip(process.env.E2E_ALL !== "1", "takes a minute that CI does not have: E2E_ALL=1");
   const david = new StandIn("David");
   const eve = new StandIn("Eve");
 
