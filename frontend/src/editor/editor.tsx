@@ -79,7 +79,7 @@ const SIDES = [
 ];
 
 function focusOutline(): void {
-  document.querySelector<HTMLElement>('[role="treegrid"] [role="row"][tabindex="0"]')?.focus();
+  document.querySelector<HTMLElement>('[role="treegrid"] [data-row][tabindex="0"]')?.focus();
 }
 
 const PANES = [

@@ -1,7 +1,7 @@
 /** One row of the outline. */
 import { ActionIcon, Menu } from "@mantine/core";
 import { IconChevronRight, IconDots, IconMessageCircle, IconPlayerPlay } from "@tabler/icons-react";
-import { memo, useState } from "react";
+import { memo, useId, useState } from "react";
 import type { Progress } from "../../api/progress";
 import { useTalk } from "../../ui/canvas/spotlight";
 import { cardLines, lineText } from "../../ui/canvas/value-text";
@@ -159,6 +159,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
   const { row, active, selected, progress, change, name, mayEdit, hands } = props;
   const label = labelOf(row, name);
   const color = row.kind === "action" ? robotColor(row.action.actor) : "transparent";
+  const words = useId();
   return (
     <tr
       className={style.row}
@@ -168,6 +169,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
       aria-posinset={row.at}
       aria-setsize={row.of}
       aria-selected={selected}
+      aria-labelledby={words}
       {...(row.open === null ? {} : { "aria-expanded": row.open })}
       tabIndex={active ? 0 : -1}
       style={{ "--c": color } as React.CSSProperties}
@@ -190,7 +192,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
             </ActionIcon>
           </span>
         )}
-        <button type="button" tabIndex={-1} onClick={() => hands.choose(row)}>
+        <button type="button" id={words} tabIndex={-1} onClick={() => hands.choose(row)}>
           <Words row={row} progress={progress} name={name} />
         </button>
       </td>
