@@ -1,13 +1,18 @@
 """`serve` as a newcomer and as a mishap meet it: real processes, real signals."""
 
+import signal
 import socket
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 import psutil
 import pytest
 
+from action_assistant.serve import Enough
 from support.product import Product, running
 
 
@@ -97,3 +102,33 @@ def test_the_network_is_not_let_in_by_accident(tmp_path: Path) -> None:
     answer = Product(tmp_path).cli("serve", "--data", str(tmp_path), "--host", "0.0.0.0")
     assert answer.returncode == 2
     assert "ACTION_ASSISTANT_HOSTS" in answer.stderr
+
+
+@pytest.fixture
+def nobody_listens() -> Iterator[None]:
+    """Signals of the tests are as they were, afterwards."""
+    before = signal.getsignal(signal.SIGUSR1)
+    yield
+    sys.settrace(None)
+    signal.signal(signal.SIGUSR1, before)
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.usefixtures("nobody_listens")
+def test_a_signal_to_end_is_heard_wherever_it_comes() -> None:
+    """Before each line that waiting for it runs, also where a library holds a lock."""
+    enough = Enough(signal.SIGUSR1)
+    came = 0
+
+    def everywhere(frame: FrameType, event: str, _: object) -> Any:
+        nonlocal came
+        if event == "line":
+            came += 1
+            signal.raise_signal(signal.SIGUSR1)
+        return everywhere
+
+    sys.settrace(everywhere)
+    heard = [enough.within(0.01) for _ in range(3)]
+    sys.settrace(None)
+    assert came >= 3
+    assert heard == [True, True, True]

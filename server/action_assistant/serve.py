@@ -42,6 +42,29 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     opens: bool
 
 
+class Enough:
+    """Whether one of these signals has come.
+
+    A handler runs in the main thread wherever that is just then, also while it holds a lock, as it
+    does in parts of `threading.Event.wait`. A handler that took the same lock would wait for itself,
+    for ever. This one takes none.
+    """
+
+    def __init__(self, *signals: signal.Signals) -> None:
+        self._came = False
+        for number in signals:
+            signal.signal(number, self._hear)
+
+    def _hear(self, *_: object) -> None:
+        self._came = True
+
+    def within(self, seconds: float) -> bool:
+        """Whether one has come, at the latest after so many seconds."""
+        if not self._came:
+            time.sleep(seconds)
+        return self._came
+
+
 class Child:
     """One of the two processes, as often as it takes."""
 
@@ -109,9 +132,7 @@ def serve(plan: Plan) -> int:
             probe.close()
     keys = Keys.of(plan.data)
     trust = _certified(plan)
-    enough = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: enough.set())
+    enough = Enough(signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     # The writing end is never written to: it closes when this process dies, however it dies.
     reading, _writing = os.pipe()
     children = _children(plan)
@@ -122,7 +143,7 @@ def serve(plan: Plan) -> int:
         target=_greet, args=(plan, keys, trust, children, enough), name="greet", daemon=True
     ).start()
     try:
-        while not enough.wait(_TICK):
+        while not enough.within(_TICK):
             for child in children:
                 code = child.tend(reading)
                 if code is not None:
@@ -181,7 +202,7 @@ def _greet(
     keys: Keys,
     trust: ssl.SSLContext | None,
     children: list[Child],
-    enough: threading.Event,
+    enough: Enough,
 ) -> None:
     """Say where the page is once both processes answer, and open it."""
     here = plan.host if plan.host not in {"0.0.0.0", "::", "localhost", EVERYWHERE} else "127.0.0.1"
@@ -190,7 +211,7 @@ def _greet(
     deadline = time.monotonic() + _PATIENCE
     for child in children:
         while not _answers(f"{scheme}://{shown}:{child.port}/healthz", trust):
-            if enough.wait(_TICK):
+            if enough.within(_TICK):
                 return
             if time.monotonic() > deadline:
                 _say(f"{child.name} does not answer yet; the messages above may say why")

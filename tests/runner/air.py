@@ -8,14 +8,11 @@ from contextlib import contextmanager
 from typing import Any
 
 import anyio
-import msgspec
 
 from action_assistant.runner.links.engine_text import name_of, snapshot
-from action_assistant.runner.links.port import (
-    Command,
-)
+from action_assistant.runner.links.heard import Endpoint, Got, Heard, LogLine, Sound
+from action_assistant.runner.links.port import Command
 from action_assistant.runner.links.port import Feedback as Shown
-from action_assistant.runner.seen import Snapshot
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import (
     NODE,
@@ -31,53 +28,6 @@ from action_assistant.runner.standin_wire import (
     Stop,
 )
 from runner.world import wall
-
-Sound = object
-
-
-class Endpoint(msgspec.Struct, frozen=True):
-    """An end of a node, as discovery shows it."""
-
-    gid: str
-    process: str
-    logger: str
-    type_hash: str
-
-
-class Heard(msgspec.Struct, frozen=True, kw_only=True):
-    """A command of somebody else."""
-
-    command: Command
-    graph: str
-    umrf: str
-    targets: tuple[str, ...]
-    sender: str
-
-
-class LogLine(msgspec.Struct, frozen=True):
-    """A line of a log."""
-
-    logger: str
-    text: str
-
-
-class Got(msgspec.Struct, frozen=True, kw_only=True):
-    """What a server answered."""
-
-    graphs: tuple[Snapshot, ...]
-    texts: dict[str, str]
-    known_actions: tuple[str, ...]
-    known_graphs: tuple[str, ...]
-
-
-class Kinds(msgspec.Struct, frozen=True):
-    """What the air talks in; the link over rclpy has its own."""
-
-    endpoint: Callable[..., Any] = Endpoint
-    heard: Callable[..., Any] = Heard
-    line: Callable[..., Any] = LogLine
-    got: Callable[..., Any] = Got
-
 
 LEASE_S = 10.0  # until discovery knows of a death that nobody announced
 GRAIN_MS = 0.01  # clocks are not finer: what is due so soon is due now
@@ -121,9 +71,9 @@ class Node:
         """Whether discovery shows it, rightly or not."""
         return self.seen_at <= now() < self.unseen_at
 
-    def end(self, of: str) -> Any:
+    def end(self, of: str) -> Endpoint:
         """One of its ends."""
-        return self.air.kinds.endpoint(
+        return Endpoint(
             gid=f"{self.process}/{of}",
             process=self.process,
             logger=NODE,
@@ -190,9 +140,8 @@ class Air:
     """One domain. `loss` is the chance that a message of that topic, or `get`, gets lost on its way
     to one node; `late_s` how long starts take."""
 
-    def __init__(self, chance: random.Random | None = None, kinds: Kinds = Kinds()) -> None:  # noqa: B008 - frozen
+    def __init__(self, chance: random.Random | None = None) -> None:
         self.number = 7
-        self.kinds = kinds
         self.own_hash = HASH
         self.joined_at = now()
         self.actors: set[str] = set()
@@ -261,7 +210,7 @@ class Air:
             case Feedback(actor=actor, history=history):
                 self.show(actor, history)
             case Line(text=text):
-                self.tell(self.kinds.line(NODE, text))
+                self.tell(LogLine(NODE, text))
             case Gone():
                 node.unseen_at = min(node.unseen_at, now())
 
@@ -293,7 +242,7 @@ class Air:
         command: Command = message.topic  # type: ignore[assignment]
         text = getattr(message, "graph_json", "") or getattr(message, "modified_graph", "")
         self.tell(
-            self.kinds.heard(
+            Heard(
                 command=command,
                 graph=name_of(text) or message.graph_name,
                 umrf=text,
@@ -319,7 +268,7 @@ class Air:
 
     # --- what a link asks of a domain ---------------------------------------------------------
 
-    async def ask(self, path: str) -> Any:
+    async def ask(self, path: str) -> Got:
         """The first answer of whoever serves a path."""
         asked_at = wall()
         self._tickets += 1
@@ -338,7 +287,7 @@ class Air:
             shown = snapshot(text, at=at, source="get", asked_at=asked_at)
             graphs.append(shown)
             texts[shown.graph] = text
-        return self.kinds.got(
+        return Got(
             graphs=tuple(graphs),
             texts=texts,
             known_actions=got[0].umrfs,
@@ -348,21 +297,19 @@ class Air:
     def client(self, path: str) -> None:
         """Nothing has to be made."""
 
-    def servers(self, path: str) -> tuple[Any, ...]:
+    def servers(self, path: str) -> tuple[Endpoint, ...]:
         """Who answers on a path, as far as discovery knows."""
         return tuple(each.end("get") for each in self.nodes if each.seen and each.path == path)
 
-    def listeners(self, topic: str) -> tuple[Any, ...]:
+    def listeners(self, topic: str) -> tuple[Endpoint, ...]:
         """Who listens, as far as discovery knows."""
         return tuple(each.end(topic) for each in self.nodes if each.seen)
 
-    def publishers(self, topic: str) -> tuple[Any, ...]:
+    def publishers(self, topic: str) -> tuple[Endpoint, ...]:
         """Who publishes feedback, or commands beside us."""
         if topic.endswith("feedback"):
             return tuple(each.end(topic) for each in self.nodes if each.seen)
-        return tuple(
-            self.kinds.endpoint(f"s{i}", f"s{i}", "cli", HASH) for i in range(self.strangers)
-        )
+        return tuple(Endpoint(f"s{i}", f"s{i}", "cli", HASH) for i in range(self.strangers))
 
     def paths(self) -> tuple[str, ...]:
         """Every path that somebody serves."""
@@ -378,6 +325,6 @@ class Air:
             self._ears.remove(ear)
 
 
-def _put(event: anyio.Event, got: list[Answer], answer: Any) -> None:
+def _put(event: anyio.Event, got: list[Answer], answer: Answer) -> None:
     got.append(answer)
     event.set()

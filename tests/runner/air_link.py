@@ -5,6 +5,7 @@ from contextlib import contextmanager
 
 import anyio
 
+from action_assistant.runner.links.heard import Heard, LogLine
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -18,7 +19,7 @@ from action_assistant.runner.links.port import (
     Standing,
 )
 from action_assistant.runner.standin_wire import Modify, Pause, Resume, Start
-from runner.air import HASH, Air, Heard, LogLine
+from runner.air import HASH, Air
 from runner.world import wall
 
 

@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final, TypeAlias, TypeVar
 
-import msgspec
 import rclpy
 from rcl_interfaces.msg import Log
 from rclpy.client import Client
@@ -34,9 +33,9 @@ from temoto_msgs.msg import (
 from temoto_msgs.srv import UmrfGraphGet
 
 from action_assistant.runner.links.engine_text import NotAGraph, name_of, snapshot
+from action_assistant.runner.links.heard import Endpoint, Got, Heard, LogLine, Sound
 from action_assistant.runner.links.port import Command, Feedback
 from action_assistant.runner.links.ros2_outlets import Message, Outlet, Outlets, Topics, qos
-from action_assistant.runner.seen import Snapshot
 
 log: Final = logging.getLogger(__name__)
 
@@ -53,45 +52,7 @@ M = TypeVar("M", bound=Message)
 Clock: TypeAlias = Callable[[], int]
 
 
-class Endpoint(msgspec.Struct, frozen=True):
-    """A publisher, a subscription or a server of somebody. `gid` is another one after every restart;
-    `process` is the part of it that all endpoints of one process share. `logger` is the name under
-    which its node logs."""
-
-    gid: str
-    process: str
-    logger: str
-    type_hash: str
-
-
-class Heard(msgspec.Struct, frozen=True, kw_only=True):
-    """A command that somebody else published. `graph` is the name that engines go by."""
-
-    command: Command
-    graph: str
-    umrf: str
-    targets: tuple[str, ...]
-    sender: str
-
-
-class LogLine(msgspec.Struct, frozen=True):
-    """A line of somebody's log."""
-
-    logger: str
-    text: str
-
-
-Sound: TypeAlias = Feedback | Heard | LogLine
 Ear: TypeAlias = Callable[[Sound], None]
-
-
-class Got(msgspec.Struct, frozen=True, kw_only=True):
-    """What a server answered. `graphs` and `texts` are what it runs or has run; `known_…` its index."""
-
-    graphs: tuple[Snapshot, ...]
-    texts: dict[str, str]
-    known_actions: tuple[str, ...]
-    known_graphs: tuple[str, ...]
 
 
 class Domain:

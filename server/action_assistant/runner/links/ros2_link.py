@@ -15,6 +15,7 @@ import anyio
 from temoto_msgs.msg import UmrfGraphModify, UmrfGraphPause, UmrfGraphResume, UmrfGraphStart
 
 from action_assistant.runner.links.engine_text import NotAGraph
+from action_assistant.runner.links.heard import Endpoint, Heard, LogLine, Sound
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -29,7 +30,7 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
-from action_assistant.runner.links.ros2_domain import Domain, Endpoint, Heard, LogLine, Sound
+from action_assistant.runner.links.ros2_domain import Domain
 from action_assistant.runner.links.ros2_outlets import Topics
 from action_assistant.runner.links.ros2_peers import (
     OLDER,
