@@ -12,6 +12,7 @@ from action_assistant.runner.control import Control
 from action_assistant.runner.events import EngineSaid, Override
 from action_assistant.runner.flight import Commanded, EngineBecame, StopWasProven
 from action_assistant.runner.links.port import Candidate, Order, Registration
+from action_assistant.runner.live import Hub
 from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.starting import GroupRequest
@@ -56,6 +57,18 @@ async def test_a_robot_that_answers_says_so_and_what_it_has() -> None:
         assert (robot.state, robot.why, robot.actions, robot.servers) == ("answering", "", 1, 1)
         index = await control.robots.index("David")
         assert list(index.actions) == ["Work"]
+
+
+@virtual
+async def test_each_beat_tells_when_an_idle_robot_answered_although_nothing_has_changed() -> None:
+    async with fleet(World(), David=Open()) as control:
+        hub = Hub(control, wall)
+        changes: list[None] = []
+        control.watch_robots(lambda: changes.append(None))
+        first = msgspec.json.decode(hub.beat())["heard"]["David"]
+        await anyio.sleep(15)
+        assert msgspec.json.decode(hub.beat())["heard"]["David"] > first
+        assert changes == []
 
 
 @virtual

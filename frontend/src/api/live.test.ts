@@ -164,3 +164,18 @@ test("a new name dials anew without a moment of doubt", () => {
   expect(live.now.link).toBe("live");
   live.close();
 });
+
+test("a beat says when each robot last answered, without another render of everything", () => {
+  const live = new Live("http://127.0.0.1:8001");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [] });
+  const all = vi.fn();
+  const seers = vi.fn();
+  live.subscribe(all);
+  live.subscribeSeen(seers);
+  newest().say({ type: "beat", at: "", seen: {}, heard: { David: "1970-01-01T00:00:02Z" } });
+  expect(live.heard.get("David")).toBe(2000);
+  expect(seers).toHaveBeenCalledOnce();
+  expect(all).not.toHaveBeenCalled();
+  live.close();
+});

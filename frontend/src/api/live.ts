@@ -33,7 +33,12 @@ type Message =
   | { type: "hello"; engines: Robot[]; runs: Run[] }
   | { type: "engines"; engines: Robot[] }
   | { type: "run"; run: Run }
-  | { type: "beat"; at: string; seen?: Record<string, string> }
+  | {
+      type: "beat";
+      at: string;
+      seen?: Record<string, string>;
+      heard?: Record<string, string>;
+    }
   | { type: "stopping"; stop_id: string; runs: string[] }
   | { type: "refused"; stop_id: string; detail: string };
 
@@ -54,6 +59,8 @@ export class Live {
   };
   /** When each open run was last shown by its engine, ms. Apart from `now`: it changes each second. */
   seen: ReadonlyMap<string, number> = new Map();
+  /** When each robot last answered, ms. */
+  heard: ReadonlyMap<string, number> = new Map();
   readonly #seers = new Set<() => void>();
   readonly #runner: string;
   readonly #listeners = new Set<() => void>();
@@ -207,11 +214,11 @@ export class Live {
         this.#set({ engines: message.engines });
         break;
       case "beat": {
-        const seen = Object.entries(message.seen ?? {}).map(
-          ([run, at]) => [run, Date.parse(at)] as const,
-        );
-        if (seen.length === 0 && this.seen.size === 0) break;
-        this.seen = new Map(seen);
+        const seen = times(message.seen);
+        const heard = times(message.heard);
+        if (seen.size + heard.size + this.seen.size + this.heard.size === 0) break;
+        this.seen = seen;
+        this.heard = heard;
         for (const seer of this.#seers) seer();
         break;
       }
@@ -237,4 +244,8 @@ export class Live {
     this.now = { ...this.now, ...part };
     for (const listener of this.#listeners) listener();
   }
+}
+
+function times(told: Record<string, string> | undefined): Map<string, number> {
+  return new Map(Object.entries(told ?? {}).map(([name, at]) => [name, Date.parse(at)]));
 }

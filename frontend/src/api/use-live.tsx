@@ -62,6 +62,12 @@ export function useSeen(run: string): number | undefined {
   return useSyncExternalStore(live?.subscribeSeen ?? never, () => live?.seen.get(run));
 }
 
+/** When a robot last answered, ms; an answer that changes nothing is told by a beat alone. */
+export function useHeard(robot: string): number | undefined {
+  const { live } = use(Context);
+  return useSyncExternalStore(live?.subscribeSeen ?? never, () => live?.heard.get(robot));
+}
+
 /** The runs that go on, newest first, as far as this page knows. */
 export function openRuns(now: LiveNow): Run[] {
   return [...now.runs.values()]

@@ -7,7 +7,7 @@ import { useState } from "react";
 import { sentence } from "../api/http";
 import { useMay } from "../api/person";
 import { forgetRobot, type Registration, type Robot } from "../api/robots";
-import { useLive } from "../api/use-live";
+import { useHeard, useLive } from "../api/use-live";
 import { EngineWord } from "../ui/engine-word";
 import { robotColor } from "../ui/robot";
 import { ago, clock, instant, useNow } from "../ui/when";
@@ -51,7 +51,7 @@ export function signsOf(robot: Robot): Sign[] {
 
 function Facts({ robot }: { robot: Robot }) {
   const now = useNow(1000);
-  const heard = instant(robot.heard_at);
+  const heard = useHeard(robot.name) ?? instant(robot.heard_at);
   const restarted = instant(robot.restarted_at);
   const took = robot.took_ms === null ? "" : ` within ${Math.max(1, Math.round(robot.took_ms))} ms`;
   return (

@@ -78,10 +78,12 @@ class EnginesMessage(msgspec.Struct, frozen=True, tag="engines", tag_field="type
 
 
 class Beat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
-    """Once a second: the link is alive. `seen`: when each open run was last shown by its engine."""
+    """Once a second: the link is alive. `seen`: when each open run was last shown by its engine;
+    `heard`: when each robot last answered."""
 
     at: datetime
     seen: dict[str, datetime]
+    heard: dict[str, datetime]
 
 
 class Frame(msgspec.Struct, frozen=True):
@@ -123,7 +125,8 @@ class Hub:
             for run, opened in self.control.open.items()
             if opened.watch.seen_at is not None
         }
-        return _text(Beat(shapes.time(self.wall()), seen))
+        heard = {name: shapes.time(at) for name, at in self.control.robots.heard().items()}
+        return _text(Beat(shapes.time(self.wall()), seen, heard))
 
     def _changed(self, opened: OpenRun) -> None:
         for box in self.boxes:

@@ -202,6 +202,14 @@ class Robots:
             return plain
         return seen(plain, engine, self.silencing.trouble)
 
+    def heard(self) -> dict[str, int]:
+        """When each robot last answered, microseconds UTC; those that never did are left out."""
+        return {
+            name: engine.answer.at
+            for name, engine in self._engines.items()
+            if engine.answer is not None
+        }
+
     def registration(self, name: str) -> Registration:
         """How a robot is reached. Raises NotFound."""
         known = self._registered.get(name)
