@@ -29,7 +29,9 @@ def test_a_run_is_started_seen_and_kept(process: RunnerProcess) -> None:
         done = over(client, run["id"])
         assert (done["state"], done["result"]) == ("finished", "on_true")
         (visit,) = done["actions"]["Work_1"]["visits"]
-        assert set(visit) == {"from", "not_before", "not_after", "until", "result", "how"}
+        assert set(visit) == {
+            *("from", "not_before", "not_after", "until", "result", "how", "inputs")
+        }
         assert done["umrf"]["gui_attributes"]["action_assistant"]["run"] == run["id"]
         first = client.get("/api/runs").json()[0]
         assert first["id"] == run["id"]

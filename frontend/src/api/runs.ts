@@ -28,6 +28,8 @@ export interface Visit {
   until: string | null;
   result: VisitResult;
   how: "observed" | "inferred";
+  /** Values that the engine reported, as JSON texts by flat name; null when nobody saw them. */
+  inputs?: Record<string, string> | null;
 }
 
 export interface ActionRun {
@@ -69,6 +71,8 @@ export interface Run {
   /** The newest lines of the engine's own log. */
   log?: { at: string; text: string }[];
   umrf?: unknown;
+  /** Values of actions as they were sent: action, parameter, JSON text as in `inputs`. */
+  sent?: Record<string, Record<string, string>>;
 }
 
 const ENDED: ReadonlySet<RunState> = new Set<RunState>([

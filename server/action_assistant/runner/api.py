@@ -19,6 +19,7 @@ from action_assistant.runner import archive, robots_api, shapes
 from action_assistant.runner.admission import SIMULATOR, read_request
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import ModifyOperation, StartOperation, StopOperation
+from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.events import Author
 from action_assistant.runner.live import Hub, Stopping, attend
 from action_assistant.runner.review import routes as review
@@ -181,9 +182,11 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
             until=_us(until),
             before=before,
         )
+        was_open = dict(house.control.open)  # a run may end between its row and its labels
         rows = await house.control.history.rows(archive.listed(wanted, limit))
         labels = await _labels(house, rows)
-        found = [_listed(house, row, labels.get(row.id, [])) for row in rows]
+        opened = was_open | house.control.open
+        found = [_listed(opened.get(row.id), row, labels.get(row.id, [])) for row in rows]
         return [each for each in found if not states or each.state in states]
 
     @get("/api/labels", summary="Labels of runs, the most used first")
@@ -253,8 +256,7 @@ def _shown(house: House, run: str) -> shapes.RunShown | None:
     return shapes.shown(opened.run, recorded=opened.recorder.recorded)
 
 
-def _listed(house: House, row: Row[Any], labels: list[str]) -> shapes.Listed:
-    opened = house.control.open.get(row.id)
+def _listed(opened: OpenRun | None, row: Row[Any], labels: list[str]) -> shapes.Listed:
     if opened is None:
         found = shapes.summary_of_row(row)
     else:

@@ -84,6 +84,18 @@ def _stop() -> RequestBody:
     return _body(press, required=False)
 
 
+def _fit() -> RequestBody:
+    one = _start().content["application/json"].schema
+    assert isinstance(one, Schema)
+    umrf = (one.properties or {})["umrf"]
+    fault = Schema(type=OpenAPIType.STRING, enum=["error", "false", "hang", "init_error"])
+    fields: dict[str, Schema | Reference] = {"umrf": umrf, "action": _TEXT, "fault": fault}
+    whole = Schema(
+        type=OpenAPIType.OBJECT, properties=fields, required=["umrf"], additional_properties=False
+    )
+    return _body(whole, required=True)
+
+
 @dataclass
 class StartOperation(Operation):
     """A start."""
@@ -132,3 +144,13 @@ class ModifyOperation(Operation):
 
     def __post_init__(self) -> None:
         self.request_body = _modify()
+
+
+@dataclass
+class FitOperation(Operation):
+    """A recorded run for another version of its graph."""
+
+    request_body: RequestBody | Reference | None = field(default_factory=_fit)
+
+    def __post_init__(self) -> None:
+        self.request_body = _fit()

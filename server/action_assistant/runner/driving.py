@@ -44,7 +44,7 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.proof import send_stop
 from action_assistant.runner.recorder import Recorder, Store
-from action_assistant.runner.runs import Run, follow
+from action_assistant.runner.runs import Run, follow, thin
 from action_assistant.runner.seen import Hazard, Seen
 from action_assistant.runner.watching import Watch
 
@@ -267,7 +267,7 @@ class OpenRun:
 
     def observe(self, seen: tuple[Seen, ...]) -> None:
         """Show and store what was seen."""
-        self.tell(Observed(self._wall(), seen))
+        self.tell(Observed(self._wall(), thin(self.run, seen)))
         for item in seen:
             if isinstance(item, Hazard) and (item.effect != "goes on" or item.code in _TOLD):
                 place = f" at {item.node}" if item.node else ""

@@ -41,7 +41,16 @@ from action_assistant.runner.seen import (
     Seen,
     Snapshot,
 )
-from action_assistant.runner.visits import KEPT, ActionRun, Message, changed, heard, resulted, shown
+from action_assistant.runner.visits import (
+    KEPT,
+    ActionRun,
+    Message,
+    changed,
+    heard,
+    is_heard,
+    resulted,
+    shown,
+)
 
 State: TypeAlias = Literal[
     "requested",
@@ -101,6 +110,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     graph_state: str | None = None
     parts: dict[str, str] = {}  # running sub-graphs of this run, and their states
     actions: dict[str, ActionRun] = {}
+    looked: dict[str, int] = {}  # when all actions of a graph were last seen to be as here
     result: str | None = None
     started_at: int | None = None
     ended_at: int | None = None
@@ -240,9 +250,45 @@ def is_news(run: Run, shown: Snapshot) -> bool:
         action = run.actions.get(key_of(run, shown.graph, node))
         if action is None or action.state != state:
             return True
-        if len(shown.messages.get(node, ())) != action.heard:
+        messages = shown.messages.get(node, ())
+        if len(messages) != action.heard or not is_heard(action, messages):
             return True
     return False
+
+
+def thin(run: Run, seen: Iterable[Seen]) -> tuple[Seen, ...]:
+    """The same without what is known already: an engine tells its whole graph after every change,
+    and to store that again and again would cost the square of its size. Folds to the same run."""
+    thinned: list[Seen] = []
+    for item in seen:
+        less = _thin(run, item) if isinstance(item, Snapshot) and not item.same else item
+        run = _observe(run, (less,))
+        thinned.append(less)
+    return tuple(thinned)
+
+
+def _thin(run: Run, shown: Snapshot) -> Snapshot:
+    own = shown.graph == run.graph_name
+    prefix = f"{shown.graph}/"
+    known = (
+        name if own else name.removeprefix(prefix)
+        for name in run.actions
+        if ("/" not in name if own else name.startswith(prefix))
+    )
+    if not all(name in shown.nodes for name in known):
+        return shown  # some are gone: of them nothing may be said
+    news: dict[str, str] = {}
+    said: dict[str, tuple[str, ...]] = {}
+    for node, state in shown.nodes.items():
+        action = run.actions.get(key_of(run, shown.graph, node))
+        messages = shown.messages.get(node, ())
+        is_new = len(messages) != action.heard or not is_heard(action, messages) if action else True
+        if is_new or action is None or action.state != state:
+            news[node] = state
+            if messages:
+                said[node] = messages
+    inputs = {name: values for name, values in shown.inputs.items() if name in news}
+    return replace(shown, nodes=news, messages=said, inputs=inputs, same=True)
 
 
 def _end(run: Run, event: Ended) -> Run:
@@ -259,14 +305,15 @@ def _end(run: Run, event: Ended) -> Run:
 
 def _observe(run: Run, seen: Iterable[Seen]) -> Run:
     actions = dict(run.actions)
-    parts = run.parts
+    parts, looked = run.parts, run.looked
     graph_state, result = run.graph_state, run.result
     begun_at = run.started_at or run.requested_at
     for item in seen:
         match item:
             case NodeState():
                 name = key_of(run, item.graph, item.node)
-                actions[name] = changed(actions.get(name, ActionRun()), item.state, item.at)
+                before = actions.get(name, ActionRun())
+                actions[name] = changed(before, item.state, item.at, item.inputs)
             case NodeResult():
                 name = key_of(run, item.graph, item.node)
                 actions[name] = resulted(actions.get(name, ActionRun()), item)
@@ -280,8 +327,13 @@ def _observe(run: Run, seen: Iterable[Seen]) -> Run:
             case Snapshot():
                 for node, state in item.nodes.items():
                     name = key_of(run, item.graph, node)
-                    action = shown(actions.get(name, ActionRun()), state, item, begun_at)
+                    known = actions.get(name)
+                    since = max(begun_at, looked.get(item.graph, 0)) if known else begun_at
+                    inputs = item.inputs.get(node)
+                    action = shown(known or ActionRun(), state, item, since, inputs)
                     actions[name] = heard(action, item.messages.get(node, ()), item.at)
+                if item.same:
+                    looked = looked | {item.graph: item.at}
                 if item.graph == run.graph_name:
                     graph_state = item.state
                 else:
@@ -290,7 +342,14 @@ def _observe(run: Run, seen: Iterable[Seen]) -> Run:
                 pass  # the alarm that comes with it is an event of its own
             case _:
                 assert_never(item)
-    return replace(run, actions=actions, parts=parts, graph_state=graph_state, result=result)
+    return replace(
+        run,
+        actions=actions,
+        parts=parts,
+        looked=looked,
+        graph_state=graph_state,
+        result=result,
+    )
 
 
 def key_of(run: Run, graph: str, node: str) -> str:

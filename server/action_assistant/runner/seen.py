@@ -15,13 +15,17 @@ ACTIVE: Final = frozenset({"RUNNING", "STOPPING", "PAUSE_REQUESTED", "PAUSED"})
 TERMINAL: Final = frozenset({"FINISHED", "HALTED", "STOPPED", "ERROR"})
 
 
-class NodeState(msgspec.Struct, frozen=True, tag="node_state", tag_field="kind"):
-    """A node changed its state at exactly this time."""
+class NodeState(
+    msgspec.Struct, frozen=True, omit_defaults=True, tag="node_state", tag_field="kind"
+):
+    """A node changed its state at exactly this time. `inputs`: the values it began with, where they
+    could be seen (flat name → JSON text)."""
 
     at: int
     graph: str
     node: str
     state: str
+    inputs: dict[str, str] | None = None
 
 
 class NodeResult(
@@ -72,7 +76,9 @@ class Snapshot(msgspec.Struct, frozen=True, omit_defaults=True, tag="snapshot", 
     `source`: `get` was asked for by us at `asked_at`, `feedback` came by itself and may be late.
     `since`: when this engine was last seen before, so that changes lie between `since` and `at`.
     `run`: the identity that the graph carries; None for graphs that others started.
-    `messages`: per node, all runtime messages so far.
+    `messages`: per node, all runtime messages so far (the engine keeps ten).
+    `inputs`: the values of nodes that move, where they could be read.
+    `same`: nodes that are not named are as they were before, with the same messages.
     """
 
     at: int
@@ -84,6 +90,8 @@ class Snapshot(msgspec.Struct, frozen=True, omit_defaults=True, tag="snapshot", 
     since: int | None = None
     run: str | None = None
     messages: dict[str, tuple[str, ...]] = {}
+    inputs: dict[str, dict[str, str]] = {}
+    same: bool = False
 
     @property
     def active(self) -> bool:

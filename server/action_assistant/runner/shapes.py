@@ -7,6 +7,7 @@ import msgspec
 from sqlalchemy import Row
 
 from action_assistant.runner.events import Author, Override
+from action_assistant.runner.parameters import sent
 from action_assistant.runner.runs import Desired, Run, State
 from action_assistant.runner.visits import ActionRun, How, Outcome, Visit
 
@@ -18,7 +19,8 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     """One execution of an action: seen from `from` to `until`, at most from `not_before` to
-    `not_after`."""
+    `not_after`. `inputs`: values that the engine reported for it, by flat name, as JSON texts (a long
+    one is cut and ends with an ellipsis); null when nobody saw them."""
 
     start: datetime
     not_before: datetime
@@ -26,6 +28,7 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     until: datetime | None
     result: Outcome | None
     how: How
+    inputs: dict[str, str] | None = None
 
 
 class MessageShown(msgspec.Struct, frozen=True):
@@ -96,10 +99,12 @@ class RunShown(Summary, frozen=True, kw_only=True):
 
 
 class RunWhole(RunShown, frozen=True, kw_only=True):
-    """A run with the graph as it was sent."""
+    """A run with the graph as it was sent. `sent`: the values of its actions, by full name and flat
+    name, written as in `inputs` of visits."""
 
     umrf: msgspec.Raw
     override: Override | None
+    sent: dict[str, dict[str, str]]
 
 
 def time(us: int) -> datetime:
@@ -122,9 +127,13 @@ def whole(run: Run, umrf: str, *, recorded: bool = True) -> RunWhole:
     """All there is."""
     actions = _actions(run, _WHOLE)
     raw = msgspec.Raw(umrf.encode())
-    log = _log(run, len(run.log))
     return RunWhole(
-        **_fields(run, recorded), actions=actions, log=log, umrf=raw, override=run.override
+        **_fields(run, recorded),
+        actions=actions,
+        log=_log(run, len(run.log)),
+        umrf=raw,
+        override=run.override,
+        sent=sent(umrf),
     )
 
 
@@ -202,6 +211,7 @@ def visit(each: Visit) -> VisitShown:
         _time(each.until),
         each.result,
         each.how,
+        each.inputs,
     )
 
 

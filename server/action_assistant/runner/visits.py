@@ -15,6 +15,8 @@ How: TypeAlias = Literal["observed", "inferred"]
 
 #: Visits and messages of one action that a run carries; older ones are in its events.
 KEPT: Final = 100
+#: Messages of one action that an engine keeps.
+_RING: Final = 10
 
 _OUTCOMES: Final[dict[str, Outcome]] = {
     "on_true": "true",
@@ -29,6 +31,7 @@ class Visit(msgspec.Struct, frozen=True, kw_only=True):
 
     It was seen going on from `start` to `until` (None: still); at most it lasted from `not_before`
     to `not_after`. `how` says whether start and result were seen or follow from other things.
+    `inputs`: the values that the engine reported while it went on; None when nobody saw them.
     """
 
     start: int
@@ -37,6 +40,7 @@ class Visit(msgspec.Struct, frozen=True, kw_only=True):
     not_after: int | None = None
     result: Outcome | None = None
     how: How = "observed"
+    inputs: dict[str, str] | None = None
 
 
 class Message(msgspec.Struct, frozen=True):
@@ -58,12 +62,14 @@ class ActionRun(msgspec.Struct, frozen=True, kw_only=True):
     heard: int = 0
 
 
-def changed(action: ActionRun, state: str, at: int) -> ActionRun:
+def changed(
+    action: ActionRun, state: str, at: int, inputs: dict[str, str] | None = None
+) -> ActionRun:
     """After an exact transition."""
     visits, older = action.visits, action.older
     if state in ACTIVE:
         if not _open(action):
-            visits, older = _kept(visits, older, Visit(start=at, not_before=at))
+            visits, older = _kept(visits, older, Visit(start=at, not_before=at, inputs=inputs))
     elif _open(action):
         result = visits[-1].result or _implied(action.state, state)
         visits = (*visits[:-1], replace(visits[-1], until=at, not_after=at, result=result))
@@ -84,14 +90,22 @@ def resulted(action: ActionRun, item: NodeResult) -> ActionRun:
     return replace(action, visits=visits, messages=messages)
 
 
-def shown(action: ActionRun, state: str, item: Snapshot, begun_at: int) -> ActionRun:
-    """After a snapshot, which says how things are but not when they became so."""
+def shown(
+    action: ActionRun,
+    state: str,
+    item: Snapshot,
+    begun_at: int,
+    inputs: dict[str, str] | None = None,
+) -> ActionRun:
+    """After a snapshot, which says how things are but not when they became so. `begun_at`: when
+    nothing can have happened before."""
     at = item.at
     before = min(at, max(item.since or 0, action.seen_at, begun_at))
     visits, older = action.visits, action.older
     if state in ACTIVE:
         if not _open(action):
-            visits, older = _kept(visits, older, Visit(start=at, not_before=before))
+            visit = Visit(start=at, not_before=before, inputs=inputs)
+            visits, older = _kept(visits, older, visit)
     elif _open(action):
         last = visits[-1]
         implied = last.result or _implied(action.state, state)
@@ -113,10 +127,28 @@ def shown(action: ActionRun, state: str, item: Snapshot, begun_at: int) -> Actio
 
 def heard(action: ActionRun, messages: tuple[str, ...], at: int) -> ActionRun:
     """A snapshot repeats all messages so far; only the new ones are added."""
-    if len(messages) <= action.heard:
-        return action if len(messages) == action.heard else replace(action, heard=len(messages))
-    fresh = tuple(Message(at, text) for text in messages[action.heard :])
+    first = len(messages) if is_heard(action, messages) else _known(action, messages)
+    if first == len(messages):
+        return action if first == action.heard else replace(action, heard=first)
+    fresh = tuple(Message(at, text) for text in messages[first:])
     return replace(action, messages=(*action.messages, *fresh)[-KEPT:], heard=len(messages))
+
+
+def is_heard(action: ActionRun, messages: tuple[str, ...]) -> bool:
+    """Whether none of these messages is new. An engine keeps the last ten: then the oldest goes with
+    each new one, which shows as long as they do not all say the same."""
+    if len(messages) != action.heard or not messages:
+        return len(messages) <= action.heard
+    last = action.messages[-len(messages) :]
+    return len(messages) < _RING or messages == tuple(each.text for each in last)
+
+
+def _known(action: ActionRun, messages: tuple[str, ...]) -> int:
+    """How many of these messages, from the first on, are those that were heard last."""
+    if len(messages) > action.heard:
+        return action.heard
+    last = tuple(each.text for each in action.messages[-len(messages) :])
+    return next(n for n in range(len(last), -1, -1) if last[len(last) - n :] == messages[:n])
 
 
 def _implied(before: str, after: str) -> Outcome | None:

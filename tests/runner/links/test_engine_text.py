@@ -40,6 +40,19 @@ def test_what_others_keep_beside_a_node_hinders_nothing() -> None:
     assert found.messages == {"Work_1": ("a", "b")}
 
 
+def test_messages_are_read_as_engines_write_them() -> None:
+    said = {"messages": [{"message": "ran 1", "timestamp": 1795251734200}]}
+    assert snapshot(text(node(runtime=said)), at=1, source="get").messages == {"Work_0": ("ran 1",)}
+
+
+def test_values_are_those_of_actions_that_move() -> None:
+    inputs = {"pose": {"x": {"pvf_type": "number", "pvf_value": 5.0}}, "to": {"pvf_type": "string"}}
+    moving, waiting = node(input_parameters=inputs), node(number=1, input_parameters=inputs)
+    odd = node(number=2, input_parameters=["theirs"])
+    found = snapshot(text(moving, waiting | {"state": "FINISHED"}, odd), at=1, source="get")
+    assert found.inputs == {"Work_0": {"pose::x": "5"}}
+
+
 @pytest.mark.parametrize(
     "hostile",
     [

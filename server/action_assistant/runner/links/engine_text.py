@@ -4,11 +4,13 @@ They come from machines that anybody on the network may own: whatever is not as 
 refused with the reason, since a proof may rest on it.
 """
 
+from collections.abc import Mapping
 from typing import Literal
 
 import msgspec
 
-from action_assistant.runner.seen import Snapshot
+from action_assistant.runner.parameters import Values, reported
+from action_assistant.runner.seen import ACTIVE, Snapshot
 
 
 class NotAGraph(ValueError):
@@ -19,10 +21,15 @@ class _Runtime(msgspec.Struct, frozen=True):
     messages: msgspec.Raw = msgspec.Raw(b"[]")
 
 
+class _Said(msgspec.Struct, frozen=True):
+    message: str
+
+
 class _Action(msgspec.Struct, frozen=True):
     name: str
     state: str
     instance_id: int = 0
+    input_parameters: msgspec.Raw = msgspec.Raw(b"{}")
     gui_attributes: msgspec.Raw = msgspec.Raw(b"{}")
     runtime: msgspec.Raw = msgspec.Raw(b"{}")
 
@@ -49,7 +56,7 @@ _GRAPH = msgspec.json.Decoder(_Graph)
 _NAMED = msgspec.json.Decoder(_Named)
 _ATTRIBUTES = msgspec.json.Decoder(_Attributes)
 _RUNTIME = msgspec.json.Decoder(_Runtime)
-_MESSAGES = msgspec.json.Decoder(tuple[str, ...])
+_MESSAGES = msgspec.json.Decoder(tuple[_Said | str, ...])
 
 
 def snapshot(
@@ -71,6 +78,7 @@ def snapshot(
         asked_at=asked_at,
         run=_run(graph.actions),
         messages={name: said for name, said in messages.items() if said},
+        inputs=_inputs(nodes),
     )
 
 
@@ -97,6 +105,16 @@ def _mark(action: _Action) -> str | None:
 
 def _messages(action: _Action) -> tuple[str, ...]:
     try:
-        return _MESSAGES.decode(_RUNTIME.decode(action.runtime).messages)
+        said = _MESSAGES.decode(_RUNTIME.decode(action.runtime).messages)
     except msgspec.DecodeError:
         return ()
+    return tuple(each if isinstance(each, str) else each.message for each in said)
+
+
+def _inputs(nodes: Mapping[str, _Action]) -> dict[str, Values]:
+    """Values of the actions that move: after that the engine forgets what came from parents."""
+    found: dict[str, Values] = {}
+    for name, each in nodes.items():
+        if each.state in ACTIVE and (values := reported(bytes(each.input_parameters))) is not None:
+            found[name] = values
+    return found

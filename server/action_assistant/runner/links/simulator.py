@@ -6,7 +6,7 @@ that is started here keeps its name to itself, so one link serves many runs of d
 
 import math
 import secrets
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Final, assert_never
 
@@ -23,6 +23,7 @@ from action_assistant.runner.links.port import (
     Standing,
     Transitions,
 )
+from action_assistant.runner.parameters import Values, values_of
 from action_assistant.runner.seen import (
     Exact,
     GraphResult,
@@ -169,8 +170,9 @@ class SimulatorLink:
     def _tell(self, traces: Sequence[semantics.Trace]) -> None:
         self._wake.set()
         per_run: dict[str, list[Exact]] = {}
+        begun = self._begun(traces)
         for trace in traces:
-            seen = _seen(trace, self._at(trace.t_ms))
+            seen = _seen(trace, self._at(trace.t_ms), begun)
             run = self._run_of(trace.graph)
             if seen is not None and run is not None:
                 per_run.setdefault(run, []).append(seen)
@@ -179,6 +181,21 @@ class SimulatorLink:
         for trace in traces:
             if isinstance(trace, semantics.Hazard) and trace.effect in {"crash", "hang"}:
                 self._fail(trace)
+
+    def _begun(self, traces: Sequence[semantics.Trace]) -> dict[int, Values]:
+        """What nodes that have just begun and still run began with, by the trace that says so. Of
+        those that have ended meanwhile it is gone."""
+        last = {
+            (trace.graph, trace.node): trace
+            for trace in traces
+            if isinstance(trace, semantics.NodeState)
+        }
+        found: dict[int, Values] = {}
+        for (name, node), trace in last.items():
+            graph = self._engine.graphs.get(name)
+            if trace.state == "RUNNING" and graph is not None and node in graph.nodes:
+                found[id(trace)] = values_of(graph.nodes[node].inputs.values())
+        return found
 
     def _fail(self, hazard: semantics.Hazard) -> None:
         """From now on nobody answers, as with the real engine; a hung one still exists."""
@@ -203,11 +220,12 @@ class SimulatorLink:
         return self._runs[max(owners, key=len)] if owners else None
 
 
-def _seen(trace: semantics.Trace, at: int) -> Exact | None:
+def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact | None:
     """What of a trace is worth a place in the history; relations follow from results."""
     match trace:
         case semantics.NodeState():
-            return NodeState(at, trace.graph, trace.node, trace.state)
+            inputs = begun.get(id(trace))
+            return NodeState(at, trace.graph, trace.node, trace.state, inputs)
         case semantics.NodeResult():
             return NodeResult(at, trace.graph, trace.node, trace.result, trace.message)
         case semantics.GraphState():

@@ -115,6 +115,30 @@ def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
     return Recorded(behaviours, doubts)
 
 
+def fitted(found: Recorded, run: Run, graph: Graph) -> Recorded:
+    """The same script for another version of the graph: an action keeps what it did under a new
+    name. Actions that the run did not have, or never came to, do what the simulator takes for usual."""
+    by_aid = {action.aid: name for name, action in run.actions.items() if action.aid is not None}
+    behaviours: dict[str, list[dict[str, Any]]] = {}
+    used: set[str] = set()
+    doubts: list[Doubt] = []
+    for action in graph.actions:
+        if action.missing:
+            continue
+        name = by_aid.get(action.key, action.full_name)
+        if name in found.behaviours:
+            used.add(name)
+            behaviours[action.full_name] = found.behaviours[name]
+        else:
+            why = "It never ran in that run" if name in run.actions else "That run did not have it"
+            doubts.append(Doubt(action.full_name, f"{why}; it ends true after a second."))
+    inside = {name: calls for name, calls in found.behaviours.items() if "/" in name}
+    gone = sorted(found.behaviours.keys() - used - inside.keys())
+    doubts += [Doubt(name, "This version does not have it any more.") for name in gone]
+    kept = [doubt for doubt in found.doubts if doubt.action in used | inside.keys()]
+    return Recorded(behaviours | inside, [*kept, *doubts])
+
+
 def _spread(action: ActionRun) -> Iterable[str]:
     """Messages by visit: an action says one thing per visit at most that a script can repeat."""
     for visit in action.visits:

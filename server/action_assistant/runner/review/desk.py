@@ -8,7 +8,7 @@ import anyio
 import msgspec
 from sqlalchemy import Row, select
 
-from action_assistant.errors import BadInput, Conflict, NotFound, Refused
+from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refused
 from action_assistant.journal.events import Draft
 from action_assistant.journal.tables import expectation, review, run, run_label
 from action_assistant.runner.control import Control
@@ -167,12 +167,22 @@ class Desk:
             after = events[-1].seq
             yield b"".join(exports.lines(run_id, events))
 
-    async def script(self, run_id: str, fault: tuple[str, again.Fault] | None) -> again.Recorded:
-        """What the run did as a script. Raises NotFound, BadInput."""
+    async def script(
+        self, run_id: str, fault: tuple[str, again.Fault] | None, umrf: bytes | None = None
+    ) -> again.Recorded:
+        """What the run did as a script, for its own graph or for another version of it. Raises
+        NotFound, BadInput, NotUmrf."""
         found = await self.known(run_id)
         if fault is not None and fault[0] not in found.actions:
             raise BadInput(f"The run has no action {fault[0]!r}.", where={"path": "/fault"})
-        return again.recorded(found, fault)
+        script = again.recorded(found, fault)
+        if umrf is None:
+            return script
+        try:
+            reading = await self._aside(lambda: codec.read(umrf))
+        except codec.Unreadable as wrong:
+            raise NotUmrf(wrong.message, where={"path": f"/umrf{wrong.path}"}) from wrong
+        return again.fitted(script, found, reading.graph)
 
     # --- many runs ----------------------------------------------------------------------------
 

@@ -167,8 +167,20 @@ def _actions(before: Run | None, after: Run) -> dict[str, ActionFrame]:
     return {
         name: _changed(old.get(name), action)
         for name, action in after.actions.items()
-        if old.get(name) is not action and old.get(name) != action
+        if _looks_new(old.get(name), action)
     }
+
+
+def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
+    """Whether anybody would see a difference; when it was seen last nobody does."""
+    if before is None:
+        return True
+    return before is not after and (
+        before.state != after.state
+        or before.aid != after.aid
+        or before.visits != after.visits
+        or before.messages != after.messages
+    )
 
 
 def _changed(before: ActionRun | None, after: ActionRun) -> ActionFrame:

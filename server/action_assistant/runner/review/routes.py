@@ -10,6 +10,8 @@ from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput
+from action_assistant.runner.admission import decoded
+from action_assistant.runner.described import FitOperation
 from action_assistant.runner.events import Author
 from action_assistant.runner.review import about, again
 from action_assistant.runner.review.compare import Comparison
@@ -31,6 +33,14 @@ class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     run: str
     name: str
+
+
+class Fit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Another version of the graph of a run; `action` (a name of the run) may have a `fault`."""
+
+    umrf: msgspec.Raw
+    action: str | None = None
+    fault: again.Fault | None = None
 
 
 def routes(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
@@ -59,9 +69,17 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
     async def script(
         run: str, action: str | None = None, fault: again.Fault | None = None
     ) -> again.Recorded:
-        if (action is None) != (fault is None):
-            raise BadInput("A fault belongs to an action: give both, or none.")
-        return await desk().script(run, (action, fault) if action and fault else None)
+        return await desk().script(run, _fault(action, fault))
+
+    @post(
+        "/api/runs/{run:str}/script",
+        status_code=200,
+        summary="What a run did, as a script for another version of its graph",
+        operation_class=FitOperation,
+    )
+    async def fit(run: str, request: _Asking) -> again.Recorded:
+        asked = decoded(await request.body(), Fit)
+        return await desk().script(run, _fault(asked.action, asked.fault), bytes(asked.umrf))
 
     @get("/api/runs/{run:str}/export", summary="A run as a file: jsonl, csv or mcap")
     async def export(
@@ -74,7 +92,7 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
         content = await desk().export(run, form)
         return Response(content, media_type=_TYPES[form], headers=head)
 
-    return [film, umrf, marks, mark, script, export]
+    return [film, umrf, marks, mark, script, fit, export]
 
 
 def _of_many(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
@@ -111,6 +129,12 @@ def _expecting(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
         await desk().retire(name, _author(request))
 
     return [listed, expect, retire]
+
+
+def _fault(action: str | None, fault: again.Fault | None) -> tuple[str, again.Fault] | None:
+    if (action is None) != (fault is None):
+        raise BadInput("A fault belongs to an action: give both, or none.")
+    return (action, fault) if action and fault else None
 
 
 def _author(request: _Asking) -> Author:
