@@ -14,6 +14,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unit e2e ros-test soak soak-ros pictures bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 BIN := .venv/bin
+# How many processes share the Python tests; each test file stays with one.
+PROCESSES ?= 2
 ROS := .venv-ros/bin
 NODE := scripts/with-node
 NPM := $(NODE) npm --prefix frontend
@@ -60,7 +62,7 @@ test: check unit ros-test e2e ## every check and every test, also in a real brow
 .PHONY: unit
 unit: setup ## the tests of the server and of the page's pure parts
 	@echo "» pytest"
-	@$(BIN)/pytest -q $(PYTEST)
+	@$(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile $(PYTEST)
 	@echo "» vitest"
 	@$(NPM) run --silent test
 

@@ -28,8 +28,8 @@ export default defineConfig({
   retries: 0,
   forbidOnly: Boolean(process.env.CI),
   timeout: 90_000,
-  expect: { timeout: 10_000 },
-  reporter: [["list"]],
+  expect: { timeout: 15_000 },
+  reporter: [["list"], ["./e2e/failures.ts"]],
   use: {
     ...devices["Desktop Chrome"],
     viewport: { width: 1440, height: 900 },
