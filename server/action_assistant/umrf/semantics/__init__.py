@@ -1,6 +1,7 @@
 """The engine's behaviour as a deterministic step function (SPEC 2)."""
 
-from action_assistant.umrf.semantics.engine import Engine, EngineRefused, GraphNow
+from action_assistant.umrf.semantics.engine import Engine, GraphNow
+from action_assistant.umrf.semantics.graphs import EngineRefused
 from action_assistant.umrf.semantics.script import Behaviour, Script, script_from
 from action_assistant.umrf.semantics.simulate import simulate
 from action_assistant.umrf.semantics.trace import (

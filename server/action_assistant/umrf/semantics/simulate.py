@@ -5,7 +5,8 @@ from typing import Final
 
 from action_assistant.umrf.facts import SIMULATED, EngineFacts
 from action_assistant.umrf.model import Graph, Key
-from action_assistant.umrf.semantics.engine import Engine, EngineRefused
+from action_assistant.umrf.semantics.engine import Engine
+from action_assistant.umrf.semantics.graphs import EngineRefused
 from action_assistant.umrf.semantics.script import Script
 from action_assistant.umrf.semantics.trace import Hazard, Trace
 

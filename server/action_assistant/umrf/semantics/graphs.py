@@ -1,0 +1,312 @@
+"""How graphs live in an engine: built, begun, stopped, paused, resumed, modified (SPEC 2)."""
+
+from collections import deque
+from collections.abc import Mapping
+from functools import partial
+
+from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.model import Graph, Signature
+from action_assistant.umrf.semantics.clock import Task
+from action_assistant.umrf.semantics.core import Core
+from action_assistant.umrf.semantics.matching import fits, has_action
+from action_assistant.umrf.semantics.parts import (
+    Node,
+    Outcome,
+    Running,
+    build,
+    exit_nodes,
+    restructure,
+)
+from action_assistant.umrf.semantics.script import Script
+from action_assistant.umrf.semantics.trace import Hazard, NodeState
+
+
+class EngineRefused(Exception):
+    """The engine throws instead of starting. What happened before comes with the next call."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.message = message
+
+
+class Graphs(Core):
+    """The life of graphs and sub-graphs, one command after the other. `Engine` says when."""
+
+    def __init__(
+        self,
+        facts: EngineFacts,
+        script: Script,
+        library: Mapping[str, Graph],
+        actor: str,
+        signatures: Mapping[str, Signature] | None,
+    ) -> None:
+        super().__init__(facts, script, library, actor)
+        self.signatures = signatures
+        #: Whether commands wait for each other.
+        self.serial = True
+        self._busy = False
+        self._waiting: deque[Task] = deque()
+
+    # Commands, one after the other
+
+    def _command(self, deed: Task) -> None:
+        if self._busy:
+            self._waiting.append(deed)
+        else:
+            deed()
+
+    def _free(self) -> None:
+        """The command that held the engine is done; the next ones may go."""
+        self._busy = False
+        while self._waiting and not self._busy and not self.crashed and not self.locked:
+            try:
+                self._waiting.popleft()()
+            except EngineRefused as e:
+                self._out.append(Hazard(self._t(), "", "refused", "goes on", None, e.message))
+            self._settle()
+
+    # Start
+
+    def _built(self, name: str, graph: Graph, above: Node | None, home: Running | None) -> Running:
+        running = Running(name, graph, above, home)
+        behaviours = {
+            a.key: self.script.calls_of(name, graph.name, a.full_name, a.name)
+            for a in graph.actions
+        }
+        build(running, behaviours)
+        taken = running.own_names()
+        for node in running.nodes.values():
+            known = (self.signatures or {}).get(node.name)
+            if known is not None:
+                for slot in node.inputs.values():
+                    slot.required = slot.name not in known.optional
+                continue
+            sub = self.library.get(node.name)
+            if sub is not None and node.name not in taken and fits(node, sub):
+                node.subgraph = sub
+        return running
+
+    def _resolves(self, graph: Running) -> bool:
+        """Whether the engine has every action that it shall run itself."""
+        if self.signatures is None:
+            return True
+        own = {"", self.actor}
+        return all(
+            node.subgraph is not None
+            or node.actor not in own
+            or has_action(node, self.signatures.get(node.name))
+            for node in graph.nodes.values()
+        )
+
+    def _refuse_unmatched(self, graph: Running) -> None:
+        """A graph that the engine holds already is not matched again: it loses its sub-graphs."""
+        lost = [node for node in graph.nodes.values() if node.subgraph is not None]
+        if self.facts.restart_matches or not lost:
+            return
+        self.graphs[graph.name] = graph
+        failed = [NodeState(self._t(), "", node.full_name, "ERROR") for node in lost]
+        self._out += failed
+        self._graph_state(graph, "UNINITIALIZED")
+        self._out += failed
+        message = (
+            "Started again by its JSON, the graph loses its sub-graphs, and a broken one stays."
+        )
+        self._hazard(graph, "H6", "goes on", message, lost[0])
+        raise EngineRefused("map::at")
+
+    def _clear(self, old: Running) -> None:
+        self._graph_state(old, "CLEARING")
+        self._graph_state(old, "UNINITIALIZED")
+
+    def _replace(self, old: Running, new: Running) -> None:
+        """Starts a graph again although actions of the finished one still run."""
+        self._graph_state(old, "CLEARING")
+        stragglers = [node for node in old.nodes.values() if node.active]
+        self._busy = True
+        for node in stragglers:
+            if node.state != "STOPPING":
+                self._stop_node(old, node)
+
+        def then() -> None:
+            self._graph_state(old, "UNINITIALIZED")
+            try:
+                self._begin_graph(new)
+            except EngineRefused:
+                return
+            finally:
+                self._free()
+
+        self._wait(stragglers, self.facts.stop_poll_ms, then)
+
+    def _begin_graph(self, graph: Running) -> None:
+        self.graphs[graph.name] = graph
+        self._graph_state(graph, "UNINITIALIZED")
+        if len(graph.nodes) < sum(not action.missing for action in graph.graph.actions):
+            message = "Two actions have one full name: the engine throws and keeps a broken graph."
+            self._hazard(graph, "H6", "goes on", message)
+            raise EngineRefused("map::at")
+        named = {node.actor for node in graph.nodes.values() if node.actor}
+        remote = named - {self.actor} if self.actor or len(named) > 1 else set()
+        if remote and not self.facts.synchronises:
+            raise EngineRefused(
+                f"Cannot execute UMRF graph '{graph.name}': actor synchronizer not initialized."
+            )
+        if self._lacks_inputs(graph):
+            return
+        self._graph_state(graph, "RUNNING")
+        self._inform(graph, graph.entry, "on_true")
+
+    def _lacks_inputs(self, graph: Running) -> bool:
+        """The silent refusal: an entry action without a required value."""
+        from_outside = {name: slot.value for name, slot in graph.entry.outputs.items()}
+        for edge in graph.entry.children:
+            if edge.child is None:
+                continue
+            renamed = {r.source: r.target for r in edge.remap}
+            given = {renamed.get(name, name) for name in from_outside}
+            for slot in edge.child.inputs.values():
+                if slot.required and not slot.has_value() and slot.name not in given:
+                    message = (
+                        f"The input “{slot.name}” has no value: the graph silently never starts."
+                    )
+                    self._hazard(graph, "H7", "goes on", message, edge.child)
+                    return True
+        return False
+
+    # Stop, pause, resume
+
+    def _stop_graph(self, graph: Running) -> None:
+        if graph.state == "STOPPING" and not self.serial:
+            message = "A second stop reaches a graph that is stopping: the engine aborts."
+            self._crash(graph, "H4", message)
+            return
+        if graph.state not in ("RUNNING", "PAUSED", "HALTED"):
+            return
+        self._graph_state(graph, "STOPPING")
+        nodes = [node for node in graph.nodes.values() if node.active]
+        graph.stop_failed = False
+        for node in nodes:
+            if node.state != "STOPPING":
+                self._stop_node(graph, node)
+                if self.crashed:
+                    return
+        if not nodes:
+            self._graph_stopped(graph)
+            return
+        hold = self.serial and graph.home is None
+        self._busy = self._busy or hold
+
+        def then() -> None:
+            self._graph_stopped(graph)
+            if hold:
+                self._free()
+
+        self._wait(nodes, self.facts.stop_poll_ms, then)
+
+    def _graph_stopped(self, graph: Running) -> None:
+        graph.result = "on_error" if graph.stop_failed else "on_stopped"
+        self._graph_state(graph, "ERROR" if graph.stop_failed else "STOPPED")
+        result: Outcome = "on_error" if graph.stop_failed else "on_stopped"
+        self._soon(partial(self._sub_ended, graph, result))
+
+    def _pause_graph(self, graph: Running, then: Task | None = None) -> None:
+        if graph.state != "RUNNING":
+            return
+        nodes = [node for node in graph.nodes.values() if node.state == "RUNNING"]
+        unpaused = [node for node in nodes if not self._pause_node(graph, node)]
+        if unpaused:
+            message = "The pause never completes: the engine answers no command any more."
+            self._lock(graph, "H5", message, unpaused[0])
+            return
+        if not nodes:
+            self._graph_state(graph, "PAUSED")
+            if then is not None:
+                then()
+            return
+        self._busy = graph.pausing = True
+
+        def paused_now() -> None:
+            graph.pausing = False
+            if graph.state == "RUNNING":
+                self._graph_state(graph, "PAUSED")
+            if then is not None:
+                then()
+            self._free()
+
+        self._at(self.now + self.facts.pause_poll_ms, paused_now)
+
+    def _resume_graph(self, graph: Running, continue_from: str = "") -> None:
+        if graph.state not in ("PAUSED", "HALTED"):
+            return
+        graph.stuck = False
+        graph.result = None
+        self._graph_state(graph, "RUNNING")
+        for node in list(graph.nodes.values()):
+            if node.state != "PAUSED":
+                continue
+            self._state(graph, node, "RUNNING")
+            if node.pending is not None:
+                result, node.pending = node.pending, None
+                self._soon(partial(self._ended, graph, node, result))
+            elif node.rest_ms is not None:
+                self._let_run(graph, node, node.rest_ms)
+                node.rest_ms = None
+        if node_to_run := graph.nodes.get(continue_from):
+            self._run(graph, node_to_run)
+
+    def _modify_graph(self, old: Running, new: Graph, continue_from: str) -> None:
+        if old.state not in ("RUNNING", "PAUSED", "HALTED"):
+            raise EngineRefused(
+                f"Cannot modify graph '{old.name}' because it is not in PAUSED state. "
+                f"Current state: '{old.state}'"
+            )
+        kept = {action.full_name for action in new.actions if not action.missing}
+        lost = next((n for n in old.nodes.values() if n.active and n.full_name not in kept), None)
+
+        def then() -> None:
+            if lost is None:
+                restructure(old, self._built(old.name, new, None, None))
+                self._resume_graph(old, continue_from)
+
+        if old.state == "RUNNING":
+            self._pause_graph(old, then)
+        else:
+            then()
+        if lost is not None:
+            raise EngineRefused(
+                f"Cannot modify graph '{old.name}': Action '{lost.full_name}' cannot be deleted, "
+                f"because it is in an active state ({lost.state})"
+            )
+
+    # Sub-graphs
+
+    def _start_sub(self, graph: Running, node: Node, sub: Graph) -> None:
+        name = f"{graph.name}__{node.name}__{node.instance_id}"
+        if old := self.graphs.get(name):
+            self._clear(old)
+        running = self._built(name, sub, node, graph)
+        node.sub = running
+        running.entry.outputs = dict(node.inputs)
+        if running.has_ghost_ends:
+            self._ended(graph, node, "on_error")
+            return
+        try:
+            self._begin_graph(running)
+        except EngineRefused:
+            self._ended(graph, node, "on_error")
+
+    def _stop_sub(self, node: Node) -> None:
+        if node.sub is not None:
+            self._stop_graph(node.sub)
+
+    def _sub_ended(self, graph: Running, result: Outcome) -> None:
+        above, home = graph.above, graph.home
+        if above is None or home is None or above.sub is not graph:
+            return
+        for node in exit_nodes(graph):
+            for name, slot in node.outputs.items():
+                if target := above.outputs.get(name):
+                    target.receive(slot.type, slot.value)
+        above.sub = None
+        if above.state in ("RUNNING", "STOPPING", "PAUSED", "PAUSE_REQUESTED"):
+            self._ended(home, above, result)
