@@ -10,6 +10,8 @@ export interface Progress {
   since: number | null;
   /** How long the last visit took, ms; null when none ended. */
   took: number | null;
+  /** How long it took at most, ms, where its ends were not seen exactly; null where they were. */
+  atMost: number | null;
   visits: number;
   inferred: boolean;
   message: string | null;
@@ -48,7 +50,7 @@ function stateOf(action: ActionRun, over: boolean, unsure: boolean): { tone: Ton
   const last = action.visits.at(-1);
   switch (action.state) {
     case "RUNNING":
-      if (over) return finished(last);
+      if (over) return { tone: "unknown", word: "end not seen" };
       return unsure ? { tone: "unknown", word: "unknown" } : { tone: "run", word: "running" };
     case "PAUSE_REQUESTED":
       return { tone: "run", word: "pausing" };
@@ -68,6 +70,16 @@ function stateOf(action: ActionRun, over: boolean, unsure: boolean): { tone: Ton
   }
 }
 
+const NOTABLE = 200; // ms that make a difference to a person
+
+/** How long a visit took at most; null where its ends are known well enough. */
+export function atMost(visit: Visit): number | null {
+  const [from, until] = [time(visit.from), time(visit.until)];
+  const [before, after] = [time(visit.not_before), time(visit.not_after)];
+  if (from === null || until === null || before === null || after === null) return null;
+  return after - before - (until - from) >= NOTABLE ? after - before : null;
+}
+
 /** `unsure`: nobody has heard of the run for too long. */
 export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progress {
   const over = run.ended_at !== null;
@@ -80,6 +92,7 @@ export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progre
     word,
     since: until === null && !over ? from : null,
     took: from !== null && until !== null ? until - from : null,
+    atMost: last ? atMost(last) : null,
     visits: action.visits.length,
     inferred: last?.how === "inferred",
     message: action.messages.at(-1)?.text ?? null,

@@ -51,8 +51,19 @@ export interface RunMarks {
   labels: string[];
 }
 
-/** A run of the list, with what people noted about it. */
-export type ListedRun = Run & Partial<RunMarks>;
+/** A run of the list, with what people noted about it and why it did not end well. */
+export type ListedRun = Run & Partial<RunMarks> & { cause?: string };
+
+/** What is proven to be behind the end of a run, and where that shows. */
+export interface Cause {
+  kind: string;
+  text: string;
+  at: string;
+  seq: number;
+  action: string | null;
+  aid: string | null;
+  quote: string;
+}
 
 export interface Field {
   field: string;
@@ -195,6 +206,26 @@ export function useFilm(runner: string | undefined, run: string, after: number, 
       ask<Film>(`${runner}${path(run)}/film?after=${after}`, { signal, patience: 60_000 }),
     enabled: asked && runner !== undefined,
   });
+}
+
+/** Asked again when the run changes its state. */
+export function useCauses(runner: string | undefined, run: Run) {
+  return useQuery({
+    queryKey: ["runs", "causes", run.id, run.state, run.alarms.length],
+    queryFn: ({ signal }) => ask<Cause[]>(`${runner}${path(run.id)}/causes`, { signal }),
+    enabled: runner !== undefined && wentWrong(run),
+  });
+}
+
+/** Whether there is something to explain. */
+export function wentWrong(run: Run): boolean {
+  if (run.state === "finished") return run.result !== null && run.result !== "on_true";
+  return run.ended_at !== null || run.state === "unknown" || run.alarms.length > 0;
+}
+
+/** Takes in the recorded runs that the product brings along; their ids. */
+export function takeInExamples(runner: string): Promise<string[]> {
+  return ask(`${runner}/api/examples`, { method: "POST", body: {} });
 }
 
 export function useMarks(runner: string | undefined, run: string) {

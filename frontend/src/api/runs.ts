@@ -73,6 +73,15 @@ export interface Run {
   umrf?: unknown;
   /** Values of actions as they were sent: action, parameter, JSON text as in `inputs`. */
   sent?: Record<string, Record<string, string>>;
+  /** Problems that somebody started in spite of, and why. */
+  override?: { codes: string[]; reason: string } | null;
+  despite?: { code: string; text?: string; aid?: string | null }[];
+}
+
+/** Where it ran, in a few words. */
+export function placeOf(run: Run): string {
+  if (!run.simulated) return run.engine;
+  return run.engine === "simulator" ? "simulator" : `${run.engine} (simulated)`;
 }
 
 const ENDED: ReadonlySet<RunState> = new Set<RunState>([

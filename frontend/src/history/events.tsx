@@ -3,9 +3,9 @@
 import { TextInput } from "@mantine/core";
 import { useMemo, useState } from "react";
 import { authorName } from "../api/graphs";
-import { begun, ended, endWords, type Tone } from "../api/progress";
+import { atMost, begun, ended, endWords, type Tone } from "../api/progress";
 import type { FilmMark } from "../api/review";
-import type { Run } from "../api/runs";
+import { placeOf, type Run } from "../api/runs";
 import { toneColor } from "../ui/state-word";
 import { clock, instant } from "../ui/when";
 import style from "./events.module.css";
@@ -21,6 +21,11 @@ interface Happening {
 
 function spaced(fullName: string): string {
   return fullName.replace(/_(\d+)$/, " $1");
+}
+
+/** Seconds after the start. */
+function after(start: number, at: number): string {
+  return `+${((at - start) / 1000).toFixed(1)}`;
 }
 
 /** Marks that say what neither the visits nor the run's own fields say. */
@@ -42,7 +47,7 @@ export function happenings(
   const all: Happening[] = [];
   const start = instant(run.started_at);
   if (start !== null) {
-    const where = run.simulated ? "in the simulator" : `on ${run.engine}`;
+    const where = run.engine === "simulator" ? "in the simulator" : `on ${placeOf(run)}`;
     const text = `${authorName(run.author)} started ${version} ${where}`;
     all.push({ at: start, tone: "idle", name: null, aid: null, text });
   }
@@ -56,8 +61,11 @@ export function happenings(
       if (until !== null) {
         const result = visit.result?.replace(/^on_/, "") ?? null;
         const tone = (result ?? "done") as Tone;
+        const last = atMost(visit) === null ? null : instant(visit.not_after);
         const seen = visit.how === "inferred" ? " (inferred)" : "";
-        all.push({ at: until, tone, ...who, text: (result ?? "finished") + seen });
+        const since =
+          last === null || start === null ? "" : ` (last seen at ${after(start, until)})`;
+        all.push({ at: last ?? until, tone, ...who, text: (result ?? "finished") + seen + since });
       }
     });
     for (const message of action.messages) {
@@ -130,7 +138,7 @@ function Line(
         title="Show this moment"
       >
         <time dateTime={new Date(event.at).toISOString()}>
-          {first ? clock(event.at) : `+${((event.at - start) / 1000).toFixed(1)}`}
+          {first ? clock(event.at) : after(start, event.at)}
         </time>
       </button>
       <span>

@@ -1,7 +1,7 @@
 /** What a run was, in a table. */
 
 import { endWords } from "../api/progress";
-import type { Run } from "../api/runs";
+import { placeOf, type Run } from "../api/runs";
 import { clock, day, duration, instant, useNow } from "../ui/when";
 import style from "./facts.module.css";
 
@@ -20,7 +20,7 @@ export function Facts({ run, version, by }: Props) {
     ["Graph", run.graph_name],
     ["Version", version],
     ["Digest", run.digest],
-    ["Engine", run.simulated ? "simulator" : run.engine],
+    ["Engine", placeOf(run)],
     ["Started by", by],
     ["Started", moment(start)],
     ["Ended", moment(end)],
@@ -30,11 +30,13 @@ export function Facts({ run, version, by }: Props) {
     ["Why", run.detail || "—"],
     ["Recorded", run.recorded ? "all of it" : "NOT all of it: the journal could not be written"],
     ["Last proof", moment(instant(run.proof_at))],
+    ...(run.despite ?? []).map(({ code, text }): [string, string] => ["In spite of", text ?? code]),
+    ...(run.override ? [["Because", `“${run.override.reason}”`] as [string, string]] : []),
   ];
   return (
     <dl className={style.facts}>
       {rows.map(([name, value]) => (
-        <div key={name}>
+        <div key={`${name} ${value}`}>
           <dt>{name}</dt>
           <dd className={name === "Digest" ? style.mono : undefined}>{value}</dd>
         </div>

@@ -15,6 +15,7 @@ import { useLocation } from "wouter";
 import { askText, sentence } from "../api/http";
 import { expectRun, exportUrl, type Fault, scriptOf, umrfUrl } from "../api/review";
 import { type Run, startRun } from "../api/runs";
+import style from "./run-page.module.css";
 
 const FAULTS: { value: Fault; label: string }[] = [
   { value: "error", label: "It ends in error" },
@@ -168,8 +169,10 @@ export function RunMenu({ runner, run }: Props) {
             variant="default"
             leftSection={<IconRepeat size={15} aria-hidden />}
             rightSection={<IconChevronDown size={14} aria-hidden />}
+            className={style.again ?? ""}
+            aria-label="Again"
           >
-            Again
+            <span className={style.word}>Again</span>
           </Button>
         </Menu.Target>
         <Menu.Dropdown>

@@ -18,6 +18,7 @@ import { StateWord } from "../ui/state-word";
 import { Timeline } from "../ui/timeline";
 import type { Crumb } from "../ui/top-bar";
 import { clock, instant, useNow } from "../ui/when";
+import { Causes } from "./causes";
 import { Events } from "./events";
 import { Facts } from "./facts";
 import { gapsOf, signsOf } from "./film-signs";
@@ -98,6 +99,10 @@ function Shown({ run: newest, bar }: { run: Run; bar: Props["bar"] }) {
   const signs = useMemo(() => signsOf(film), [film]);
   const gaps = useMemo(() => gapsOf(film, newest, until), [film, newest, until]);
   const label = useVersionLabel(newest);
+  const show = (at: number, aid: string | null) => {
+    replay.seek(at);
+    if (aid !== null) setSelected(aid);
+  };
   const { tone, word } = runWord(run);
   const since = `unknown since ${clock(live.since)}`;
   const seen = unsure && !past;
@@ -136,6 +141,7 @@ function Shown({ run: newest, bar }: { run: Run; bar: Props["bar"] }) {
         ),
       })}
       <main className={style.page}>
+        <Causes runner={runner} run={newest} onShow={show} />
         <section className={style.canvas} aria-label="Graph of the run">
           <ReactFlowProvider>
             <GraphView

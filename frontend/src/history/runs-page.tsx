@@ -1,5 +1,6 @@
 /** What ran: newest first, with who, when, how long and how it ended. */
 import { Button, Checkbox, Skeleton } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
 import {
   IconAlertTriangle,
   IconArrowsDiff,
@@ -8,14 +9,21 @@ import {
   IconPinFilled,
   IconSearch,
 } from "@tabler/icons-react";
-import { useInfiniteQuery } from "@tanstack/react-query";
+import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
 import { sentence } from "../api/http";
 import { endWords, runWord } from "../api/progress";
-import { filterOf, type ListedRun, listRuns, queryOf, type RunFilter } from "../api/review";
-import { hasEnded, type Run } from "../api/runs";
+import {
+  filterOf,
+  type ListedRun,
+  listRuns,
+  queryOf,
+  type RunFilter,
+  takeInExamples,
+} from "../api/review";
+import { hasEnded, placeOf, type Run } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { Empty } from "../ui/empty";
 import { StateWord } from "../ui/state-word";
@@ -86,11 +94,12 @@ function Row({ run, now, chosen, onChoose }: RowProps) {
             {each}
           </span>
         ))}
+        {run.cause && <span className={style.cause}>{run.cause}</span>}
       </td>
       <td>
         <span className={style.version}>{label}</span>
       </td>
-      <td className={style.quiet}>{run.simulated ? "simulator" : run.engine}</td>
+      <td className={style.quiet}>{placeOf(run)}</td>
       <td>{authorName(run.author)}</td>
       <td className={style.quiet}>{start !== null && `${day(start, now)} ${clock(start)}`}</td>
       <td className={style.took}>{took}</td>
@@ -159,6 +168,26 @@ function Waiting() {
         <Skeleton key={i} height={40} mb={6} />
       ))}
     </div>
+  );
+}
+
+/** Recorded runs that failed: how this page finds out why can be seen without a robot. */
+function BringExamples({ runner, onDone }: { runner: string | undefined; onDone: () => void }) {
+  const bring = useMutation({
+    mutationFn: () => takeInExamples(runner ?? ""),
+    onSuccess: onDone,
+    onError: (error) =>
+      notifications.show({ color: "red", title: "Not taken in", message: sentence(error) }),
+  });
+  return (
+    <Button
+      variant="default"
+      disabled={runner === undefined}
+      loading={bring.isPending}
+      onClick={() => bring.mutate()}
+    >
+      Show five recorded runs that failed
+    </Button>
   );
 }
 
@@ -232,7 +261,11 @@ export function RunsPage() {
           </Empty>
         )}
         {listed.isSuccess && runs.length === 0 && !filtered && waiting === 0 && (
-          <Empty icon={<IconHistory size={22} />} title="Nothing ran yet">
+          <Empty
+            icon={<IconHistory size={22} />}
+            title="Nothing ran yet"
+            action={<BringExamples runner={runner} onDone={() => void listed.refetch()} />}
+          >
             Open a graph and hold <b>Start</b>. Every run is kept here, with its exact version and
             what each action did.
           </Empty>

@@ -1,11 +1,12 @@
 /** Lanes of a run over time: one for each action, with what is not known left hatched. */
-import type { PointerEvent } from "react";
+import { Fragment, type PointerEvent } from "react";
 import { begun, ended, progressOf, type Tone } from "../api/progress";
 import type { Run, Visit } from "../api/runs";
 import type { Lane } from "./lanes";
 import { robotColor } from "./robot";
 import { StateWord, toneColor } from "./state-word";
 import style from "./timeline.module.css";
+import { moreOf } from "./took";
 import { duration, instant } from "./when";
 
 interface Props {
@@ -42,6 +43,8 @@ interface Bar {
   width: number;
   tone: Tone;
   open: boolean;
+  /** Where it may have gone on as well: nobody saw its ends. */
+  maybe: { left: number; width: number } | null;
 }
 
 function barOf(
@@ -60,7 +63,16 @@ function barOf(
     result === "true" || result === "false" || result === "error" || result === "stopped";
   const tone: Tone = known ? result : open && !over ? "run" : open ? "unknown" : "done";
   const at = (t: number) => Math.min(100, Math.max(0, ((t - start) / span) * 100));
-  return { left: at(from), width: Math.max(0.4, at(to) - at(from)), tone, open: open && !over };
+  const earliest = instant(visit.not_before) ?? from;
+  const latest = open ? to : (instant(visit.not_after) ?? to);
+  const wider = at(latest) - at(earliest) - (at(to) - at(from)) > 0.5;
+  return {
+    left: at(from),
+    width: Math.max(0.4, at(to) - at(from)),
+    tone,
+    open: open && !over,
+    maybe: wider ? { left: at(earliest), width: at(latest) - at(earliest) } : null,
+  };
 }
 
 function Ticks({ span }: { span: number }) {
@@ -169,27 +181,35 @@ export function Timeline(props: Props) {
                   const bar = barOf(visit, start, span, end, over);
                   if (!bar) return null;
                   return (
-                    <i
-                      // biome-ignore lint/suspicious/noArrayIndexKey: visits only ever grow
-                      key={i}
-                      data-tone={unsure && bar.open ? "unknown" : bar.tone}
-                      data-inferred={visit.how === "inferred" || undefined}
-                      style={{
-                        left: `${bar.left}%`,
-                        width: `${bar.width}%`,
-                        color: toneColor[bar.tone],
-                      }}
-                    />
+                    // biome-ignore lint/suspicious/noArrayIndexKey: visits only ever grow
+                    <Fragment key={i}>
+                      {bar.maybe && (
+                        <i
+                          className={style.maybe}
+                          title="Seen at one moment only: it may have gone on for this long"
+                          style={{
+                            left: `${bar.maybe.left}%`,
+                            width: `${bar.maybe.width}%`,
+                            color: toneColor[bar.tone],
+                          }}
+                        />
+                      )}
+                      <i
+                        data-tone={unsure && bar.open ? "unknown" : bar.tone}
+                        data-inferred={visit.how === "inferred" || undefined}
+                        style={{
+                          left: `${bar.left}%`,
+                          width: `${bar.width}%`,
+                          color: toneColor[bar.tone],
+                        }}
+                      />
+                    </Fragment>
                   );
                 })}
               </div>
               <span className={style.state}>
                 {progress && (
-                  <StateWord
-                    tone={progress.tone}
-                    word={progress.word}
-                    {...(progress.took === null ? {} : { more: duration(progress.took) })}
-                  />
+                  <StateWord tone={progress.tone} word={progress.word} {...moreOf(progress)} />
                 )}
               </span>
             </li>

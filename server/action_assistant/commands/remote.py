@@ -35,8 +35,17 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     runs.add_argument("--graph", metavar="GRAPH", help="id or name")
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(deed=_runs)
+    more = runs.add_subparsers(metavar="verify | examples")
+    brought = command(
+        more,
+        "examples",
+        "take in recorded runs that failed, to see how causes are found; each is there once",
+        "",
+        of="runs",
+    )
+    brought.set_defaults(deed=_examples)
     again = command(
-        runs.add_subparsers(metavar="verify"),
+        more,
         "verify",
         "simulate every expected course again, with the graph as it was and as it is now; exit 1 if "
         "any goes another way",
@@ -117,6 +126,16 @@ def _verify(options: argparse.Namespace) -> int:
     from action_assistant.commands.expected import verify  # slow to load
 
     return verify(options)
+
+
+def _examples(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        try:
+            taken = server.runner("POST", "/api/examples").json()
+        except No as error:
+            return refused(error)
+    print(f"{len(taken)} examples are there, with the label “example”.")
+    return 0
 
 
 def _runs(options: argparse.Namespace) -> int:

@@ -261,7 +261,13 @@ def _listed(opened: OpenRun | None, row: Row[Any], labels: list[str]) -> shapes.
         found = shapes.summary_of_row(row)
     else:
         found = shapes.summary(opened.run, recorded=opened.recorder.recorded)
-    return shapes.listed(found, pinned=bool(row.pinned), note=row.note or "", labels=labels)
+    return shapes.listed(
+        found,
+        cause=row.summary.get("cause", ""),
+        pinned=bool(row.pinned),
+        note=row.note or "",
+        labels=labels,
+    )
 
 
 async def _labels(house: House, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:

@@ -51,6 +51,7 @@ def booked(
         umrf=umrf,
         script=admitted.script_text,
         override=asked.override,
+        despite=cleared.despite,
         group=group,
         like=asked.like,
     )

@@ -204,8 +204,7 @@ class Control:
         stops: int,
         group: str | None = None,
     ) -> Run:
-        self._number += 1
-        number = self._number
+        number = self.next_number()
         at = self._wall()
         requested, order = await self._aside(
             lambda: booked(asked, cleared, author, at=at, number=number, group=group)
@@ -218,6 +217,11 @@ class Control:
             self._tasks.start_soon(self._drive, opened, order, cleared.incarnation)
         await opened.published.wait()
         return opened.run
+
+    def next_number(self) -> int:
+        """A number for one more run."""
+        self._number += 1
+        return self._number
 
     def _opened(self, run: Run, link: Link, *, own: bool, seq: int) -> OpenRun:
         opened = OpenRun(

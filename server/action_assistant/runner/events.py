@@ -29,6 +29,16 @@ class Override(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     reason: str
 
 
+class Overridden(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """A problem that stood in the way of a start, as the look before it told it. `aid` and `path`
+    are its place in the graph that was sent."""
+
+    code: str
+    text: str
+    aid: str | None = None
+    path: str = ""
+
+
 class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Somebody asked for a start and nothing stood in its way. Stored before anything is sent."""
 
@@ -49,6 +59,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     umrf: str  # as sent
     script: str = ""  # JSON text
     override: Override | None = None
+    despite: tuple[Overridden, ...] = ()  # what was overridden
     group: str | None = None  # shared by runs that one request has started together
     like: str | None = None  # the robot whose engine the simulator played
 

@@ -19,6 +19,7 @@ from action_assistant.runner.events import (
     EngineSaid,
     ModifyRequested,
     Observed,
+    Overridden,
     Override,
     PauseRequested,
     Proof,
@@ -103,6 +104,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     simulated: bool
     requested_at: int
     override: Override | None = None
+    despite: tuple[Overridden, ...] = ()
     group: str | None = None
     like: str | None = None
     desired: Desired = "running"
@@ -184,6 +186,7 @@ def begin(event: Requested) -> Run:
         simulated=event.simulated,
         requested_at=event.at,
         override=event.override,
+        despite=event.despite,
         group=event.group,
         like=event.like,
         actions={name: ActionRun(aid=aid) for name, aid in event.actions.items()},

@@ -6,7 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row
 
-from action_assistant.runner.events import Author, Override
+from action_assistant.runner.events import Author, Overridden, Override
 from action_assistant.runner.parameters import sent
 from action_assistant.runner.runs import Desired, Run, State
 from action_assistant.runner.visits import ActionRun, How, Outcome, Visit
@@ -84,8 +84,10 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Listed(Summary, frozen=True, kw_only=True):
-    """A run of the list, with what people noted about it."""
+    """A run of the list, with what people noted about it, and in one sentence why it did not end
+    well, as far as that is recorded."""
 
+    cause: str
     pinned: bool
     note: str
     labels: list[str]
@@ -105,6 +107,7 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
     umrf: msgspec.Raw
     override: Override | None
     sent: dict[str, dict[str, str]]
+    despite: list[Overridden]
 
 
 def time(us: int) -> datetime:
@@ -133,6 +136,7 @@ def whole(run: Run, umrf: str, *, recorded: bool = True) -> RunWhole:
         log=_log(run, len(run.log)),
         umrf=raw,
         override=run.override,
+        despite=list(run.despite),
         sent=sent(umrf),
     )
 
@@ -169,10 +173,10 @@ def summary_of_row(row: Row[Any]) -> Summary:
     )
 
 
-def listed(found: Summary, *, pinned: bool, note: str, labels: list[str]) -> Listed:
+def listed(found: Summary, *, cause: str, pinned: bool, note: str, labels: list[str]) -> Listed:
     """A summary with its marks."""
     fields = {name: getattr(found, name) for name in Summary.__struct_fields__}
-    return Listed(**fields, pinned=pinned, note=note, labels=labels)
+    return Listed(**fields, cause=cause, pinned=pinned, note=note, labels=labels)
 
 
 def _fields(run: Run, recorded: bool) -> dict[str, Any]:

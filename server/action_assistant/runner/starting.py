@@ -11,7 +11,7 @@ from action_assistant.runner import preflight
 from action_assistant.runner.admission import SIMULATOR, Admitted, StartRequest, admit, decoded
 from action_assistant.runner.driving import Clock
 from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.events import Override
+from action_assistant.runner.events import Overridden, Override
 from action_assistant.runner.history import Aside
 from action_assistant.runner.links.port import Answer, Link, NoAnswer
 from action_assistant.runner.links.simulator import SimulatorLink
@@ -23,6 +23,7 @@ from action_assistant.umrf.semantics import Engine
 
 _PREFLIGHT_S: Final = 2.0
 _MOST: Final = 20  # engines of one group
+_TOLD: Final = 40  # overridden problems that are kept with a run
 
 _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 
@@ -63,12 +64,14 @@ def read_group(body: bytes) -> GroupRequest:
 
 
 class Cleared(msgspec.Struct, frozen=True, kw_only=True):
-    """Nothing stands in the way: what will be sent, where, and to which life of the engine."""
+    """Nothing stands in the way: what will be sent, where, to which life of the engine, and which
+    problems somebody answers for."""
 
     admitted: Admitted
     link: Link
     own: bool
     incarnation: str
+    despite: tuple[Overridden, ...] = ()
 
 
 class Starting:
@@ -98,7 +101,13 @@ class Starting:
             engine = Engine(facts=facts, script=admitted.script)
             link = SimulatorLink(engine, wall=self._wall)
             incarnation = (await link.get()).incarnation
-            return Cleared(admitted=admitted, link=link, own=True, incarnation=incarnation)
+            return Cleared(
+                admitted=admitted,
+                link=link,
+                own=True,
+                incarnation=incarnation,
+                despite=_despite(admitted, ()),
+            )
         robot = self._robots.reachable(asked.engine)
         if asked.like is not None:
             raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
@@ -120,7 +129,11 @@ class Starting:
         items = await self._aside(lambda: preflight.of_robot(sight, admitted.graph))
         preflight.check_items(items, asked.override.codes if asked.override else ())
         return Cleared(
-            admitted=admitted, link=robot, own=False, incarnation=sight.answer.incarnation
+            admitted=admitted,
+            link=robot,
+            own=False,
+            incarnation=sight.answer.incarnation,
+            despite=_despite(admitted, items),
         )
 
     async def all_cleared(self, starts: Sequence[StartRequest]) -> list[Cleared]:
@@ -206,3 +219,20 @@ class Starting:
             return SIMULATED
         facts = facts_of(self._robots.registration(asked.like).profile)
         return msgspec.structs.replace(facts, simulated=True)
+
+
+def _despite(admitted: Admitted, items: Sequence[Item]) -> tuple[Overridden, ...]:
+    """What somebody overrides: of the graph, and of the robot that has answered."""
+    found = [each for each in admitted.problems if each.severity == "error"]
+    told: list[Overridden] = []
+    for item in items:
+        if item.verdict != "blocked":
+            continue
+        found += item.problems
+        if not item.problems:
+            told.append(Overridden(code=item.code, text=item.text))
+    told += [
+        Overridden(code=each.code, text=each.message, aid=each.where.aid, path=each.where.path)
+        for each in found
+    ]
+    return tuple(told[:_TOLD])

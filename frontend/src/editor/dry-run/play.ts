@@ -67,6 +67,7 @@ function progressOf(visit: Visit, over: boolean): Progress {
     word,
     since: null,
     took: visit.took,
+    atMost: null,
     visits: visit.visits,
     inferred: false,
     message: visit.message,

@@ -8,7 +8,7 @@ import { cardLines, lineText } from "../../ui/canvas/value-text";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
 import { robotColor } from "../../ui/robot";
 import { StateWord } from "../../ui/state-word";
-import { duration } from "../../ui/when";
+import { moreOf } from "../../ui/took";
 import style from "./outline.module.css";
 import { deedsOf, type RowDeed } from "./row-deeds";
 import { type Change, RowEdit } from "./row-edit";
@@ -66,11 +66,7 @@ function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">
             </b>
             <Talk of={action.key} />
             {progress && (
-              <StateWord
-                tone={progress.tone}
-                word={progress.word}
-                {...(progress.took === null ? {} : { more: duration(progress.took) })}
-              />
+              <StateWord tone={progress.tone} word={progress.word} {...moreOf(progress)} />
             )}
           </span>
           <span className={style.sub}>

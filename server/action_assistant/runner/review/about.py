@@ -9,14 +9,17 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, ClassVar, Final
 
 import msgspec
-from sqlalchemy import Executable, delete, insert
+from sqlalchemy import Executable, delete, func, insert, update
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.tables import action_sum, review, run_label
+from action_assistant.journal.tables import run as runs
 from action_assistant.runner.events import Author
+from action_assistant.runner.review.cause import causes, words
 from action_assistant.runner.runs import Run
 from action_assistant.runner.visits import ActionRun
+from action_assistant.umrf.model import Graph
 
 _PREFIX: Final = "about/"
 _WORDS: Final = 8_000  # characters of messages that a search looks through
@@ -62,6 +65,7 @@ class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
     at: int
     actions: dict[str, ActionSum]
     words: str = ""
+    cause: str = ""
 
 
 def stream_about(run: str) -> str:
@@ -80,15 +84,17 @@ def draft(event: Marked | SummedUp) -> Draft:
     return Draft(event.kind, author, msgspec.json.encode(event))
 
 
-def sum_of(run: Run, at: int) -> SummedUp:
-    """What a run adds up to."""
+def sum_of(run: Run, graph: Graph | None, at: int) -> SummedUp:
+    """What a run of a graph adds up to."""
+    found = causes(run, graph)[:1]
+    cause = words(found[0], run) if found else ""
     said = itertools.chain(
-        [run.detail],
+        [cause, run.detail],
         (alarm.text for alarm in run.alarms),
         (message.text for action in run.actions.values() for message in action.messages),
     )
-    words = "\n".join(dict.fromkeys(text for text in said if text))[:_WORDS]
-    return SummedUp(at, {name: _sum(each) for name, each in run.actions.items()}, words)
+    told = "\n".join(dict.fromkeys(text for text in said if text))[:_WORDS]
+    return SummedUp(at, {name: _sum(each) for name, each in run.actions.items()}, told, cause)
 
 
 def _sum(action: ActionRun) -> ActionSum:
@@ -147,6 +153,7 @@ def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
     ]
     return [
         _review(run, {"words": summed.words, "summed": True}),
+        *_told(run, summed.cause),
         delete(action_sum).where(action_sum.c.run == run),
         *(insert(action_sum).values(rows[i : i + 100]) for i in range(0, len(rows), 100)),
     ]
@@ -156,3 +163,11 @@ def _review(run: str, fields: Mapping[str, object]) -> Executable:
     blank: dict[str, object] = {"pinned": False, "note": "", "words": "", "summed": False}
     statement = upsert(review).values(run=run, **{**blank, **fields})
     return statement.on_conflict_do_update(index_elements=["run"], set_=dict(fields))
+
+
+def _told(run: str, cause: str) -> Sequence[Executable]:
+    """The sentence that the list shows."""
+    if not cause:
+        return ()
+    told = func.json_set(runs.c.summary, "$.cause", cause)
+    return (update(runs).where(runs.c.id == run).values(summary=told),)

@@ -1,7 +1,8 @@
 """Where runs are looked back on: sums up what has ended, keeps marks, compares, exports, expects."""
 
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
+from datetime import datetime
 from typing import Any, Final, Literal, TypeAlias
 
 import anyio
@@ -11,12 +12,14 @@ from sqlalchemy import Row, select
 from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refused
 from action_assistant.journal.events import Draft
 from action_assistant.journal.tables import expectation, review, run, run_label
+from action_assistant.runner import recorded_runs, shapes
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.events import Author
 from action_assistant.runner.history import Aside
 from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.review import about, again, exports, statistics
+from action_assistant.runner.review.cause import causes, words
 from action_assistant.runner.review.compare import Comparison, compare
 from action_assistant.runner.review.film import Film, film
 from action_assistant.runner.review.reel import APART, Archive, Reels
@@ -28,6 +31,7 @@ from action_assistant.umrf.semantics import script_from
 log: Final = logging.getLogger(__name__)
 
 _LAST: Final = 1_000  # runs in one statistics
+_CAUSES: Final = 10  # in one answer
 _AT_ONCE: Final = 200  # runs summed up between two looks
 _ROWS: Final = 400  # parameters of one query
 
@@ -53,6 +57,19 @@ class Expectation(msgspec.Struct, frozen=True, kw_only=True):
     umrf: msgspec.Raw
     script: msgspec.Raw
     course: list[again.Step]
+
+
+class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
+    """One cause in a sentence, with its evidence: the moment, the event `seq` by which it had been
+    seen, the action, and the words that were said there."""
+
+    kind: str
+    text: str
+    at: datetime
+    seq: int
+    action: str | None
+    aid: str | None
+    quote: str
 
 
 class Desk:
@@ -109,7 +126,9 @@ class Desk:
             log.exception("run %s cannot be read; it is left out of sums", run_id)
             summed = about.SummedUp(self._wall(), {})
         else:
-            summed = await self._aside(lambda: about.sum_of(found, self._wall()))
+            good = found.end == "finished" and found.result == "on_true"
+            graph = None if good else await self._graph(run_id)  # only failures have causes
+            summed = await self._aside(lambda: about.sum_of(found, graph, self._wall()))
         await self._ledger.append(about.stream_about(run_id), [about.draft(summed)])
 
     async def known(self, run_id: str) -> Run:
@@ -118,6 +137,26 @@ class Desk:
         return opened.run if opened is not None else (await self.reels.reel(run_id)).keys[-1].run
 
     # --- one run ------------------------------------------------------------------------------
+
+    async def causes(self, run_id: str) -> list[CauseShown]:
+        """What is proven to be behind the end of a run, the weightiest first. Raises NotFound."""
+        found, graph = await self.known(run_id), await self._graph(run_id)
+        named = await self._aside(lambda: causes(found, graph))
+        shown: list[CauseShown] = []
+        for each in named[:_CAUSES]:
+            action = found.actions.get(each.action or "")
+            shown.append(
+                CauseShown(
+                    kind=str(each.__struct_config__.tag),
+                    text=words(each, found),
+                    at=shapes.time(each.at),
+                    seq=await self.reels.seq_at(run_id, each.at),
+                    action=each.action,
+                    aid=action.aid if action is not None else None,
+                    quote=each.quote,
+                )
+            )
+        return shown
 
     async def film(self, run_id: str, after: int) -> Film:
         """A page of the run's film. Raises NotFound."""
@@ -202,6 +241,22 @@ class Desk:
             return codec.read(text.encode()).graph
         except codec.Unreadable:
             return None
+
+    async def take_in(self, texts: Sequence[bytes], author: Author) -> list[str]:
+        """Take in recorded runs as examples, each once; their ids. Raises BadInput, Unavailable."""
+        taken: list[str] = []
+        for text in texts:
+            first, rest = recorded_runs.read(text)
+            stream = stream_of(first.run)
+            if not await self._ledger.newest(stream):
+                label = about.Marks(labels=(recorded_runs.LABEL,))
+                marked = about.Marked(self._wall(), author, label)
+                await self._ledger.append(about.stream_about(first.run), [about.draft(marked)])
+                begin = recorded_runs.numbered(first, self._control.next_number())
+                await self._ledger.append(stream, [begin, *rest], expected=0)
+            taken.append(first.run)
+        self._ended.set()
+        return taken
 
     # --- expectations -------------------------------------------------------------------------
 

@@ -120,6 +120,19 @@ class Reels:
         events = await self._ledger.read(stream_of(run), after=key.seq if key else 0, upto=seq)
         return (await self.aside(lambda: _next(key, events))).run
 
+    async def seq_at(self, run: str, at: int) -> int:
+        """The first event by which this moment had come. Raises NotFound, Unavailable."""
+        key = (await self.reel(run)).until(at - 1)
+        events = await self.page(run, key.seq if key else 0)
+
+        def found() -> int:
+            for event in events:
+                if getattr(decode(event.kind, event.body), "at", event.at) >= at:
+                    return event.seq
+            return events[-1].seq if events else key.seq if key else 1
+
+        return await self.aside(found)
+
     async def page(self, run: str, after: int) -> Sequence[Event]:
         """Events of one page, those with `seq > after`."""
         return await self._ledger.read(stream_of(run), after=after, limit=APART)

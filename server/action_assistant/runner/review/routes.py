@@ -4,18 +4,21 @@ from collections.abc import Callable
 from typing import Annotated, Any, Final
 
 import msgspec
+from anyio import to_thread
 from litestar import Request, Response, delete, get, patch, post
 from litestar.params import Parameter
 from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 
+from action_assistant import places
 from action_assistant.errors import BadInput
+from action_assistant.runner import recorded_runs
 from action_assistant.runner.admission import decoded
 from action_assistant.runner.described import FitOperation
 from action_assistant.runner.events import Author
 from action_assistant.runner.review import about, again
 from action_assistant.runner.review.compare import Comparison
-from action_assistant.runner.review.desk import Desk, Expectation, Format, Marked
+from action_assistant.runner.review.desk import CauseShown, Desk, Expectation, Format, Marked
 from action_assistant.runner.review.film import Film
 from action_assistant.runner.review.statistics import Statistics
 from action_assistant.web.access import Needs, person_of
@@ -52,6 +55,10 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
     @get("/api/runs/{run:str}/film", summary="What every event of a run changed, a page at a time")
     async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Film:
         return await desk().film(run, after)
+
+    @get("/api/runs/{run:str}/causes", summary="What is proven to be behind the end of a run")
+    async def found_causes(run: str) -> list[CauseShown]:
+        return await desk().causes(run)
 
     @get("/api/runs/{run:str}/umrf", summary="The graph of a run as it was sent")
     async def umrf(run: str) -> Response[bytes]:
@@ -92,7 +99,7 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
         content = await desk().export(run, form)
         return Response(content, media_type=_TYPES[form], headers=head)
 
-    return [film, umrf, marks, mark, script, fit, export]
+    return [film, found_causes, umrf, marks, mark, script, fit, export]
 
 
 def _of_many(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
@@ -108,7 +115,17 @@ def _of_many(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
     ) -> Statistics:
         return await desk().statistics(graph, robot, last)
 
-    return [comparison, statistics]
+    @post(
+        "/api/examples",
+        summary="Take in recorded runs that failed, as examples; each is there once",
+        status_code=200,
+        guards=[Needs("edit")],
+    )
+    async def take_in_examples(request: _Asking) -> list[str]:
+        texts = await to_thread.run_sync(recorded_runs.shipped, places.examples())
+        return await desk().take_in(texts, _author(request))
+
+    return [comparison, statistics, take_in_examples]
 
 
 def _expecting(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:

@@ -1,0 +1,191 @@
+"""A run names what was behind its end, with evidence, and says nothing where nothing is proven."""
+
+from typing import Any
+
+import msgspec
+import pytest
+
+from action_assistant.journal.events import Draft
+from action_assistant.places import examples
+from action_assistant.runner import recorded_runs
+from action_assistant.runner.events import (
+    AlarmRaised,
+    Author,
+    Ended,
+    Observed,
+    Published,
+    Requested,
+    RunEvent,
+    Silent,
+    StopRequested,
+    decode,
+)
+from action_assistant.runner.review.cause import Cause, causes, words
+from action_assistant.runner.runs import Run, replay
+from action_assistant.runner.seen import GraphState, NodeResult, NodeState
+from action_assistant.umrf import codec
+from action_assistant.umrf.model import Graph
+from runner.process import RunnerProcess
+from runner.record_examples import graph, line, recorded
+from runner.review.test_desk import eventually
+from runner.world import ANN
+
+EXAMPLES = {
+    "wrong_parameter": 'Grip was started with speed = "fast": a number was expected.',
+    "missing_action": "Search is not known to Robin, so it refused the graph.",
+    "hang_in_a_join": "Join waits for Look, which never reported its end. It went on until Ben "
+    "pressed Stop.",
+    "engine_restart": "The engine of Robin was restarted; what happened after is unknown.",
+    "foreign_start": "Somebody else started inspect on Robin; this run was ended by it.",
+}
+
+
+def example(name: str) -> tuple[Run, Graph, list[RunEvent]]:
+    first, rest = recorded_runs.read((examples() / f"{name}.run.jsonl").read_bytes())
+    told: list[RunEvent] = [first, *(decode(each.kind, each.body) for each in rest)]
+    run = replay(told)
+    assert run is not None
+    return run, codec.read(first.umrf.encode()).graph, told
+
+
+def test_the_examples_are_what_the_runner_records_today() -> None:
+    for name, text in recorded().items():
+        assert (examples() / name).read_bytes() == text, f"{name}: see runner/record_examples.py"
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_cause_of_each_example_comes_first_and_has_its_evidence(name: str) -> None:
+    run, sent, told = example(name)
+    first = causes(run, sent)[0]
+    assert words(first, run) == EXAMPLES[name]
+    assert run.requested_at <= first.at <= max(getattr(each, "at", 0) for each in told)
+    assert first.action is None or first.action in run.actions
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_no_cause_is_named_before_its_evidence_was_there(name: str) -> None:
+    _, sent, told = example(name)
+    for upto in range(1, len(told) + 1):
+        run = replay(told[:upto])
+        assert run is not None
+        latest = max(getattr(each, "at", 0) for each in told[:upto])
+        named = causes(run, sent)
+        assert all(each.at <= latest for each in named)
+        if upto == 1:
+            assert named == ()
+
+
+def begun(task: Graph) -> Requested:
+    return Requested(
+        at=1, run="r", number=1, request_id="q", author=ANN, graph=None, graph_name=task.name,
+        version="v", digest="d", engine="Robin", simulated=False, umrf="",
+        actions={each.full_name: each.key for each in task.actions},
+    )  # fmt: skip
+
+
+def found(task: Graph, *told: RunEvent) -> list[str]:
+    run = replay([begun(task), Published(2), *told])
+    assert run is not None
+    return [words(each, run) for each in causes(run, task)]
+
+
+def state(at: int, node: str, name: str) -> NodeState:
+    return NodeState(at, "task", node, name)
+
+
+FORK = graph("task", ("entry", "A"), ("entry", "B"), ("A", "Join"), ("B", "Join"), ("Join", "exit"))
+LINE = graph("task", *line("A", "B"))
+
+
+def test_nothing_is_named_of_a_run_that_went_well_or_of_which_nothing_is_recorded() -> None:
+    assert found(LINE, Ended(9, "finished", "on_true")) == []
+    assert found(LINE, Ended(9, "halted")) == []
+    assert found(LINE) == []
+
+
+def test_an_action_that_ended_in_error_is_named_with_its_own_words() -> None:
+    told = Observed(4, (state(3, "A_0", "RUNNING"), NodeResult(4, "task", "A_0", "on_error", "jammed"),
+                        state(4, "A_0", "ERROR"), GraphState(4, "task", "ERROR")))  # fmt: skip
+    assert found(LINE, told, Ended(5, "error", "on_error")) == ["A ended in error: “jammed”"]
+
+
+def test_of_a_stop_in_the_middle_only_what_went_on_is_told() -> None:
+    told = Observed(4, (state(3, "A_0", "RUNNING"),))
+    stop = StopRequested(6, Author("ben", "Ben"))
+    assert found(LINE, told, stop, Ended(7, "stopped")) == [
+        "A had not reported its end when Ben pressed Stop."
+    ]
+
+
+def test_a_join_is_said_to_wait_only_when_another_parent_has_reported() -> None:
+    both = (state(3, "A_0", "RUNNING"), state(3, "B_0", "RUNNING"))
+    stop, end = StopRequested(9, ANN), Ended(10, "stopped")
+    assert not any("waits" in each for each in found(FORK, Observed(3, both), stop, end))
+    done = (NodeResult(4, "task", "A_0", "on_true"), state(4, "A_0", "FINISHED"))
+    assert found(FORK, Observed(4, (*both, *done)), stop, end) == [
+        "Join waits for B, which never reported its end. It went on until Ann pressed Stop."
+    ]
+
+
+def test_an_arrow_that_passes_the_outcome_over_is_named() -> None:
+    told = (
+        state(3, "A_0", "RUNNING"), state(3, "B_0", "RUNNING"),
+        NodeResult(4, "task", "A_0", "on_true"), state(4, "A_0", "FINISHED"),
+        NodeResult(5, "task", "B_0", "on_false"), state(5, "B_0", "FINISHED"),
+    )  # fmt: skip
+    assert found(FORK, Observed(5, told), StopRequested(9, ANN), Ended(10, "stopped"))[0] == (
+        "Join waits for B, which ended false: its arrow passes that over."
+    )
+
+
+def test_a_foreign_start_ends_a_run_only_where_nobody_here_pressed_stop() -> None:
+    alarm = AlarmRaised(5, "foreign_start", "Somebody else …")
+    assert "ended by it" in found(LINE, alarm, Ended(7, "stopped"))[0]
+    assert "ended by it" not in found(LINE, alarm, StopRequested(6, ANN), Ended(7, "stopped"))[0]
+    assert "ended by it" not in found(LINE, alarm)[0]
+
+
+def test_silence_is_said_to_be_unknown() -> None:
+    assert found(LINE, Silent(9, 6, "it does not answer")) == [
+        "What happened after this moment is unknown."
+    ]
+
+
+def test_examples_are_taken_in_once_marked_and_tell_their_cause(
+    process: RunnerProcess,
+) -> None:
+    def listed() -> list[dict[str, Any]]:
+        answer: list[dict[str, Any]] = client.get("/api/runs", params={"label": "example"}).json()
+        return answer
+
+    with process.client() as client:
+        first = client.post("/api/examples").json()
+        assert client.post("/api/examples").json() == first
+        eventually(lambda: len(listed()) == 5 and all(each["cause"] for each in listed()))
+        assert {each["cause"] for each in listed()} == set(EXAMPLES.values())
+        assert all(each["simulated"] for each in listed())
+        assert {each["id"] for each in listed()} == set(first)
+        for each in listed():
+            named = client.get(f"/api/runs/{each['id']}/causes").json()
+            assert named[0]["text"] == each["cause"]
+            assert named[0]["seq"] > 0
+        wrong = client.get("/api/runs/example-wrong-parameter").json()
+        assert wrong["override"]["reason"] == "The new gripper takes words, too."
+        assert [each["code"] for each in wrong["despite"]] == ["parameter-type"]
+        assert client.get("/api/runs/nowhere/causes").status_code == 404
+
+
+def test_what_is_no_recorded_run_is_refused() -> None:
+    for text in (b"", b"{}\n", b'{"kind":"run.ended.v1","author":"","at":1,"body":{}}\n'):
+        with pytest.raises(Exception, match="no recorded run"):
+            recorded_runs.read(text)
+    first, _ = recorded_runs.read((examples() / "foreign_start.run.jsonl").read_bytes())
+    draft = recorded_runs.numbered(first, 77)
+    assert isinstance(draft, Draft)
+    assert msgspec.json.decode(draft.body)["number"] == 77
+
+
+def test_causes_are_different_values() -> None:
+    run, sent, _ = example("hang_in_a_join")
+    named: tuple[Cause, ...] = causes(run, sent)
+    assert len(set(named)) == len(named)
