@@ -1,6 +1,6 @@
 /** Drawing with a mouse: pieces travel, arrows are led, things are put in their place. */
 
-import { expect, type Page, test } from "@playwright/test";
+import { expect, type Locator, type Page, test } from "@playwright/test";
 import { add, arrows, boxOf, card, connect, digestOf, enter, meant, saved, umrfOf } from "./bench";
 import { Product } from "./product";
 import { fetching } from "./semantics";
@@ -33,6 +33,27 @@ async function pick(page: Page, ...names: readonly [string, number][]): Promise<
     });
   }
   await expect(chosen(page)).toHaveCount(names.length);
+}
+
+/** Takes one end of an arrow and drops it on something, or on empty canvas. */
+async function lead(
+  page: Page,
+  arrow: string,
+  end: "source" | "target",
+  to: Locator | null,
+): Promise<void> {
+  const anchor = page.locator(
+    `[aria-label^="Arrow from ${arrow}"] .react-flow__edgeupdater-${end}`,
+  );
+  const [from, box] = [await boxOf(anchor), to && (await boxOf(to))];
+  const goal = box
+    ? ([box.x + box.width / 2, box.y + box.height / 2] as const)
+    : ([from.x + 260, from.y + 40] as const);
+  await page.mouse.move(from.x + from.width / 2, from.y + from.height / 2);
+  await page.mouse.down();
+  await page.mouse.move(goal[0] - 30, goal[1] + 4, { steps: 6 });
+  await page.mouse.move(...goal, { steps: 4 });
+  await page.mouse.up();
 }
 
 const places = async (page: Page, id: string) => {
@@ -159,6 +180,21 @@ test("arrows: healed, filled, led elsewhere, drawn by two taps", async ({ browse
   await page.getByRole("combobox", { name: "To", exact: true }).fill("check");
   await page.keyboard.press("Enter");
   await expect.poll(() => arrows(product, id)).toContain("Wait_2 > CheckBattery_0");
+
+  // Its ends are taken with the mouse: to another card, after another outcome, and nowhere.
+  await lead(page, "Wait 2, when error: run CheckBattery 0", "target", card(page, "Wait", 0));
+  await expect.poll(() => arrows(product, id)).toContain("Wait_2 > Wait_0");
+  expect(await arrows(product, id)).not.toContain("Wait_2 > CheckBattery_0");
+  await lead(page, "Wait 2, when error: run Wait 0", "source", card(page, "CheckBattery"));
+  await expect.poll(() => arrows(product, id)).toContain("CheckBattery_0 > Wait_0");
+  const led = await arrows(product, id);
+  expect(led).not.toContain("Wait_2 > Wait_0");
+  await lead(page, "CheckBattery 0, when error: run Wait 0", "target", null);
+  await expect(page.getByRole("combobox", { name: "Name of an action" })).toBeHidden();
+  const ok = card(page, "CheckBattery").getByLabel("When stopped", { exact: true });
+  await lead(page, "CheckBattery 0, when error: run Wait 0", "source", ok);
+  await expect(page.getByLabel(/^Arrow from CheckBattery 0, when stopped: run/)).toBeAttached();
+  expect(await arrows(product, id)).toEqual(led);
   expect(failures).toEqual([]);
   await context.close();
 });

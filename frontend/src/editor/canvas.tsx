@@ -197,6 +197,8 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
           edgesReconnectable={bench.mayEdit}
           reconnectRadius={12}
           onReconnect={connecting.onReconnect}
+          onReconnectStart={connecting.onReconnectStart}
+          onReconnectEnd={connecting.onReconnectEnd}
           nodesDraggable={bench.mayEdit}
           nodesConnectable={bench.mayEdit}
           snapToGrid={bench.snap}

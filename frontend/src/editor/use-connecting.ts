@@ -1,7 +1,7 @@
 /** Drawing arrows by hand: drag from an outcome, tap an outcome and then what follows, lead elsewhere. */
-import type { Connection, OnConnectEnd } from "@xyflow/react";
-import { type MouseEvent, useCallback, useEffect, useState } from "react";
-import { connect, retarget } from "../graph/edit";
+import type { Connection, FinalConnectionState, OnConnectEnd } from "@xyflow/react";
+import { type MouseEvent, useCallback, useEffect, useRef, useState } from "react";
+import { connect, moveRelation, retarget } from "../graph/edit";
 import type { Key, Position, Precondition } from "../graph/model";
 import { ENTRY } from "../graph/model";
 import type { Arrow } from "../ui/canvas/elements";
@@ -48,7 +48,10 @@ export function useConnecting(bench: Bench, openAddAt: AddAt) {
     return () => window.removeEventListener("keydown", onKey, { capture: true });
   }, [pending]);
 
+  // An end that is led elsewhere is told as a connection too, which must not draw a second arrow.
+  const leading = useRef(false);
   const onConnectEnd: OnConnectEnd = (event, state) => {
+    if (leading.current) return;
     const from = state.fromHandle;
     if (state.isValid || !from || from.type !== "source") return;
     const point = pointOf(event);
@@ -76,16 +79,48 @@ export function useConnecting(bench: Bench, openAddAt: AddAt) {
     return true;
   };
 
-  const onReconnect = (edge: Arrow, to: Connection) => {
-    const { data } = edge;
+  // The arrows of one relation end together and are led together; they begin each for itself.
+  const lead = ({ data }: Arrow, to: Parameters<typeof retarget>[3]) => {
     if (!data || !mayEdit) return;
-    const moved = retarget(doc, data.relation, data.outcome, {
-      ...(to.source !== edge.source ? { parent: to.source } : {}),
-      ...(to.target !== edge.target ? { child: to.target } : {}),
-      ...(to.source === ENTRY ? {} : { outcome: outcomeOf(to.sourceHandle) }),
-    });
+    const whole = to.child === undefined ? null : moveRelation(doc, data.relation, to);
+    const moved = whole ?? retarget(doc, data.relation, data.outcome, to);
     if (moved !== null) select([moved]);
   };
+  /** Dropped on the mark of an outcome, or on an input. */
+  const onReconnect = (edge: Arrow, to: Connection) =>
+    lead(
+      edge,
+      to.target === edge.target
+        ? {
+            ...(to.source === edge.source ? {} : { parent: to.source }),
+            ...(to.source === ENTRY ? {} : { outcome: outcomeOf(to.sourceHandle) }),
+          }
+        : { child: to.target },
+    );
+  const onReconnectStart = () => {
+    leading.current = true;
+  };
+  /** Dropped anywhere else: on a card it means that card, on nothing the arrow stays. */
+  const onReconnectEnd = (
+    event: globalThis.MouseEvent | TouchEvent,
+    edge: Arrow,
+    fixed: "source" | "target",
+    state: FinalConnectionState,
+  ) => {
+    leading.current = false;
+    const card = state.isValid ? null : nodeAt(pointOf(event));
+    if (card === null || card === edge.source || card === edge.target) return;
+    lead(edge, fixed === "source" ? { child: card } : { parent: card });
+  };
 
-  return { pending, setPending, draw, onConnectEnd, onClick, onReconnect };
+  return {
+    pending,
+    setPending,
+    draw,
+    onConnectEnd,
+    onClick,
+    onReconnect,
+    onReconnectStart,
+    onReconnectEnd,
+  };
 }

@@ -210,6 +210,7 @@ function arrowsOf(relation: Relation, options: NodeOptions, { boxes, names }: Ar
   const shown: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
   const entry = relation.parent === ENTRY;
   const mark = options.marks.get(id) ?? null;
+  const selected = options.selected.has(id);
   return shown.map((outcome, i) => ({
     id: `${id}|${outcome}`,
     type: "outcome",
@@ -218,7 +219,9 @@ function arrowsOf(relation: Relation, options: NodeOptions, { boxes, names }: Ar
     target: relation.child,
     sourceHandle: entry ? "start" : outcome,
     targetHandle: "in",
-    selected: options.selected.has(id),
+    selected,
+    // Where several begin or end, the chosen one is the one whose end can be taken.
+    ...(selected ? { zIndex: 1 } : {}),
     data: {
       relation: id,
       outcome,
