@@ -253,6 +253,15 @@ test("things are put in their place: aligned, spread, tidied, nudged, framed, no
   await text.fill("=1+1 <script>");
   await text.press("Escape");
   await expect(page.getByRole("group", { name: "Note, amber: =1+1 <script>" })).toBeVisible();
+  // It has a form too.
+  const form = page.getByRole("tabpanel", { name: "Note" });
+  await form.getByText("green", { exact: true }).click();
+  await form.getByRole("textbox", { name: "Width" }).fill("20");
+  await expect(form.getByText("A whole number from 60 to 20000.")).toBeVisible();
+  await form.getByRole("textbox", { name: "Width" }).fill("300");
+  await page.keyboard.press("Enter");
+  const note = page.getByRole("group", { name: "Note, green: =1+1 <script>" });
+  await expect(note).toHaveCSS("width", "300px");
 
   // The pictures have it all, escaped.
   const download = page.waitForEvent("download");

@@ -160,7 +160,29 @@ test.describe("on plain http", () => {
     await page.keyboard.press("Delete");
     await page.keyboard.press("a");
     await expect(page.getByRole("combobox", { name: "Name of an action" })).toHaveCount(0);
-    await expect(page.getByRole("textbox", { name: "Name", exact: true }).first()).toBeDisabled();
+    await expect(
+      page.getByRole("textbox", { name: "Name", exact: true }).first(),
+    ).not.toBeEditable();
+    const panel = page.getByRole("tabpanel").first();
+    await expect(panel.getByRole("button", { name: "Connect" })).toBeDisabled();
+    await expect(panel.getByRole("checkbox", { name: /^The graph starts with/ })).toBeDisabled();
+    await expect(panel.getByRole("button", { name: /^Delete the arrow/ })).toBeDisabled();
+    // What only shows something works: go to an arrow and on to its end, unfold a parameter.
+    await panel.getByRole("button", { name: /^true.*Wait 1$/ }).click();
+    await expect(panel.getByRole("button", { name: "Delete this arrow" })).toBeDisabled();
+    await panel.getByRole("button", { name: "Wait 1", exact: true }).click();
+    await expect(card(page, "Wait", 1)).toHaveClass(/selected/);
+    await page.getByRole("link", { name: /^fetch_tool/ }).click();
+    await card(page, "DriveTo")
+      .first()
+      .click({ position: { x: 50, y: 30 } });
+    await panel
+      .getByRole("button", { name: /^What the parameter/ })
+      .first()
+      .click();
+    await expect(panel.getByRole("button", { name: /^Remove the parameter/ })).toBeDisabled();
+    await expect(panel.getByRole("textbox", { name: "Name", exact: true }).last()).toBeVisible();
+    await page.getByRole("link", { name: /^chain_40/ }).click();
     await expect(page.locator(".react-flow__node-action.draggable")).toHaveCount(0);
     const change = await product.ask<{ seq: number }>(`/api/graphs/${graph}`);
     expect(change.seq).toBe(1);

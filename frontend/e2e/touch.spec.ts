@@ -203,6 +203,12 @@ test("a tablet: two fingers zoom, a resting one opens the menu, taps choose seve
   const [right, bottom] = await middle(card(page, "Wait", 1), 1);
   await fingers.move({ from: [left - 150, top - 12], to: [right + 130, bottom + 20] });
   await expect(chosen).toHaveCount(2);
+  // Two fingers move and zoom the view there too, and what was chosen stays so.
+  const [near, before] = [await zoom(page), await middle(card(page, "Wait", 0))];
+  await fingers.move({ from: [200, 640], to: [150, 700] }, { from: [500, 640], to: [600, 700] });
+  await expect.poll(() => zoom(page)).toBeGreaterThan(near * 1.2);
+  expect((await middle(card(page, "Wait", 0)))[1]).not.toBe(before[1]);
+  await expect(chosen).toHaveCount(2);
   await page.getByRole("button", { name: "Select", exact: true }).tap();
   expect(await small(page, '[role="toolbar"]')).toEqual([]);
 

@@ -82,6 +82,19 @@ test("a graph is drawn in the outline by keyboard alone", async ({ browser }) =>
   await expect(card(page, "Catch")).toHaveCount(0);
   await page.keyboard.press("ControlOrMeta+z");
   await expect(card(page, "Catch")).toBeVisible();
+
+  // A note stands in the outline too, and is written there.
+  await page.keyboard.press("n");
+  await page.keyboard.type("Mind the step");
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("o");
+  await expect(row(page)).toContainText("Mind the step");
+  await page.keyboard.press("F2");
+  await expect(page.getByRole("textbox", { name: "Text of the note" })).toBeFocused();
+  await page.keyboard.press("ControlOrMeta+a");
+  await page.keyboard.type("Mind the gap");
+  await page.keyboard.press("Enter");
+  await expect(page.getByRole("group", { name: "Note, amber: Mind the gap" })).toBeVisible();
   await saved(page);
   const { actions } = await product.ask<{ actions: { name: string; parents?: object[] }[] }>(
     `/api/graphs/${id}/umrf`,

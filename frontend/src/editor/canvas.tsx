@@ -31,6 +31,7 @@ import { arrowAt } from "./hit";
 import { AtCards, Cursors } from "./people";
 import type { useCanvas } from "./use-canvas";
 import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
+import { usePinch, ZOOM } from "./use-pinch";
 import { usePress } from "./use-press";
 
 interface Props {
@@ -145,6 +146,7 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
   };
   const connecting = useConnecting(bench, openAddAt);
   const press = usePress(bench);
+  const pinch = usePinch(bench, onPanned);
   const desk = useNoteDesk(bench, writing, canvas.setResized);
   const onDoubleClick = (event: MouseEvent) => {
     if (!(event.target as Element).classList.contains("react-flow__pane")) return;
@@ -160,9 +162,22 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
       {...press}
       onPointerDownCapture={(event) => {
         press.onPointerDownCapture(event);
+        pinch.down(event);
         // Under fingers there is no Shift: in the select mode each tap adds or takes away.
         if (event.pointerType !== "mouse" && bench.tool === "select")
           store.setState({ multiSelectionActive: true });
+      }}
+      onPointerMoveCapture={(event) => {
+        press.onPointerMoveCapture(event);
+        pinch.move(event);
+      }}
+      onPointerUpCapture={(event) => {
+        press.onPointerUpCapture(event);
+        pinch.end(event);
+      }}
+      onPointerCancelCapture={(event) => {
+        press.onPointerCancelCapture(event);
+        pinch.end(event);
       }}
       onPointerMove={(event) => {
         if (event.pointerType === "touch") return;
@@ -226,8 +241,8 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
           zoomOnDoubleClick={false}
           deleteKeyCode={null}
           multiSelectionKeyCode={["Shift", "Meta", "Control"]}
-          minZoom={0.08}
-          maxZoom={2.2}
+          minZoom={ZOOM.least}
+          maxZoom={ZOOM.most}
           onMoveStart={(event) => {
             // A move without an event is the page's own.
             if (event !== null) onPanned();

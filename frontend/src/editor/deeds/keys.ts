@@ -23,6 +23,13 @@ function isTaken(target: EventTarget | null): boolean {
   return target.isContentEditable || target.closest(FIELDS) !== null;
 }
 
+/** The way out of a form works in the form, and so does what no field has a use for. */
+function worksInForms(event: KeyboardEvent): boolean {
+  const deed = deedFor(DEEDS, event, false);
+  const free = ["to-canvas", "palette", "find", "export"].includes(deed?.name ?? "");
+  return free && document.querySelector("[role=dialog]") === null;
+}
+
 /** Lists and trees have their own use for arrow keys, Enter and Delete; the canvas shares ours. */
 function isOnCanvas(target: EventTarget | null): boolean {
   if (!(target instanceof Element) || target === document.body) return true;
@@ -51,9 +58,7 @@ export function useShortcuts(bench: Bench): void {
   const [singles] = useSingleKeys();
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
-      // The way out of a form works in the form.
-      const leaves = event.key === "F6" && document.querySelector("[role=dialog]") === null;
-      if (event.defaultPrevented || (isTaken(event.target) && !leaves)) return;
+      if (event.defaultPrevented || (isTaken(event.target) && !worksInForms(event))) return;
       if (MOVING.has(event.key) && !isOnCanvas(event.target)) return;
       if (event.key === "/" && singles) {
         event.preventDefault();

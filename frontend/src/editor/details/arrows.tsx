@@ -123,6 +123,7 @@ export function Arrows({ action }: { action: Action }) {
         <input
           type="checkbox"
           checked={first}
+          disabled={!bench.mayEdit}
           onChange={() =>
             first ? unsetEntry(bench.doc, action.key) : setEntry(bench.doc, action.key)
           }

@@ -5,12 +5,15 @@ import type { Problems } from "../../api/graphs";
 import type { Thread } from "../../graph/comments";
 import { relationId } from "../../graph/layout";
 import { EXIT } from "../../graph/model";
+import { notesOf } from "../../graph/notes";
 import { type Bench, type Panel, selectedActions, selectedRelations, useBench } from "../bench";
 import { Comments } from "../talk/comments";
 import { ActionForm } from "./action-form";
 import style from "./details.module.css";
 import { GraphForm } from "./graph-form";
 import { JsonView } from "./json-view";
+import { LookOnly } from "./look-only";
+import { NoteForm } from "./note-form";
 import { ProblemList, ProblemsHere } from "./problems";
 import { RelationForm } from "./relation-form";
 import { RunsWhen } from "./runs-when";
@@ -23,11 +26,21 @@ interface Props {
   threads: readonly Thread[];
 }
 
+const counted = (count: number, what: string): string | null =>
+  count === 0 ? null : `${count} ${what}${count === 1 ? "" : "s"}`;
+
+const chosenNotes = ({ graph, selection }: Bench) =>
+  notesOf(graph).filter(({ key }) => selection.has(key));
+
 function title(bench: Bench): string {
   const actions = selectedActions(bench);
   const relations = selectedRelations(bench);
+  const notes = chosenNotes(bench);
   const [action] = actions;
-  if (actions.length + relations.length > 1) return `${actions.length + relations.length} selected`;
+  const [note] = notes;
+  const count = actions.length + relations.length + notes.length;
+  if (count > 1) return `${count} selected`;
+  if (note) return note.kind === "frame" ? "Frame" : "Note";
   if (action) return `${action.name} ${action.instanceId}`;
   if (relations.length === 1) return "Arrow";
   return bench.selection.has(EXIT) ? "Exit" : "Graph";
@@ -37,16 +50,24 @@ function Properties() {
   const bench = useBench();
   const actions = selectedActions(bench);
   const relations = selectedRelations(bench);
+  const notes = chosenNotes(bench);
   const [action] = actions;
   const [relation] = relations;
-  if (actions.length + relations.length > 1) {
+  const [note] = notes;
+  if (actions.length + relations.length + notes.length > 1) {
+    const parts = [
+      counted(actions.length, "action"),
+      counted(relations.length, "arrow"),
+      counted(notes.length, "note"),
+    ].flatMap((part) => part ?? []);
     return (
       <p className={style.hint}>
-        {actions.length} actions and {relations.length} arrows are selected. Drag moves them
-        together, <b>Del</b> deletes them, <b>Ctrl D</b> duplicates the actions.
+        Selected: {parts.join(", ")}. Drag moves them together, <b>Del</b> deletes them,{" "}
+        <b>Ctrl D</b> duplicates them.
       </p>
     );
   }
+  if (note) return <NoteForm key={note.key} note={note} />;
   if (action) return <ActionForm key={action.key} action={action} />;
   if (relation) return <RelationForm key={relationId(relation)} relation={relation} />;
   if (bench.selection.has(EXIT)) return <RunsWhen of={EXIT} title="The graph ends" />;
@@ -86,11 +107,10 @@ export function Details({ id, seq, panel, problems, threads }: Props) {
         </Tabs.Tab>
       </Tabs.List>
       <Tabs.Panel value="details" className={style.panel ?? ""}>
-        {/* A fieldset switches off every field and button in it, also those that come later. */}
-        <fieldset className={style.fields} disabled={!bench.mayEdit}>
+        <LookOnly>
           <ProblemsHere problems={problems} />
           <Properties />
-        </fieldset>
+        </LookOnly>
       </Tabs.Panel>
       <Tabs.Panel value="json" className={style.panel ?? ""} data-fill>
         <JsonView graph={id} seq={seq} />

@@ -56,6 +56,7 @@ function Label({ name, fullName, field, open, onOpen }: LabelProps) {
         <ActionIcon
           size={24}
           className={style.remove ?? ""}
+          disabled={false}
           aria-label={`What the parameter ${fullName} is`}
           aria-expanded={open}
           onClick={(event) => {

@@ -75,7 +75,7 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
         />
       )}
       <Group gap="xs">
-        <Button size="compact-sm" onClick={onClose}>
+        <Button size="compact-sm" disabled={false} onClick={onClose}>
           Close
         </Button>
         <Button

@@ -56,6 +56,7 @@ function ProblemItem({ problem, jumps }: { problem: Problem; jumps: boolean }) {
           <ActionIcon
             size="sm"
             ml="auto"
+            disabled={false}
             aria-label={`Copy a link to ${problem.code}`}
             onClick={() => void copyLinkTo(linkToProblem(bench.id, problem))}
           >

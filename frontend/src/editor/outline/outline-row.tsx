@@ -1,8 +1,17 @@
 /** One row of the outline. */
 import { ActionIcon, Menu } from "@mantine/core";
-import { IconChevronRight, IconDots, IconMessageCircle, IconPlayerPlay } from "@tabler/icons-react";
+import {
+  IconChevronRight,
+  IconDots,
+  IconFrame,
+  IconMessageCircle,
+  IconNote,
+  IconPlayerPlay,
+} from "@tabler/icons-react";
 import { memo, useId, useState } from "react";
 import type { Progress } from "../../api/progress";
+import type { Note } from "../../graph/notes";
+import { noteColor } from "../../ui/canvas/note-colors";
 import { useTalk } from "../../ui/canvas/spotlight";
 import { cardLines, lineText } from "../../ui/canvas/value-text";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
@@ -90,6 +99,16 @@ function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">
           {!row.relation.required && <span className={style.sub}>optional</span>}
         </span>
       );
+    case "note": {
+      const { kind, text } = row.note;
+      const Sign = kind === "frame" ? IconFrame : IconNote;
+      return (
+        <span className={style.note}>
+          <Sign size={13} aria-label={noteWord(row.note)} />
+          <span className={style.sub}>{text || "empty"}</span>
+        </span>
+      );
+    }
   }
 }
 
@@ -138,6 +157,13 @@ function Deeds({ row, active, label, mayEdit, hands }: DeedsProps) {
 const keyWords = (key: string): string =>
   key.replace("Arrow", "").replace("Alt+Up", "Alt ↑").replace("Alt+Down", "Alt ↓").toUpperCase();
 
+const noteWord = ({ kind }: Note) => (kind === "frame" ? "Frame" : "Note");
+
+function colorOf(row: Row): string {
+  if (row.kind === "note") return noteColor[row.note.color];
+  return row.kind === "action" ? robotColor(row.action.actor) : "transparent";
+}
+
 function labelOf(row: Row, name: string): string {
   switch (row.kind) {
     case "entry":
@@ -148,13 +174,14 @@ function labelOf(row: Row, name: string): string {
       return `${name}, ${outcomeWord[row.outcome]}`;
     case "target":
       return `the arrow to ${name}`;
+    case "note":
+      return `${noteWord(row.note)}: ${row.note.text.slice(0, 60) || "empty"}`;
   }
 }
 
 export const OutlineRow = memo(function OutlineRow(props: Props) {
   const { row, active, selected, progress, change, name, mayEdit, hands } = props;
   const label = labelOf(row, name);
-  const color = row.kind === "action" ? robotColor(row.action.actor) : "transparent";
   const words = useId();
   return (
     <tr
@@ -168,7 +195,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
       aria-labelledby={words}
       {...(row.open === null ? {} : { "aria-expanded": row.open })}
       tabIndex={active ? 0 : -1}
-      style={{ "--c": color } as React.CSSProperties}
+      style={{ "--c": colorOf(row) } as React.CSSProperties}
       onFocus={(event) => {
         if (event.target === event.currentTarget) hands.focus(row.id);
       }}

@@ -186,12 +186,12 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
       <div className={style.robots}>
         <Robots />
       </div>
-      {graph.actions.length === 0 && (
+      {rows.length === 1 && graph.actions.length === 0 && (
         <Empty icon={<IconListTree size={22} />} title="Nothing here yet">
           The actions of the graph stand here as a list, in the order in which they run.
         </Empty>
       )}
-      {graph.actions.length > 0 && (
+      {(rows.length > 1 || graph.actions.length > 0) && (
         <table
           ref={tree}
           className={style.tree}
@@ -249,5 +249,7 @@ function ownerOf(row: Row): Key {
       return row.action.key;
     case "target":
       return row.relation.parent;
+    case "note":
+      return row.note.key;
   }
 }

@@ -1,5 +1,11 @@
 /** What can be done to a row of the outline, with its key. */
-import { removeActions, removeRelation, setResponse, swapOrder } from "../../graph/edit";
+import {
+  removeActions,
+  removeNotes,
+  removeRelation,
+  setResponse,
+  swapOrder,
+} from "../../graph/edit";
 import { relationId } from "../../graph/layout";
 import { ENTRY, type Key, spoken } from "../../graph/model";
 import { type Bench, endName } from "../bench";
@@ -21,6 +27,7 @@ const TALK: RowDeed = { name: "comments", label: "Comment", key: "m", changes: f
 const UP: RowDeed = { name: "up", label: "Move up", key: "Alt+ArrowUp", changes: true };
 const DOWN: RowDeed = { name: "down", label: "Move down", key: "Alt+ArrowDown", changes: true };
 const DELETE: RowDeed = { name: "delete", label: "Delete", key: "Delete", changes: true };
+const WRITE: RowDeed = { name: "rename", label: "Write the text", key: "F2", changes: true };
 const RESPONSE: RowDeed = {
   name: "response",
   label: "Another response …",
@@ -41,6 +48,8 @@ export function deedsOf(row: Row): readonly RowDeed[] {
       return row.relation.parent === ENTRY
         ? [DETAILS, TARGET, UP, DOWN, DELETE]
         : [DETAILS, RESPONSE, TARGET, UP, DOWN, DELETE];
+    case "note":
+      return [DETAILS, WRITE, DELETE];
   }
 }
 
@@ -56,6 +65,10 @@ export function remove(bench: Bench, row: Row): string {
     const name = endName(bench.graph, row.action.key);
     removeActions(bench.doc, [row.action.key]);
     return `${name} is deleted`;
+  }
+  if (row.kind === "note") {
+    removeNotes(bench.doc, [row.note.key.slice(2)]);
+    return row.note.kind === "frame" ? "The frame is deleted" : "The note is deleted";
   }
   if (row.kind !== "target") return "";
   const id = relationId(row.relation);

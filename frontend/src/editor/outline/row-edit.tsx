@@ -1,9 +1,10 @@
 /** What opens under a row of the outline: a new name, another target, another response, an arrow. */
-import { Select, TextInput } from "@mantine/core";
+import { Select, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { connect, rename, retarget, setEntry, setResponse } from "../../graph/edit";
 import { relationId } from "../../graph/layout";
 import { ENTRY, EXIT, type Precondition, RESPONSES, type Response } from "../../graph/model";
+import { changeNote } from "../../graph/notes";
 import { OUTCOMES, outcomeWord } from "../../ui/outcome";
 import { type Bench, endName, useBench } from "../bench";
 import style from "./outline.module.css";
@@ -57,7 +58,7 @@ function Connect({ row, onDone }: Props) {
   const fixed = row.kind === "outcome" ? row.outcome : null;
   const [outcome, setOutcome] = useState<Precondition>(fixed ?? "on_true");
   const entry = row.kind === "entry";
-  const from = entry ? ENTRY : row.kind === "target" ? null : row.action.key;
+  const from = entry ? ENTRY : "action" in row ? row.action.key : null;
   const to = (target: string | null) => {
     if (target === null || from === null) return onDone(null);
     if (entry) setEntry(bench.doc, target);
@@ -126,7 +127,38 @@ function Pick({ row, change, onDone }: Props) {
   );
 }
 
+function Write({ row, onDone }: Props) {
+  const { doc, graph } = useBench();
+  const old = row.kind === "note" ? row.note.text : "";
+  const [text, setText] = useState(old);
+  const save = () => {
+    if (row.kind !== "note" || text === old) return onDone(null);
+    changeNote(doc, graph, row.note.key, { text });
+    onDone("The text is written");
+  };
+  return (
+    <Textarea
+      aria-label="Text of the note"
+      autoFocus
+      autosize
+      maxRows={8}
+      maxLength={5_000}
+      value={text}
+      onChange={(event) => setText(event.currentTarget.value)}
+      onKeyDown={(event) => {
+        if (event.key === "Enter" && !event.shiftKey) {
+          event.preventDefault();
+          save();
+        }
+        if (event.key === "Escape") onDone(null);
+      }}
+      onBlur={save}
+    />
+  );
+}
+
 export function RowEdit(props: Props) {
+  if (props.row.kind === "note") return <Write {...props} />;
   switch (props.change) {
     case "rename":
       return <Rename {...props} />;

@@ -4,6 +4,7 @@ import * as Y from "yjs";
 import { addAction, connect, setEntry, setExit, setResponse } from "../../graph/edit";
 import { mapsOf } from "../../graph/layout";
 import { type Graph, PRECONDITIONS } from "../../graph/model";
+import { writeNote } from "../../graph/notes";
 import { readGraph } from "../../graph/read";
 import { inOrder, type Row, rowsOf } from "./rows";
 
@@ -21,6 +22,8 @@ function words(graph: Graph, row: Row): string {
       return row.outcome;
     case "target":
       return `${row.response} ${name(row.relation.child)}`;
+    case "note":
+      return row.note.text;
   }
 }
 
@@ -78,6 +81,7 @@ test("every row has its place in the tree, whatever is drawn", () => {
       for (const [from, to, outcome] of arrows) {
         connect(doc, keys[from] ?? "", keys[to] ?? "", PRECONDITIONS[outcome]);
       }
+      writeNote(doc, { kind: "note", at: [0, 0], size: [200, 80], text: "", color: "grey" });
       const rows = rowsOf(read(doc), () => open);
       const ids = rows.map(({ id }) => id);
       expect(new Set(ids).size).toBe(ids.length);

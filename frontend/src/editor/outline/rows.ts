@@ -11,6 +11,7 @@ import {
   type Relation,
   type Response,
 } from "../../graph/model";
+import { type Note, notesOf } from "../../graph/notes";
 
 interface Place {
   readonly id: string;
@@ -35,6 +36,7 @@ export type Row = Place &
         readonly outcome: Precondition;
         readonly response: Response;
       }
+    | { readonly kind: "note"; readonly note: Note }
   );
 
 type Children = ReadonlyMap<Key, readonly Relation[]>;
@@ -75,7 +77,8 @@ export function rowsOf(graph: Graph, isOpen: (id: string) => boolean): Row[] {
   const children = childrenOf(graph);
   const actions = inOrder(graph, children);
   const rows: Row[] = [];
-  const of = actions.length + 1;
+  const notes = notesOf(graph);
+  const of = 1 + actions.length + notes.length;
   const starts = children.get(ENTRY) ?? [];
   const entryOpen = starts.length === 0 ? null : isOpen(ENTRY);
   rows.push({ kind: "entry", id: ENTRY, level: 1, parent: null, open: entryOpen, at: 1, of });
@@ -87,6 +90,10 @@ export function rowsOf(graph: Graph, isOpen: (id: string) => boolean): Row[] {
     const place = { id: action.key, level: 1, parent: null, open, at: i + 2, of } as const;
     rows.push({ kind: "action", ...place, action, follows });
     if (open) rows.push(...outcomes(action, after, isOpen));
+  }
+  for (const [i, note] of notes.entries()) {
+    const at = actions.length + i + 2;
+    rows.push({ kind: "note", id: note.key, level: 1, parent: null, open: null, at, of, note });
   }
   return rows;
 }
@@ -167,5 +174,7 @@ export function subjectOf(row: Row): string {
       return row.action.key;
     case "target":
       return relationId(row.relation);
+    case "note":
+      return row.note.key;
   }
 }
