@@ -1,7 +1,5 @@
 /** The page for somebody who comes by a link: says what it leads to, and asks for a name, once. */
 import { Button, Paper, Text, TextInput, Title } from "@mantine/core";
-import { useState } from "react";
-import { sentence } from "../api/http";
 import {
   type Invited,
   type Key,
@@ -12,6 +10,7 @@ import {
 } from "../api/session";
 import { Mark } from "../ui/top-bar";
 import style from "./sign-in.module.css";
+import { useEntry } from "./use-entry";
 
 interface Props {
   link: Key;
@@ -20,20 +19,11 @@ interface Props {
 }
 
 export function Invitation({ link, invited, onOpen }: Props) {
-  const [name, setName] = useState("");
-  const [problem, setProblem] = useState("");
-  const [busy, setBusy] = useState(false);
-  const enter = async () => {
-    setBusy(true);
-    try {
-      const person = await openSession(link, name.trim());
-      rememberName(person.name);
-      onOpen(person);
-    } catch (error) {
-      setProblem(sentence(error));
-      setBusy(false);
-    }
-  };
+  const entry = useEntry(async (name) => {
+    const person = await openSession(link, name);
+    rememberName(person.name);
+    return person;
+  }, onOpen);
   return (
     <main className={style.page}>
       <Paper className={style.card} withBorder radius="lg">
@@ -45,33 +35,16 @@ export function Invitation({ link, invited, onOpen }: Props) {
           To TeMoto Action Assistant, where robot tasks are drawn and run. You may{" "}
           {ROLE_WORDS[invited.role]}.
         </Text>
-        <form
-          onSubmit={(event) => {
-            event.preventDefault();
-            void enter();
-          }}
-        >
+        <form {...entry.form}>
           <TextInput
             mt="lg"
             label="What should others see you as?"
-            value={name}
             maxLength={60}
             autoFocus
             autoComplete="name"
-            error={problem || undefined}
-            onChange={(event) => {
-              setName(event.currentTarget.value);
-              setProblem("");
-            }}
+            {...entry.field}
           />
-          <Button
-            type="submit"
-            variant="filled"
-            fullWidth
-            mt="md"
-            loading={busy}
-            disabled={name.trim() === ""}
-          >
+          <Button {...entry.button} variant="filled" fullWidth mt="md">
             Come in
           </Button>
         </form>

@@ -1,33 +1,14 @@
 /** Asks to sign in again in place: the session has ended, the page and its edits have not. */
 import { Button, PasswordInput } from "@mantine/core";
-import { useState } from "react";
-import { sentence } from "../api/http";
 import { openSession, type Person } from "../api/session";
 import { pastedKey } from "./sign-in";
 import style from "./sign-in-bar.module.css";
+import { useEntry } from "./use-entry";
 
 export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
-  const [pasted, setPasted] = useState("");
-  const [problem, setProblem] = useState("");
-  const [busy, setBusy] = useState(false);
-  const submit = async () => {
-    setBusy(true);
-    try {
-      onOpen(await openSession(pastedKey(pasted)));
-    } catch (error) {
-      setProblem(sentence(error));
-      setBusy(false);
-    }
-  };
+  const entry = useEntry((pasted) => openSession(pastedKey(pasted)), onOpen);
   return (
-    <form
-      className={style.bar}
-      aria-label="Sign in again"
-      onSubmit={(event) => {
-        event.preventDefault();
-        void submit();
-      }}
-    >
+    <form className={style.bar} aria-label="Sign in again" {...entry.form}>
       <p role="status">
         <b>Your session has ended.</b> Edits stay in this page, and STOP is still sent. Paste your
         link to go on.
@@ -36,14 +17,9 @@ export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
         aria-label="Link or token"
         placeholder="http://…/#t=…"
         autoComplete="off"
-        value={pasted}
-        error={problem || undefined}
-        onChange={(event) => {
-          setPasted(event.currentTarget.value);
-          setProblem("");
-        }}
+        {...entry.field}
       />
-      <Button type="submit" variant="filled" loading={busy} disabled={pasted.trim() === ""}>
+      <Button {...entry.button} variant="filled">
         Sign in
       </Button>
     </form>

@@ -1,10 +1,9 @@
 /** The page for somebody whom the server does not know: says how to get in. */
 import { Button, Paper, PasswordInput, Text, Title } from "@mantine/core";
-import { useState } from "react";
-import { sentence } from "../api/http";
 import { type Key, keyIn, openSession, type Person } from "../api/session";
 import { Mark } from "../ui/top-bar";
 import style from "./sign-in.module.css";
+import { useEntry } from "./use-entry";
 
 interface Props {
   /** Why nobody is signed in, when a link was tried. */
@@ -18,18 +17,7 @@ export function pastedKey(pasted: string): Key {
 }
 
 export function SignIn({ why, onOpen }: Props) {
-  const [pasted, setPasted] = useState("");
-  const [problem, setProblem] = useState(why);
-  const [busy, setBusy] = useState(false);
-  const submit = async () => {
-    setBusy(true);
-    try {
-      onOpen(await openSession(pastedKey(pasted)));
-    } catch (error) {
-      setProblem(sentence(error));
-      setBusy(false);
-    }
-  };
+  const entry = useEntry((pasted) => openSession(pastedKey(pasted)), onOpen, why);
   return (
     <main className={style.page}>
       <Paper className={style.card} withBorder radius="lg">
@@ -41,34 +29,17 @@ export function SignIn({ why, onOpen }: Props) {
           Open the link that the server printed when it started, or the one that you were given. It
           signs this browser in. You can paste it here as well.
         </Text>
-        <form
-          onSubmit={(event) => {
-            event.preventDefault();
-            void submit();
-          }}
-        >
+        <form {...entry.form}>
           <PasswordInput
             mt="lg"
             size="sm"
             label="Link or token"
             placeholder="http://…/#t=…"
-            value={pasted}
             autoFocus
             autoComplete="off"
-            error={problem || undefined}
-            onChange={(event) => {
-              setPasted(event.currentTarget.value);
-              setProblem("");
-            }}
+            {...entry.field}
           />
-          <Button
-            type="submit"
-            variant="filled"
-            fullWidth
-            mt="md"
-            loading={busy}
-            disabled={pasted.trim() === ""}
-          >
+          <Button {...entry.button} variant="filled" fullWidth mt="md">
             Sign in
           </Button>
         </form>
