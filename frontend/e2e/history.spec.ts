@@ -20,8 +20,8 @@ let bad: Run;
 const QUICK = { after_s: 0.25 };
 const JAMMED = { after_s: 0.25, result: "on_error", message: "gripper jammed" };
 
-async function version(): Promise<{ id: string; digest: string; umrf: string }> {
-  const made = await product.ask<{ id: string; digest: string }>(`/api/graphs/${graph}/versions`, {
+async function version(of: string): Promise<{ id: string; digest: string; umrf: string }> {
+  const made = await product.ask<{ id: string; digest: string }>(`/api/graphs/${of}/versions`, {
     method: "POST",
     body: "{}",
     headers: { "content-type": "application/json" },
@@ -33,12 +33,12 @@ async function version(): Promise<{ id: string; digest: string; umrf: string }> 
 }
 
 /** Runs the graph's newest version with actions that do as they are told, to its end. */
-async function ran(behaviours: Record<string, unknown[]>): Promise<Run> {
-  const { id, digest, umrf } = await version();
+async function ran(behaviours: Record<string, unknown[]>, of = graph): Promise<Run> {
+  const { id, digest, umrf } = await version(of);
   const head = {
     version: id,
     digest,
-    graph,
+    graph: of,
     engine: "simulator",
     request_id: `e2e-${Math.random()}`,
   };
@@ -156,6 +156,69 @@ test("a run goes again with one fault, in the simulator", async () => {
   await page.getByRole("button", { name: "Run in the simulator" }).click();
   await expect(page).not.toHaveURL(new RegExp(good.id));
   await expect(card(page, "Wait", 2).getByText("error")).toBeVisible({ timeout: 15_000 });
+});
+
+/** A graph in which the first action hands a value to the second one. */
+async function handingOver(): Promise<string> {
+  const number = (value: number) => ({ value: { pvf_type: "number", pvf_value: value } });
+  const [first, second] = [
+    { name: "Measure", instance_id: 0 },
+    { name: "Move", instance_id: 0 },
+  ];
+  const body = JSON.stringify({
+    graph_name: "handing_over",
+    graph_entry: [first],
+    graph_exit: [second],
+    actions: [
+      { ...first, type: "sync", parents: [], children: [second], output_parameters: number(7) },
+      { ...second, type: "sync", parents: [first], children: [], input_parameters: number(5) },
+    ],
+  });
+  const headers = { "content-type": "application/json" };
+  return (await product.ask<{ id: string }>("/api/graphs", { method: "POST", body, headers })).id;
+}
+
+test("values as an action ran with them stand beside those that were sent", async () => {
+  const { page } = ada;
+  const run = await ran({ "*": [QUICK] }, await handingOver());
+  await page.goto(`${product.url}/runs/${run.id}`);
+  await page.getByRole("tab", { name: "Parameters" }).click();
+  const move = page.getByRole("region", { name: "Parameters of Move 0" });
+  await expect(move.getByRole("row", { name: /value/ })).toContainText("5≠ 7");
+});
+
+test("a run starts again through the dialog of every start, looked at and held", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${good.id}`);
+  await page.getByRole("button", { name: "Again" }).click();
+  await page.getByRole("menuitem", { name: "v1 again …" }).click();
+  const dialog = page.getByRole("dialog", { name: "Start v1 of chain_3" });
+  await expect(dialog.getByRole("radio", { name: /Simulator/ })).toBeChecked();
+  const hold = dialog.getByRole("button", { name: "Start v1 on the simulator" });
+  await expect(hold).toBeEnabled();
+  await hold.focus();
+  await page.keyboard.down("Enter");
+  await expect(dialog).toBeHidden();
+  await page.keyboard.up("Enter");
+  await expect(page).not.toHaveURL(new RegExp(good.id));
+  await expect(card(page, "Wait", 2).getByText("true")).toBeVisible({ timeout: 15_000 });
+});
+
+test("a run is repeated with the newest version of its graph", async () => {
+  const { page } = ada;
+  await product.ask(`/api/graphs/${graph}`, {
+    method: "PATCH",
+    body: JSON.stringify({ name: "chain_renamed" }),
+    headers: { "content-type": "application/json" },
+  });
+  await page.goto(`${product.url}/runs/${bad.id}`);
+  await page.getByRole("button", { name: "Again" }).click();
+  await page.getByRole("menuitem", { name: "As it went, with the newest version" }).click();
+  await expect(page.getByRole("link", { name: "chain_renamed" })).toBeVisible();
+  await expect(card(page, "Wait", 1).getByText("error")).toBeVisible({ timeout: 15_000 });
+  await expect(page.getByRole("region", { name: "Why" })).toContainText(
+    "Wait 1 ended in error: “gripper jammed”",
+  );
 });
 
 test("statistics tell how often it succeeds and which action fails", async () => {

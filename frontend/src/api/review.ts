@@ -1,7 +1,7 @@
 /** What the runner tells of past runs: films, marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
 import { ask } from "./http";
-import type { ActionRun, Run, Visit } from "./runs";
+import { type ActionRun, getRun, type Run, type Visit } from "./runs";
 
 /** What became of an action. From the visit number `first` on, its visits are now `visits`. */
 export interface ActionFrame {
@@ -276,6 +276,33 @@ export function scriptOf(
 ): Promise<{ behaviours: unknown; doubts: { action: string; text: string }[] }> {
   const query = fault ? `?${new URLSearchParams({ ...fault })}` : "";
   return ask(`${runner}${path(run)}/script${query}`);
+}
+
+/** The same for another version of the graph; `umrf` is JSON text. */
+export function fittedScriptOf(
+  runner: string,
+  run: string,
+  umrf: string,
+  fault?: { action: string; fault: Fault },
+): Promise<{ behaviours: unknown; doubts: { action: string; text: string }[] }> {
+  const head = JSON.stringify({ ...fault });
+  const body = `${head.slice(0, -1)}${fault ? "," : ""}"umrf":${umrf}}`;
+  return ask(`${runner}${path(run)}/script`, { method: "POST", body });
+}
+
+/** Runs that one request has started together with this one. */
+export function useMates(runner: string | undefined, run: Run) {
+  const around = (ms: number) => new Date(Date.parse(run.requested_at) + ms).toISOString();
+  return useQuery({
+    queryKey: ["runs", "mates", run.id],
+    queryFn: async ({ signal }) => {
+      const query = new URLSearchParams({ since: around(-10_000), until: around(10_000) });
+      const near = await ask<Run[]>(`${runner}/api/runs?${query}`, { signal });
+      const ids = near.filter((each) => each.group === run.group && each.id !== run.id);
+      return Promise.all(ids.map((each) => getRun(runner ?? "", each.id, signal)));
+    },
+    enabled: runner !== undefined && run.group !== null,
+  });
 }
 
 export function expectRun(runner: string, run: string, name: string): Promise<unknown> {

@@ -1,10 +1,15 @@
 /** The screens around the features: home, runs, one run. */
+import { useLocation } from "wouter";
+import { useVersions } from "../api/graphs";
 import { ComparePage } from "../history/compare-page";
+import type { StartAgain } from "../history/run-menu";
 import { RunPage } from "../history/run-page";
 import { RunsPage } from "../history/runs-page";
 import { StatisticsPage } from "../history/statistics-page";
 import { Home } from "../library/home";
 import { RobotsPage } from "../robots/robots-page";
+import { StartDialog } from "../runs/start-dialog";
+import { nextLabel } from "../runs/use-start";
 import { useNewGraphs } from "./files";
 import { Bar, Frame } from "./frame";
 import { useTitle } from "./title";
@@ -34,8 +39,28 @@ export function RunScreen({ id }: { id: string }) {
   useTitle("Run");
   return (
     <Frame>
-      <RunPage id={id} bar={(parts) => <Bar at="runs" {...parts} />} />
+      <RunPage
+        id={id}
+        bar={(parts) => <Bar at="runs" {...parts} />}
+        start={(again, onClose) => <Again {...again} onClose={onClose} />}
+      />
     </Frame>
+  );
+}
+
+/** A run once more: looked at, held, recorded like every other start. */
+function Again({ engines, onClose, ...what }: StartAgain & { onClose: () => void }) {
+  const [, go] = useLocation();
+  const versions = useVersions(what.graph).data ?? [];
+  return (
+    <StartDialog
+      {...what}
+      label={nextLabel(versions, what.seq)}
+      chosen={engines}
+      onChosen={() => undefined}
+      onStarted={([first]) => first && go(`/runs/${first.id}`)}
+      onClose={onClose}
+    />
   );
 }
 

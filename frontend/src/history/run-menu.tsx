@@ -1,5 +1,5 @@
 /** What can be done with a run that was: run it again, compare it, hand it over, expect it. */
-import { Button, Menu, Modal, Select, Stack, Text, TextInput } from "@mantine/core";
+import { Button, Menu, Modal, Stack, Text, TextInput } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import {
   IconArrowsDiff,
@@ -7,100 +7,37 @@ import {
   IconChevronDown,
   IconDownload,
   IconPlayerPlay,
+  IconPlayerTrackNext,
   IconRepeat,
   IconShieldCheck,
 } from "@tabler/icons-react";
 import { useState } from "react";
 import { useLocation } from "wouter";
-import { askText, sentence } from "../api/http";
-import { expectRun, exportUrl, type Fault, scriptOf, umrfUrl } from "../api/review";
-import { type Run, startRun } from "../api/runs";
+import { graphMoment, useVersions, versionName } from "../api/graphs";
+import { sentence } from "../api/http";
+import { expectRun, exportUrl } from "../api/review";
+import type { Run } from "../api/runs";
+import { type Repeated, repeat, type Which } from "./again";
+import { FaultDialog } from "./fault-dialog";
 import style from "./run-page.module.css";
 
-const FAULTS: { value: Fault; label: string }[] = [
-  { value: "error", label: "It ends in error" },
-  { value: "false", label: "It ends false" },
-  { value: "hang", label: "It never ends and ignores Stop" },
-  { value: "init_error", label: "It fails while it is made ready" },
-];
+/** A start like any other one, that begins with what a run had. */
+export interface StartAgain {
+  graph: string;
+  name: string;
+  seq: number;
+  engines: readonly string[];
+}
 
 interface Props {
   runner: string | undefined;
   run: Run;
 }
 
-/** Starts what ran, in the simulator, with actions that do what they did then. */
-async function again(
-  runner: string,
-  run: Run,
-  fault?: { action: string; fault: Fault },
-): Promise<string> {
-  const [umrf, script] = await Promise.all([
-    askText(umrfUrl(runner, run.id)),
-    scriptOf(runner, run.id, fault),
-  ]);
-  const started = await startRun({
-    runner,
-    version: run.version ?? "",
-    digest: run.digest,
-    umrf,
-    graph: run.graph ?? "",
-    engines: ["simulator"],
-    request: crypto.getRandomValues(new Uint32Array(4)).join("-"),
-    script: { behaviours: script.behaviours },
-  });
-  return started.runs[0]?.id ?? "";
-}
-
-function FaultDialog({ runner, run, onClose }: Props & { onClose: () => void }) {
-  const [, go] = useLocation();
-  const actions = Object.keys(run.actions ?? {});
-  const [action, setAction] = useState<string | null>(actions[0] ?? null);
-  const [fault, setFault] = useState<string | null>("error");
-  const [refused, setRefused] = useState("");
-  const start = async () => {
-    const chosen = FAULTS.find((each) => each.value === fault);
-    if (runner === undefined || action === null || chosen === undefined) return;
-    try {
-      const fresh = await again(runner, run, { action, fault: chosen.value });
-      onClose();
-      go(`/runs/${fresh}`);
-    } catch (error) {
-      setRefused(sentence(error));
-    }
-  };
-  return (
-    <Modal opened onClose={onClose} title="Run again with one fault" centered>
-      <Stack gap="sm">
-        <Text size="sm" c="dimmed">
-          In the simulator: everything goes as it did in run {run.number}, except this.
-        </Text>
-        <Select
-          label="Action"
-          data={actions}
-          value={action}
-          onChange={setAction}
-          searchable
-          allowDeselect={false}
-        />
-        <Select
-          label="Fault"
-          data={FAULTS}
-          value={fault}
-          onChange={setFault}
-          allowDeselect={false}
-        />
-        {refused !== "" && (
-          <Text size="sm" c="red" role="alert">
-            {refused}
-          </Text>
-        )}
-        <Button onClick={() => void start()} disabled={action === null}>
-          Run in the simulator
-        </Button>
-      </Stack>
-    </Modal>
-  );
+interface MenuProps extends Props {
+  /** Engines of the run, and of those that were started with it. */
+  engines: readonly string[];
+  onStart: (again: StartAgain) => void;
 }
 
 function ExpectDialog({ runner, run, onClose }: Props & { onClose: () => void }) {
@@ -145,19 +82,33 @@ function ExpectDialog({ runner, run, onClose }: Props & { onClose: () => void })
   );
 }
 
-export function RunMenu({ runner, run }: Props) {
+export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
   const [, go] = useLocation();
   const [dialog, setDialog] = useState<"fault" | "expect" | null>(null);
   const over = run.ended_at !== null;
   const ran = Object.values(run.actions ?? {}).some((action) => action.visits.length > 0);
-  const repeat = async () => {
-    if (runner === undefined) return;
-    try {
-      go(`/runs/${await again(runner, run)}`);
-    } catch (error) {
-      notifications.show({ color: "red", title: "Not started", message: sentence(error) });
-    }
+  const graph = run.graph ?? "";
+  const versions = useVersions(graph, run.version).data ?? [];
+  const version = versions.find((each) => each.id === run.version);
+  const where = engines.join(", ");
+  const complain = (error: unknown) =>
+    notifications.show({ color: "red", title: "Not started", message: sentence(error) });
+  const show = ({ run: fresh, doubts }: Repeated) => {
+    go(`/runs/${fresh}`);
+    if (doubts.length === 0) return;
+    const told = doubts.slice(0, 3).map(({ action, text }) => `${action}: ${text}`);
+    const more = doubts.length > 3 ? [`and ${doubts.length - 3} more`] : [];
+    notifications.show({
+      title: "Not everything was known",
+      message: [...told, ...more].join(" "),
+      autoClose: 12_000,
+    });
   };
+  const simulate = (which: Which) => {
+    if (runner !== undefined) repeat(runner, run, which).then(show, complain);
+  };
+  const start = (seq: number) => onStart({ graph, name: run.graph_name, seq, engines });
+  const startNewest = () => graphMoment(graph).then(({ seq }) => start(seq), complain);
   const file = (format: "jsonl" | "csv" | "mcap") =>
     runner === undefined ? undefined : exportUrl(runner, run.id, format);
   const close = () => setDialog(null);
@@ -176,14 +127,41 @@ export function RunMenu({ runner, run }: Props) {
           </Button>
         </Menu.Target>
         <Menu.Dropdown>
-          <Menu.Label>In the simulator</Menu.Label>
+          {graph !== "" && (
+            <>
+              <Menu.Label>Start on {where}</Menu.Label>
+              <Menu.Item
+                leftSection={<IconPlayerPlay size={15} aria-hidden />}
+                disabled={version === undefined}
+                onClick={() => version && start(version.seq)}
+              >
+                {version ? versionName(versions, version.id) : "This version"} again …
+              </Menu.Item>
+              <Menu.Item
+                leftSection={<IconPlayerTrackNext size={15} aria-hidden />}
+                onClick={() => void startNewest()}
+              >
+                The newest version …
+              </Menu.Item>
+            </>
+          )}
+          <Menu.Label>Repeat in the simulator</Menu.Label>
           <Menu.Item
-            leftSection={<IconPlayerPlay size={15} aria-hidden />}
+            leftSection={<IconRepeat size={15} aria-hidden />}
             disabled={!over || !ran}
-            onClick={() => void repeat()}
+            onClick={() => simulate("same")}
           >
             As it went
           </Menu.Item>
+          {graph !== "" && (
+            <Menu.Item
+              leftSection={<IconRepeat size={15} aria-hidden />}
+              disabled={!over || !ran}
+              onClick={() => simulate("newest")}
+            >
+              As it went, with the newest version
+            </Menu.Item>
+          )}
           <Menu.Item
             leftSection={<IconBug size={15} aria-hidden />}
             disabled={!over || !ran}
@@ -224,7 +202,9 @@ export function RunMenu({ runner, run }: Props) {
           ))}
         </Menu.Dropdown>
       </Menu>
-      {dialog === "fault" && <FaultDialog runner={runner} run={run} onClose={close} />}
+      {dialog === "fault" && (
+        <FaultDialog runner={runner} run={run} onDone={show} onClose={close} />
+      )}
       {dialog === "expect" && <ExpectDialog runner={runner} run={run} onClose={close} />}
     </>
   );

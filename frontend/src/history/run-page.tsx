@@ -7,7 +7,7 @@ import { Link, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
 import { sentence } from "../api/http";
 import { endWords, type Progress, progressByAid, runWord } from "../api/progress";
-import { type FilmMark, useFilm } from "../api/review";
+import { type FilmMark, useFilm, useMates } from "../api/review";
 import { type Run, useRun } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { fromUmrf } from "../ui/canvas/from-umrf";
@@ -15,7 +15,7 @@ import { GraphView } from "../ui/canvas/view";
 import { Empty } from "../ui/empty";
 import { lanesOf } from "../ui/lanes";
 import { StateWord } from "../ui/state-word";
-import { Timeline } from "../ui/timeline";
+import { Timeline, type Track } from "../ui/timeline";
 import type { Crumb } from "../ui/top-bar";
 import { clock, instant, useNow } from "../ui/when";
 import { Causes } from "./causes";
@@ -23,8 +23,9 @@ import { Events } from "./events";
 import { Facts } from "./facts";
 import { gapsOf, signsOf } from "./film-signs";
 import { Notes, Pin } from "./notes";
+import { Parameters } from "./parameters";
 import { PlayerControls } from "./player";
-import { RunMenu } from "./run-menu";
+import { RunMenu, type StartAgain } from "./run-menu";
 import style from "./run-page.module.css";
 import { type Replay, useReplay } from "./use-replay";
 import { useVersionLabel } from "./version-label";
@@ -40,6 +41,8 @@ const NO_MARKS: readonly FilmMark[] = [];
 interface Props {
   id: string;
   bar: (parts: BarParts) => ReactNode;
+  /** The dialog by which everything is started. */
+  start: (again: StartAgain, onClose: () => void) => ReactNode;
 }
 
 /** Progress as it was at a moment: what went on then had gone on for so long. */
@@ -76,7 +79,22 @@ function useAddress(id: string, replay: Replay, selected: string | null): void {
   }, [id, at, start, playing, selected]);
 }
 
-function Shown({ run: newest, bar }: { run: Run; bar: Props["bar"] }) {
+/** The runs that began together with this one, as they are known now. */
+function useTracks(runner: string | undefined, run: Run): readonly Track[] {
+  const { now } = useLive();
+  const mates = useMates(runner, run).data;
+  return useMemo(
+    () =>
+      (mates ?? []).map((stored) => {
+        const live = now.runs.get(stored.id);
+        const mate = live ? { ...stored, ...live, umrf: stored.umrf } : stored;
+        return { run: mate, lanes: lanesOf(mate, fromUmrf(mate.umrf), mate.engine) };
+      }),
+    [mates, now.runs],
+  );
+}
+
+function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const { now: live, runner } = useLive();
   const place = usePlace(newest);
   const [selected, setSelected] = useState<string | null>(place.action);
@@ -93,7 +111,17 @@ function Shown({ run: newest, bar }: { run: Run; bar: Props["bar"] }) {
     () => progressAt(run, unsure && !past, replay.at),
     [run, unsure, past, replay.at],
   );
-  const lanes = useMemo(() => lanesOf(newest, graph), [newest, graph]);
+  const mates = useTracks(runner, newest);
+  const robot = mates.length > 0 ? newest.engine : "";
+  const lanes = useMemo(() => lanesOf(newest, graph, robot), [newest, graph, robot]);
+  const engines = useMemo(
+    () =>
+      newest.simulated
+        ? ["simulator"]
+        : [newest.engine, ...mates.map(({ run: mate }) => mate.engine)].sort(),
+    [newest, mates],
+  );
+  const [again, setAgain] = useState<StartAgain | null>(null);
   const picked = useMemo(() => new Set(selected === null ? [] : [selected]), [selected]);
   const film = useFilm(runner, newest.id, 0, true).data;
   const signs = useMemo(() => signsOf(film), [film]);
@@ -131,7 +159,7 @@ function Shown({ run: newest, bar }: { run: Run; bar: Props["bar"] }) {
         actions: (
           <>
             <Pin runner={runner} run={newest.id} />
-            <RunMenu runner={runner} run={newest} />
+            <RunMenu runner={runner} run={newest} engines={engines} onStart={setAgain} />
             {newest.graph !== null && (
               <Button component={Link} to={`/graphs/${newest.graph}`} className={style.back ?? ""}>
                 Open graph
@@ -171,12 +199,14 @@ function Shown({ run: newest, bar }: { run: Run; bar: Props["bar"] }) {
             onSeek={replay.seek}
             signs={signs}
             gaps={gaps}
+            others={mates}
           />
         </section>
         <aside className={style.side} aria-label="About the run">
           <Tabs defaultValue="events" className={style.tabs ?? ""}>
             <Tabs.List>
               <Tabs.Tab value="events">Events</Tabs.Tab>
+              <Tabs.Tab value="parameters">Parameters</Tabs.Tab>
               <Tabs.Tab value="facts">Facts</Tabs.Tab>
             </Tabs.List>
             <Tabs.Panel value="events" className={style.panel ?? ""}>
@@ -190,6 +220,9 @@ function Shown({ run: newest, bar }: { run: Run; bar: Props["bar"] }) {
                 onSeek={replay.seek}
               />
             </Tabs.Panel>
+            <Tabs.Panel value="parameters" className={style.panel ?? ""}>
+              <Parameters run={run} selected={selected} onPick={setSelected} />
+            </Tabs.Panel>
             <Tabs.Panel value="facts" className={style.panel ?? ""}>
               <Notes runner={runner} run={newest.id} />
               <Facts run={newest} version={label} by={authorName(newest.author)} />
@@ -197,11 +230,12 @@ function Shown({ run: newest, bar }: { run: Run; bar: Props["bar"] }) {
           </Tabs>
         </aside>
       </main>
+      {again !== null && start(again, () => setAgain(null))}
     </>
   );
 }
 
-export function RunPage({ id, bar }: Props) {
+export function RunPage({ id, bar, start }: Props) {
   const { runner, now } = useLive();
   const stored = useRun(runner, id);
   const live = now.runs.get(id);
@@ -209,7 +243,7 @@ export function RunPage({ id, bar }: Props) {
     if (!stored.data) return null;
     return live ? { ...stored.data, ...live, umrf: stored.data.umrf } : stored.data;
   }, [stored.data, live]);
-  if (run !== null) return <Shown run={run} bar={bar} />;
+  if (run !== null) return <Shown run={run} bar={bar} start={start} />;
   const crumbs = [{ label: "Runs", to: "/runs" }, { label: "Run" }];
   return (
     <>

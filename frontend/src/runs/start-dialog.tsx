@@ -7,6 +7,7 @@ import { Link } from "wouter";
 import { askText, sentence } from "../api/http";
 import { useMay } from "../api/person";
 import { lookBefore, type Preflight, type Robot, SIMULATOR } from "../api/robots";
+import type { Run } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { EngineWord } from "../ui/engine-word";
 import { HoldButton } from "../ui/hold-button";
@@ -22,6 +23,7 @@ interface Props {
   label: string;
   chosen: readonly string[];
   onChosen: (engines: string[]) => void;
+  onStarted?: (runs: readonly Run[]) => void;
   onClose: () => void;
 }
 
@@ -143,7 +145,8 @@ export function obstacleOf(
   return null;
 }
 
-export function StartDialog({ graph, name, seq, label, chosen, onChosen, onClose }: Props) {
+export function StartDialog(props: Props) {
+  const { graph, name, seq, label, chosen, onChosen, onStarted, onClose } = props;
   const [engines, setEngines] = useState<readonly string[]>(chosen);
   const [reason, setReason] = useState("");
   const { now } = useLive();
@@ -167,7 +170,11 @@ export function StartDialog({ graph, name, seq, label, chosen, onChosen, onClose
     rememberEngines(graph, engines);
     onChosen([...engines]);
     const override = codes.length > 0 ? { override: { codes, reason: reason.trim() } } : {};
-    start.mutate({ seq, engines, digest, ...override }, { onSuccess: onClose });
+    const done = ({ runs }: { runs: readonly Run[] }) => {
+      onClose();
+      onStarted?.(runs);
+    };
+    start.mutate({ seq, engines, digest, ...override }, { onSuccess: done });
   };
   const where = engines.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
   return (

@@ -8,8 +8,9 @@ export interface Lane {
   robot: string;
 }
 
-/** Every action, those that ran first, in the order in which they began. */
-export function lanesOf(run: Run, graph: Graph): Lane[] {
+/** Every action, those that ran first, in the order in which they began. `robot` is whose they are
+ * where the graph does not say. */
+export function lanesOf(run: Run, graph: Graph, robot = ""): Lane[] {
   const known = new Map(graph.actions.map((action) => [fullName(action), action]));
   const own = Object.keys(run.actions ?? {});
   const names = own.length > 0 ? own : [...known.keys()];
@@ -18,7 +19,7 @@ export function lanesOf(run: Run, graph: Graph): Lane[] {
     .map((name) => ({
       name,
       aid: run.actions?.[name]?.aid ?? known.get(name)?.key ?? null,
-      robot: known.get(name)?.actor ?? "",
+      robot: known.get(name)?.actor || robot,
     }))
     .sort((a, b) => {
       const [x, y] = [began(a.name), began(b.name)];

@@ -22,6 +22,14 @@ interface Props {
   onSeek?: (at: number) => void;
   signs?: readonly TimeSign[];
   gaps?: readonly TimeGap[];
+  /** Runs that began together with this one, on the same axis. */
+  others?: readonly Track[];
+}
+
+/** The lanes of one more run. */
+export interface Track {
+  run: Run;
+  lanes: readonly Lane[];
 }
 
 /** A moment worth seeing on the axis: a stop, a pause, a proof, an alarm. */
@@ -121,12 +129,80 @@ function Across(props: {
   );
 }
 
+interface RowProps {
+  run: Run;
+  lane: Lane;
+  axis: { start: number; span: number; end: number };
+  unsure: boolean;
+  selected: string | null;
+  onPick: ((aid: string) => void) | undefined;
+}
+
+function LaneRow({ run, lane, axis, unsure, selected, onPick }: RowProps) {
+  const over = run.ended_at !== null;
+  const ended = instant(run.ended_at) ?? axis.end;
+  const action = run.actions?.[lane.name];
+  const visits = action?.visits ?? [];
+  const progress = action ? progressOf(action, run, unsure) : null;
+  return (
+    <li
+      className={style.lane}
+      data-selected={(lane.aid !== null && lane.aid === selected) || undefined}
+    >
+      <button
+        type="button"
+        className={style.name}
+        disabled={lane.aid === null || onPick === undefined}
+        onClick={() => lane.aid && onPick?.(lane.aid)}
+        title={lane.name}
+      >
+        <i style={{ background: robotColor(lane.robot) }} aria-hidden />
+        <span>{lane.robot === "" ? lane.name : `${lane.robot} · ${lane.name}`}</span>
+      </button>
+      <div className={style.track} aria-hidden>
+        {visits.map((visit, i) => {
+          const bar = barOf(visit, axis.start, axis.span, over ? ended : axis.end, over);
+          if (!bar) return null;
+          return (
+            // biome-ignore lint/suspicious/noArrayIndexKey: visits only ever grow
+            <Fragment key={i}>
+              {bar.maybe && (
+                <i
+                  className={style.maybe}
+                  title="Seen at one moment only: it may have gone on for this long"
+                  style={{
+                    left: `${bar.maybe.left}%`,
+                    width: `${bar.maybe.width}%`,
+                    color: toneColor[bar.tone],
+                  }}
+                />
+              )}
+              <i
+                data-tone={unsure && bar.open ? "unknown" : bar.tone}
+                data-inferred={visit.how === "inferred" || undefined}
+                style={{
+                  left: `${bar.left}%`,
+                  width: `${bar.width}%`,
+                  color: toneColor[bar.tone],
+                }}
+              />
+            </Fragment>
+          );
+        })}
+      </div>
+      <span className={style.state}>
+        {progress && <StateWord tone={progress.tone} word={progress.word} {...moreOf(progress)} />}
+      </span>
+    </li>
+  );
+}
+
 const NOTHING: readonly never[] = [];
 
 export function Timeline(props: Props) {
   const { run, lanes, until, unsure, selected = null, onPick, onSeek, cursor = null } = props;
   const start = instant(run.started_at) ?? until;
-  const over = run.ended_at !== null;
+  const tracks: readonly Track[] = [{ run, lanes }, ...(props.others ?? NOTHING)];
   const end = instant(run.ended_at) ?? until;
   const span = Math.max(1000, end - start);
   const share = (at: number) => Math.min(100, Math.max(0, ((at - start) / span) * 100));
@@ -156,65 +232,19 @@ export function Timeline(props: Props) {
         gaps={props.gaps ?? NOTHING}
       />
       <ul className={style.lanes} aria-label="Actions of the run over time">
-        {lanes.map((lane) => {
-          const action = run.actions?.[lane.name];
-          const visits = action?.visits ?? [];
-          const progress = action ? progressOf(action, run, unsure) : null;
-          return (
-            <li
-              key={lane.name}
-              className={style.lane}
-              data-selected={(lane.aid !== null && lane.aid === selected) || undefined}
-            >
-              <button
-                type="button"
-                className={style.name}
-                disabled={lane.aid === null || onPick === undefined}
-                onClick={() => lane.aid && onPick?.(lane.aid)}
-                title={lane.name}
-              >
-                <i style={{ background: robotColor(lane.robot) }} aria-hidden />
-                <span>{lane.robot === "" ? lane.name : `${lane.robot} · ${lane.name}`}</span>
-              </button>
-              <div className={style.track} aria-hidden>
-                {visits.map((visit, i) => {
-                  const bar = barOf(visit, start, span, end, over);
-                  if (!bar) return null;
-                  return (
-                    // biome-ignore lint/suspicious/noArrayIndexKey: visits only ever grow
-                    <Fragment key={i}>
-                      {bar.maybe && (
-                        <i
-                          className={style.maybe}
-                          title="Seen at one moment only: it may have gone on for this long"
-                          style={{
-                            left: `${bar.maybe.left}%`,
-                            width: `${bar.maybe.width}%`,
-                            color: toneColor[bar.tone],
-                          }}
-                        />
-                      )}
-                      <i
-                        data-tone={unsure && bar.open ? "unknown" : bar.tone}
-                        data-inferred={visit.how === "inferred" || undefined}
-                        style={{
-                          left: `${bar.left}%`,
-                          width: `${bar.width}%`,
-                          color: toneColor[bar.tone],
-                        }}
-                      />
-                    </Fragment>
-                  );
-                })}
-              </div>
-              <span className={style.state}>
-                {progress && (
-                  <StateWord tone={progress.tone} word={progress.word} {...moreOf(progress)} />
-                )}
-              </span>
-            </li>
-          );
-        })}
+        {tracks.flatMap((track) =>
+          track.lanes.map((lane) => (
+            <LaneRow
+              key={`${track.run.id} ${lane.name}`}
+              run={track.run}
+              lane={lane}
+              axis={{ start, span, end }}
+              unsure={unsure && track.run.ended_at === null}
+              selected={selected}
+              onPick={onPick}
+            />
+          )),
+        )}
       </ul>
     </div>
   );

@@ -1,0 +1,65 @@
+/** A run once more in the simulator: the graph that it ran or the newest one, doing what it did then. */
+import { graphMoment, publish, type Version } from "../api/graphs";
+import { askText } from "../api/http";
+import { memberText } from "../api/member";
+import { type Fault, fittedScriptOf, scriptOf, umrfUrl } from "../api/review";
+import { type Run, startRun } from "../api/runs";
+
+export type Which = "same" | "newest";
+
+export interface Injected {
+  action: string;
+  fault: Fault;
+}
+
+export interface Repeated {
+  run: string;
+  /** What the run did not tell, so that the script had to choose. */
+  doubts: readonly { action: string; text: string }[];
+}
+
+interface Sent {
+  version: string;
+  digest: string;
+  umrf: string;
+}
+
+/** The graph as it is now, published as exactly that. */
+async function newestOf(graph: string): Promise<Sent> {
+  const { seq } = await graphMoment(graph);
+  const text = await publish(graph, seq);
+  const version = JSON.parse(text) as Version;
+  const umrf = memberText(text, "umrf");
+  if (umrf === null) throw new Error("The editor gave no graph with the version.");
+  return { version: version.id, digest: version.digest, umrf };
+}
+
+/** Starts it; whatever was not seen is chosen, and told. */
+export async function repeat(
+  runner: string,
+  run: Run,
+  which: Which,
+  fault?: Injected,
+): Promise<Repeated> {
+  const sent: Sent =
+    which === "newest" && run.graph !== null
+      ? await newestOf(run.graph)
+      : {
+          version: run.version ?? "",
+          digest: run.digest,
+          umrf: await askText(umrfUrl(runner, run.id)),
+        };
+  const script =
+    which === "newest"
+      ? await fittedScriptOf(runner, run.id, sent.umrf, fault)
+      : await scriptOf(runner, run.id, fault);
+  const started = await startRun({
+    runner,
+    ...sent,
+    graph: run.graph ?? "",
+    engines: ["simulator"],
+    request: crypto.getRandomValues(new Uint32Array(4)).join("-"),
+    script: { behaviours: script.behaviours },
+  });
+  return { run: started.runs[0]?.id ?? "", doubts: script.doubts };
+}
