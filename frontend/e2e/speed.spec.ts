@@ -15,6 +15,8 @@ const rows: string[][] = [];
 const frames: string[][] = [];
 
 test.skip(process.env.SPEED === undefined, "measures; started by `make performance`");
+// The recorder of failures takes pictures of the page, which cost as much as what is measured.
+test.use({ trace: "off", screenshot: "off" });
 test.describe.configure({ mode: "serial", timeout: 300_000 });
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
@@ -23,7 +25,7 @@ test.afterEach(() => {
   const head = ["actions", "open", "of that CPU", "key to paint", "drag: frame", "longest", "tidy"];
   const tables = [
     { head, rows },
-    { head: ["1,000 actions", "frame (median)", "95 %", "99 %", "longest"], rows: frames },
+    { head: ["1,000 actions", "frame (median)", "95 %", "99 %", "longest", "CPU"], rows: frames },
   ];
   writeFileSync(resolve(ROOT, "frontend/test-results/speed.json"), JSON.stringify(tables));
 });
@@ -156,9 +158,8 @@ test(`a graph of 1,000 actions while ${OTHERS} people edit it`, async ({ browser
   const id = await field(1000);
   await page.goto(`${product.url}/graphs/${id}`);
   await shown(page);
-  const alone = await watchFrames(page);
-  await pause(4000);
-  note("alone", await alone());
+  await pause(3000); // what opening leaves to do
+  await watch(page, "alone");
   const plan = {
     ...{ port: product.port, pid: process.pid, dialect: "plain", deed: "idle" },
     ...{ path: "/api/graphs/{room}/room", rooms: [id], people: OTHERS, rate: 2, seconds: 9 },
@@ -170,13 +171,35 @@ test(`a graph of 1,000 actions while ${OTHERS} people edit it`, async ({ browser
   ]);
   const ended = new Promise((done) => others.once("exit", done));
   await pause(3000);
-  const together = await watchFrames(page);
-  await pause(5000);
-  note(`${OTHERS} people, 40 edits/s`, await together());
+  const profiled = await profile(page, process.env.PROFILE);
+  await watch(page, `${OTHERS} people, 40 edits/s`);
+  await profiled();
   expect(await ended).toBe(0);
   await context.close();
 });
 
-function note(what: string, sorted: number[]): void {
-  frames.push([what, ...[0.5, 0.95, 0.99, 1].map((part) => ms(share(sorted, part)))]);
+const WATCHED = 5; // s
+
+/** A row about the frames of the next seconds, and how much of a processor the page's thread takes. */
+async function watch(page: Page, what: string): Promise<void> {
+  const [gaps, busy] = [await watchFrames(page), await busyWith(page)];
+  const before = await busy();
+  await pause(WATCHED * 1000);
+  const cpu = ((await busy()) - before) / (10 * WATCHED);
+  const sorted = await gaps();
+  const parts = [0.5, 0.95, 0.99, 1].map((part) => ms(share(sorted, part)));
+  frames.push([what, ...parts, `${cpu.toFixed(0)} %`]);
+}
+
+/** Writes a profile of the page's thread to `file` when asked; the tools of Chromium open it. */
+async function profile(page: Page, file: string | undefined): Promise<() => Promise<void>> {
+  if (file === undefined) return async () => {};
+  const tools = await page.context().newCDPSession(page);
+  await tools.send("Profiler.enable");
+  await tools.send("Profiler.setSamplingInterval", { interval: 500 });
+  await tools.send("Profiler.start");
+  return async () => {
+    const { profile } = await tools.send("Profiler.stop");
+    writeFileSync(file, JSON.stringify(profile));
+  };
 }

@@ -4,6 +4,7 @@ import { useMediaQuery } from "@mantine/hooks";
 import {
   Background,
   BackgroundVariant,
+  type Connection,
   ConnectionLineType,
   MiniMap,
   PanOnScrollMode,
@@ -25,6 +26,7 @@ import { edgeTypes, nodeTypes } from "../ui/canvas/view";
 import { actionCarrier } from "../ui/carry";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../ui/outcome";
 import { robotColor } from "../ui/robot";
+import { useSteady } from "../ui/steady";
 import { type Bench, endName, GRID, placeAction } from "./bench";
 import style from "./canvas.module.css";
 import { arrowAt } from "./hit";
@@ -33,6 +35,13 @@ import type { useCanvas } from "./use-canvas";
 import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
 import { usePinch, ZOOM } from "./use-pinch";
 import { usePress } from "./use-press";
+
+// What React Flow gets anew, it hands on to all that is drawn.
+const SNAP_GRID: [number, number] = [GRID, GRID];
+const OTHER_BUTTONS = [1, 2];
+const MORE_KEYS = ["Shift", "Meta", "Control"];
+const PLAIN = { hideAttribution: true };
+const MAP_SIZE = { width: 132, height: 92 };
 
 interface Props {
   bench: Bench;
@@ -104,6 +113,46 @@ function useNoteDesk(bench: Bench, writing: string | null, setResized: NoteDesk[
   }, [doc, graph, open, select, mayEdit, writing, alone, setResized]);
 }
 
+/** What hands do on the canvas: functions that stay the same, since each card and arrow has them. */
+function useHands(
+  { bench, canvas, onPanned }: Pick<Props, "bench" | "canvas" | "onPanned">,
+  connecting: ReturnType<typeof useConnecting>,
+) {
+  return {
+    onNodeDrag: useSteady(canvas.onDrag),
+    onNodeDragStop: useSteady(canvas.onDragStop),
+    onSelectionDrag: useSteady((event: MouseEvent, nodes: CanvasNode[]) => {
+      if (nodes[0]) canvas.onDrag(event, nodes[0], nodes);
+    }),
+    onSelectionDragStop: useSteady((event: MouseEvent, nodes: CanvasNode[]) => {
+      if (nodes[0]) canvas.onDragStop(event, nodes[0], nodes);
+    }),
+    onConnect: useSteady(({ source, target, sourceHandle }: Connection) =>
+      connecting.draw(source, target, outcomeOf(sourceHandle)),
+    ),
+    onConnectEnd: useSteady(connecting.onConnectEnd),
+    onReconnect: useSteady(connecting.onReconnect),
+    onReconnectStart: useSteady(connecting.onReconnectStart),
+    onReconnectEnd: useSteady(connecting.onReconnectEnd),
+    onEdgeClick: useSteady((event: MouseEvent, edge: Arrow) => {
+      const id = edge.data?.relation;
+      if (id) bench.select(event.shiftKey ? [...bench.selection, id] : [id]);
+    }),
+    onNodeClick: useSteady((event: MouseEvent) => {
+      if (connecting.onClick(event)) return;
+      const onNote = (event.target as Element).closest(".react-flow__node-note") !== null;
+      if (!onNote && bench.tool === "pan") bench.setPanel("details");
+    }),
+    onPaneClick: useSteady((event: MouseEvent) => {
+      if (!connecting.onClick(event)) bench.select([]);
+    }),
+    // A move without an event is the page's own.
+    onMoveStart: useSteady((event: Event | null) => {
+      if (event !== null) onPanned();
+    }),
+  };
+}
+
 export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: Props) {
   const { presence } = useRoom();
   const { flow, setOver } = canvas;
@@ -145,6 +194,7 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
     bench.openAdd({ screen, at: [Math.round(at.x), Math.round(at.y)], from });
   };
   const connecting = useConnecting(bench, openAddAt);
+  const hands = useHands({ bench, canvas, onPanned }, connecting);
   const press = usePress(bench);
   const pinch = usePinch(bench, onPanned);
   const desk = useNoteDesk(bench, writing, canvas.setResized);
@@ -198,41 +248,17 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
           edgeTypes={edgeTypes}
           onNodesChange={canvas.onNodesChange}
           onEdgesChange={canvas.onEdgesChange}
-          onNodeDrag={canvas.onDrag}
-          onNodeDragStop={canvas.onDragStop}
-          onSelectionDrag={(event, nodes) => nodes[0] && canvas.onDrag(event, nodes[0], nodes)}
-          onSelectionDragStop={(event, nodes) =>
-            nodes[0] && canvas.onDragStop(event, nodes[0], nodes)
-          }
-          onConnect={({ source, target, sourceHandle }) =>
-            connecting.draw(source, target, outcomeOf(sourceHandle))
-          }
-          onConnectEnd={connecting.onConnectEnd}
+          {...hands}
           connectOnClick={false}
           edgesReconnectable={bench.mayEdit}
           reconnectRadius={12}
-          onReconnect={connecting.onReconnect}
-          onReconnectStart={connecting.onReconnectStart}
-          onReconnectEnd={connecting.onReconnectEnd}
           nodesDraggable={bench.mayEdit}
           nodesConnectable={bench.mayEdit}
           snapToGrid={bench.snap}
-          snapGrid={[GRID, GRID]}
+          snapGrid={SNAP_GRID}
           elevateNodesOnSelect={false}
-          onEdgeClick={(event, edge) => {
-            const id = edge.data?.relation;
-            if (id) bench.select(event.shiftKey ? [...bench.selection, id] : [id]);
-          }}
-          onNodeClick={(event) => {
-            if (connecting.onClick(event)) return;
-            const onNote = (event.target as Element).closest(".react-flow__node-note") !== null;
-            if (!onNote && bench.tool === "pan") bench.setPanel("details");
-          }}
-          onPaneClick={(event) => {
-            if (!connecting.onClick(event)) bench.select([]);
-          }}
           selectionOnDrag={bench.tool === "select"}
-          panOnDrag={bench.tool === "pan" ? true : coarse ? false : [1, 2]}
+          panOnDrag={bench.tool === "pan" ? true : coarse ? false : OTHER_BUTTONS}
           panOnScroll={false}
           panOnScrollMode={PanOnScrollMode.Free}
           selectionMode={SelectionMode.Partial}
@@ -240,16 +266,12 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
           connectionRadius={34}
           zoomOnDoubleClick={false}
           deleteKeyCode={null}
-          multiSelectionKeyCode={["Shift", "Meta", "Control"]}
+          multiSelectionKeyCode={MORE_KEYS}
           minZoom={ZOOM.least}
           maxZoom={ZOOM.most}
-          onMoveStart={(event) => {
-            // A move without an event is the page's own.
-            if (event !== null) onPanned();
-          }}
           onlyRenderVisibleElements={canvas.nodes.length > 150}
           nodeDragThreshold={3}
-          proOptions={{ hideAttribution: true }}
+          proOptions={PLAIN}
           aria-label="Canvas"
         >
           <ArrowTips />
@@ -261,7 +283,7 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
               position="top-right"
               pannable
               zoomable
-              style={{ width: 132, height: 92 }}
+              style={MAP_SIZE}
               nodeBorderRadius={10}
               nodeColor={mapColor}
               ariaLabel="Map of the canvas"

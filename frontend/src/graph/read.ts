@@ -70,13 +70,17 @@ export function readTakenUp(maps: Maps): {
 export interface GraphSource {
   /** The graph now; the same object until something of it changes. */
   graph(): Graph;
-  /** Calls back once after each transaction that may have changed it. */
+  /** Calls back after a transaction that may have changed it: one of this page at once. */
   subscribe(listener: () => void): () => void;
   /** Lets go of the document. */
   close(): void;
 }
 
-export function followGraph(doc: Y.Doc): GraphSource {
+/** `soon` calls back for what others changed; once for several transactions, if it likes. */
+export function followGraph(
+  doc: Y.Doc,
+  soon: (tell: () => void) => void = (tell) => tell(),
+): GraphSource {
   const reader = new Reader(mapsOf(doc));
   const listeners = new Set<() => void>();
   let changed = false;
@@ -91,10 +95,14 @@ export function followGraph(doc: Y.Doc): GraphSource {
     map.observe(onChange);
     return () => map.unobserve(onChange);
   });
-  const onEnd = () => {
+  const tell = () => {
+    for (const listener of [...listeners]) listener();
+  };
+  const onEnd = ({ local }: Y.Transaction) => {
     if (!changed) return;
     changed = false;
-    for (const listener of [...listeners]) listener();
+    if (local) tell();
+    else soon(tell);
   };
   doc.on("afterTransaction", onEnd);
   return {

@@ -9,6 +9,7 @@
 import type { Awareness } from "y-protocols/awareness";
 import type { Key, Position } from "../graph/model";
 import { same } from "../graph/same";
+import { atOnce, type Soon } from "./pace";
 
 /** What this page tells the others. */
 export interface Presence {
@@ -59,7 +60,8 @@ export interface PresenceSource {
 const INTERVAL_MS = 50;
 const NOTHING: Presence = { selection: [] };
 
-export function presenceOf(awareness: Awareness): PresenceSource {
+/** `soon` calls back for what changed among the others. */
+export function presenceOf(awareness: Awareness, soon: Soon = atOnce): PresenceSource {
   let mine: Presence = NOTHING;
   let toldAt = Number.NEGATIVE_INFINITY;
   let timer: ReturnType<typeof setTimeout> | undefined;
@@ -71,11 +73,14 @@ export function presenceOf(awareness: Awareness): PresenceSource {
     toldAt = performance.now();
     awareness.setLocalState({ ...mine });
   };
+  const tell = () => {
+    for (const listener of [...listeners]) listener();
+  };
   const onChange = () => {
     const fresh = peopleOf(awareness, people);
     if (fresh === people) return;
     people = fresh;
-    for (const listener of [...listeners]) listener();
+    soon(tell);
   };
   awareness.on("change", onChange);
   return {

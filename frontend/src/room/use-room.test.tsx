@@ -75,24 +75,30 @@ const show = (url = "ws://host/room") =>
       </StrictMode>,
     ),
   );
+/** What the server sends is drawn with the next frame. */
+const heard = (deed: () => void) =>
+  act(async () => {
+    deed();
+    await new Promise(requestAnimationFrame);
+  });
 const text = () => document.querySelector("p")?.textContent;
 
-test("a page shows the link, the graph, the people and undo as they change", () => {
+test("a page shows the link, the graph, the people and undo as they change", async () => {
   show();
   expect(text()).toBe("connecting 0");
-  act(() => void server.accept());
+  await heard(() => void server.accept());
   expect(text()).toBe("live 0");
-  act(() => void addAction(open.doc, { name: "Scan" }));
+  await heard(() => void addAction(open.doc, { name: "Scan" }));
   expect(text()).toBe("live 0 Scan undo");
-  act(() => server.presence(5, 1, { user: { id: "1", name: "Ada", color: "" } }));
+  await heard(() => server.presence(5, 1, { user: { id: "1", name: "Ada", color: "" } }));
   expect(text()).toBe("live 0 Scan Ada undo");
   act(() => void open.undo.undo());
   expect(text()).toBe("live 0 Ada");
 });
 
-test("who looks at one part is drawn again only when that part changes", () => {
+test("who looks at one part is drawn again only when that part changes", async () => {
   show();
-  act(() => void server.accept());
+  await heard(() => void server.accept());
   const before = drawn.name;
   act(() => void rename(open.doc, addAction(open.doc, { name: "Scan" }), "Look"));
   expect(drawn.name).toBe(before);
@@ -101,10 +107,23 @@ test("who looks at one part is drawn again only when that part changes", () => {
   expect(document.querySelector("h1")?.textContent).toBe("other");
 });
 
-test("leaving and changing the graph close the room that was open", () => {
+test("what others send between two frames is drawn once", async () => {
+  show();
+  await heard(() => void server.accept());
+  const before = drawn.graph;
+  await heard(() => {
+    for (let n = 0; n < 20; n += 1) {
+      server.broadcast((doc) => doc.getMap("actions").set(`AAAAAAAAAAA${n % 10}`, `Action ${n}`));
+    }
+  });
+  expect(drawn.graph - before).toBe(2); // each twice in strict mode
+  expect(open.source.graph().actions.length).toBe(10);
+});
+
+test("leaving and changing the graph close the room that was open", async () => {
   show();
   const first = server.last;
-  act(() => void server.accept());
+  await heard(() => void server.accept());
   show("ws://host/other");
   expect(first.readyState).toBe(3);
   const second = server.last;
@@ -162,13 +181,13 @@ test("a page knows who edits a field, where somebody looks, and whose edits wait
   act(() => void addAction(open.doc, { name: "Scan" }));
   await leave();
   await showKept({ graph: "g", person: ADA, device });
-  act(() => void server.accept());
+  await heard(() => void server.accept());
   const view = { x: 7, y: 8, zoom: 1 };
-  act(() => server.presence(5, 1, { user: MARI, editing: "k|name", view }));
+  await heard(() => server.presence(5, 1, { user: MARI, editing: "k|name", view }));
   await flush();
   act(() => goAfter(5));
   expect(text()).toBe("live 0 Mari Mari:1 at 7");
-  act(() => server.presence(5, 2, null));
+  await heard(() => server.presence(5, 2, null));
   expect(text()).toBe("live 0 Mari:1");
 });
 
@@ -178,7 +197,7 @@ test("what another person left on this device can be read and let go, and is nev
   act(() => void addAction(open.doc, { name: "Scan" }));
   await leave();
   await showKept({ graph: "g", person: ADA, device });
-  act(() => void server.accept());
+  await heard(() => void server.accept());
   await flush();
   const [stranded] = await left.read("m");
   expect([...(stranded?.difference.actions.values() ?? [])]).toContain("Scan");
@@ -194,16 +213,16 @@ test("edits on a history that the server left are made again there, or dropped, 
     const device = new FakeDevice();
     server = new FakeServer("one");
     await showKept({ graph: "g", person: ADA, device });
-    act(() => void server.accept());
+    await heard(() => void server.accept());
     act(() => void addAction(open.doc, { name: "Lost" }));
     act(() => server.last.end(1006));
     act(() => void addAction(open.doc, { name: "Mine" }));
     await leave();
     server = new FakeServer("two");
     await showKept({ graph: "g", person: ADA, device });
-    act(() => void server.accept());
+    await heard(() => void server.accept());
     await flush();
-    act(() => void server.accept());
+    await heard(() => void server.accept());
     await flush();
     expect(text()).toBe("live 0");
     expect(choice?.stranded.edits).toBe(1);

@@ -134,8 +134,8 @@ export function useGraphPart<T>(part: (graph: Graph) => T): T {
 
 /** How the page stands with the server, and how many edits are not stored yet. */
 export function useLink(): Link {
-  const { room } = useRoom();
-  return useSyncExternalStore(room.onLink, room.link);
+  const { room, onLink } = useRoom();
+  return useSyncExternalStore(onLink, room.link);
 }
 
 /** The others in the room. */

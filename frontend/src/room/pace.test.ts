@@ -1,0 +1,33 @@
+// @vitest-environment jsdom
+import { expect, test, vi } from "vitest";
+import { frames } from "./pace";
+
+const nextFrame = () => new Promise((done) => requestAnimationFrame(done));
+
+test("whatever comes between two frames is told once", async () => {
+  const { soon } = frames();
+  const tell = vi.fn();
+  for (let n = 0; n < 40; n += 1) soon(tell);
+  expect(tell).not.toHaveBeenCalled();
+  await nextFrame();
+  expect(tell).toHaveBeenCalledOnce();
+  soon(tell);
+  await nextFrame();
+  expect(tell).toHaveBeenCalledTimes(2);
+});
+
+test("a page without frames is told too", async () => {
+  vi.stubGlobal("requestAnimationFrame", () => 0); // as in a hidden tab
+  const { soon } = frames();
+  await new Promise<void>((told) => soon(told));
+  vi.unstubAllGlobals();
+});
+
+test("a page that was left is told nothing any more", async () => {
+  const { soon, close } = frames();
+  const tell = vi.fn();
+  soon(tell);
+  close();
+  await nextFrame();
+  expect(tell).not.toHaveBeenCalled();
+});

@@ -1,0 +1,11 @@
+/** Functions that stay the same, for what would draw again because of a new one. */
+import { useCallback, useLayoutEffect, useRef } from "react";
+
+/** The same function as long as the component is there. It does what the last one given does. */
+export function useSteady<A extends unknown[], R>(deed: (...given: A) => R): (...given: A) => R {
+  const latest = useRef(deed);
+  useLayoutEffect(() => {
+    latest.current = deed;
+  });
+  return useCallback((...given: A) => latest.current(...given), []);
+}
