@@ -76,7 +76,7 @@ async def healthy(editor: Editor, graph: str) -> AsyncIterator[list[float]]:
             things["k"] = float(len(taken))
             begun = time.monotonic()
             await session.send_bytes(wire.change(made[-1]))
-            await acks(session, len(taken) + 1)
+            await acks(session, len(taken) + 1, patience=60)
             taken.append(time.monotonic() - begun)
             await asyncio.sleep(0.02)
 

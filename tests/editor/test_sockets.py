@@ -34,10 +34,12 @@ def things(doc: Doc[Any]) -> dict[str, Any]:
     return found
 
 
-async def acks(session: httpx_ws.AsyncWebSocketSession, messages: int) -> tuple[int, int]:
-    """Read until so many messages are durable; what was said then."""
+async def acks(
+    session: httpx_ws.AsyncWebSocketSession, messages: int, patience: float = 5
+) -> tuple[int, int]:
+    """Read until so many messages are durable; what was said then. `patience` in s for each frame."""
     while True:
-        frame = await session.receive_bytes(timeout=5)
+        frame = await session.receive_bytes(timeout=patience)
         if frame[0] == wire.ACKS:
             reader = wire.Reader(frame[1:])
             durable, seq = reader.number(), reader.number()

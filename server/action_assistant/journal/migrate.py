@@ -54,7 +54,7 @@ def upgrade_to(branch: Branch, revision: str = "head") -> Callable[[Connection],
         if current - known:
             raise CannotStart(
                 f"The database {name} was made by a newer version of this program "
-                f"({', '.join(sorted(current - known))}): install that version, or choose another."
+                f"({', '.join(sorted(map(str, current - known)))}): install that version, or choose another."
             )
         if current - ours:
             raise CannotStart(f"The database {name} is not the {branch}'s.")
