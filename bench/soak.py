@@ -79,6 +79,11 @@ PARTS: Final[dict[str, Part]] = {
             "tests/test_stop_latency.py",
         ),
     ),
+    "archives": Part(
+        "kill -9 at every step of putting runs and raw messages into archives",
+        {"SOAK_ARCHIVE_EVERY": "1"},
+        ("tests/runner/review/test_retention.py", "-k", "kill"),
+    ),
     "clients": Part(
         "stock clients in a room that is silent for a minute",
         {"TEST_IDLE_SECONDS": "61"},

@@ -15,8 +15,14 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_URL": "where the command line finds the editor (http://127.0.0.1:8000)",
     "ACTION_ASSISTANT_HOSTS": "more host names that may stand in the address bar, comma separated",
     "ACTION_ASSISTANT_RUNNER_PYTHON": "the Python that has rclpy; `serve` runs the runner under it",
+    "ACTION_ASSISTANT_KEEP_RUNS": "days after which runs go into archives (for ever)",
+    "ACTION_ASSISTANT_KEEP_RAW": "days after which raw messages of robots go into archives; without "
+    "it they are deleted after 7 days or beyond 500 MB",
+    "ACTION_ASSISTANT_ARCHIVE": "the folder of archives (`archive` in the data folder)",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
 }
+#: The folder of archives, inside the data folder.
+ARCHIVE: Final = "archive"
 #: The host that stands for every address of this computer, of both families.
 EVERYWHERE: Final = "*"
 LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
@@ -36,6 +42,15 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     tls: bool = False
 
 
+class Keep(msgspec.Struct, frozen=True, kw_only=True):
+    """For how many days runs and raw messages stay here before they go into archives below `folder`;
+    None for ever."""
+
+    folder: Path
+    runs: float | None = None
+    raw: float | None = None
+
+
 class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How the runner runs. `page_port` is the port of the page that may talk to it."""
 
@@ -47,6 +62,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     limits: bool = True
     share: bool = False
     tls: bool = False
+    keep: Keep | None = None
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
@@ -62,6 +78,28 @@ def check_environment(environ: Mapping[str, str] = os.environ) -> None:
 def limits(environ: Mapping[str, str] = os.environ) -> bool:
     """Whether rate and socket limits hold."""
     return environ.get("ACTION_ASSISTANT_LIMITS", "").lower() != "off"
+
+
+def keep(data: Path, environ: Mapping[str, str] = os.environ) -> Keep:
+    """What is kept here, and for how long. Raises CannotStart."""
+    return Keep(
+        folder=Path(environ.get("ACTION_ASSISTANT_ARCHIVE") or data / ARCHIVE).resolve(),
+        runs=_days("ACTION_ASSISTANT_KEEP_RUNS", environ),
+        raw=_days("ACTION_ASSISTANT_KEEP_RAW", environ),
+    )
+
+
+def _days(name: str, environ: Mapping[str, str]) -> float | None:
+    text = environ.get(name, "").strip()
+    if not text:
+        return None
+    try:
+        days = float(text)
+    except ValueError:
+        days = -1.0
+    if not 0 <= days < 1e6:
+        raise CannotStart(f"{name} is a number of days, not {text!r}.")
+    return days
 
 
 def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:

@@ -186,8 +186,9 @@ def _runner(options: argparse.Namespace) -> int:
     from action_assistant.web.listen import serve as listen
 
     _log()
+    data = settings.writable_folder(options.data.resolve())
     chosen = settings.RunnerSettings(
-        data=settings.writable_folder(options.data.resolve()),
+        data=data,
         host=_host(options),
         port=options.port,
         page_port=options.page_port or options.port - 1,
@@ -195,6 +196,7 @@ def _runner(options: argparse.Namespace) -> int:
         limits=settings.limits(),
         share=options.share,
         tls=options.tls,
+        keep=settings.keep(data),
     )
     listen(
         lambda: create_app(chosen),

@@ -9,6 +9,7 @@ from typing import Final
 
 import msgspec
 
+from action_assistant.commands import archives
 from action_assistant.commands.client import No, Server, command, print_json, refused, running
 from action_assistant.errors import CannotStart
 
@@ -35,7 +36,8 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     runs.add_argument("--graph", metavar="GRAPH", help="id or name")
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(deed=_runs)
-    more = runs.add_subparsers(metavar="verify | examples")
+    more = runs.add_subparsers(metavar="verify | archive | restore | examples")
+    archives.add_to(more)
     brought = command(
         more,
         "examples",

@@ -1,6 +1,6 @@
 """The chain through each stream, by which every change of a stored event shows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from hashlib import blake2b
 from struct import pack
 from typing import Any, Final
@@ -44,13 +44,20 @@ def link(before: bytes, event: Event) -> bytes:
 
 
 class Inspector:
-    """Looks at all stored events in the order of their positions, and remembers what is wrong."""
+    """Looks at all stored events in the order of their positions, and remembers what is wrong.
+    `removed`: reads from an event which stream it says was taken out, and where that ended."""
 
-    def __init__(self) -> None:
+    def __init__(
+        self, removed: Callable[[Event], tuple[str, Head] | None] = lambda _: None
+    ) -> None:
         self.seen = 0
+        self._removed = removed
         self._heads: dict[str, Head] = {}
         self._damages: dict[str, Damage] = {}
         self._position = 0
+        self._missing = 0  # positions at which there is nothing
+        self._gone = 0  # events that were taken out
+        self._gap: Damage | None = None  # the first
 
     def see(self, row: Sequence[Any]) -> None:
         """The next event: its eight columns as they stand in the database."""
@@ -67,13 +74,29 @@ class Inspector:
             self._note(stream, before.seq + 1, f"{event.seq} stands in its place")
         elif chain != link(before.chain, event):
             self._note(stream, event.seq, "it is not what was written")
-        elif event.position != self._position and not self._damages:
-            self._note(stream, event.seq, f"events before position {event.position} are missing")
+        elif event.position < self._position and not self._damages:
+            self._note(stream, event.seq, f"position {event.position} was there before")
+        elif event.position > self._position:
+            why = f"events before position {event.position} are missing"
+            self._gap = self._gap or Damage(stream, event.seq, why)
+            self._missing += event.position - self._position
         self._position = event.position
         self._heads[stream] = Head(event.seq, chain)
+        if stream not in self._damages and (taken := self._removed(event)) is not None:
+            self._take_out(*taken)
+
+    def _take_out(self, stream: str, end: Head) -> None:
+        """The rest of a stream is kept elsewhere. Its beginning may still be here."""
+        here = self._heads.get(stream, NOTHING)
+        if here.seq > end.seq or (here.seq == end.seq and here.chain != end.chain):
+            self._note(stream, end.seq, "it is not what was taken out")
+        self._gone += max(0, end.seq - here.seq)
+        self._heads[stream] = end
 
     def findings(self, heads: Mapping[str, Head] | None) -> list[Damage]:
         """The first damage of each stream. `heads`: what the database says their ends are."""
+        if self._missing != self._gone and self._gap is not None and not self._damages:
+            self._note(self._gap.stream, self._gap.seq, self._gap.why)
         heads = self._heads if heads is None else heads
         for stream in sorted(heads.keys() | self._heads.keys()):
             end, found = heads.get(stream, NOTHING), self._heads.get(stream, NOTHING)

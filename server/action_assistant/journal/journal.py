@@ -8,14 +8,16 @@ from contextlib import AbstractAsyncContextManager
 from functools import partial
 from typing import Any, Final, TypeVar
 
+import msgspec
 from sqlalchemy import Connection, Row, Select, delete, func, insert, select
 
-from action_assistant.errors import Unavailable
-from action_assistant.journal.chain import Damage, Head, Inspector
+from action_assistant.errors import Conflict, Unavailable
+from action_assistant.journal.chain import NOTHING, Damage, Head, Inspector
 from action_assistant.journal.database import Branch, Database, Session, cause_of, database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold, Snapshot
 from action_assistant.journal.follower import Follower
 from action_assistant.journal.migrate import BRANCHES
+from action_assistant.journal.removal import STREAM, Removed, delete_some
 from action_assistant.journal.tables import LOG, editor_event, editor_head, editor_snapshot
 from action_assistant.journal.writer import Job, Outcome, Pen, Writer
 
@@ -135,6 +137,32 @@ class Journal:
 
         await self._write(keep)
 
+    async def end(self, stream: str) -> Head:
+        """The last event of a stream, and the chain up to it."""
+        chosen = select(_head.seq, _head.chain).where(_head.stream == stream)
+        row = await self._ask(lambda connection: connection.execute(chosen).first())
+        return Head(*row) if row is not None else NOTHING
+
+    async def take_out(self, removed: Removed, also: Callable[[int], Addition]) -> int:
+        """Say in the log that a stream is kept elsewhere from now on; the number of that, by which
+        its events may be deleted. `also` tells more of it, in the same transaction. Raises Conflict
+        when the stream does not end there, Unavailable."""
+        body = msgspec.json.encode(removed)
+
+        def say(pen: Pen) -> int:
+            if pen.end(removed.stream) != removed.end:
+                raise Conflict(f"{removed.stream} does not end at {removed.seq}.")
+            by = pen.add(Addition(STREAM, (Draft(removed.kind, "", body),)))
+            pen.add(also(by))
+            return by
+
+        return await self._write(say)
+
+    async def delete_some(self, stream: str, by: int) -> bool:
+        """Delete some events of a stream that was taken out; whether any are left. Raises Conflict,
+        Unavailable."""
+        return await self._write(lambda pen: delete_some(pen.connection, stream, by))
+
     async def rebuild(self) -> int:
         """Make all tables again from the events, in one transaction; the number of events."""
         folds = [t for t in BRANCHES[self._branch].sorted_tables if t.name not in LOG]
@@ -158,7 +186,7 @@ class Journal:
 
         Finds every change of a stored event and every one that is missing. Raises Unavailable.
         """
-        inspector = Inspector()
+        inspector = Inspector(_taken_out)
         after = 0
         try:
             while True:
@@ -262,6 +290,13 @@ class Journal:
                 if each.position > last:
                     last = each.position
                     yield each
+
+
+def _taken_out(event: Event) -> tuple[str, Head] | None:
+    if event.stream != STREAM or event.kind != Removed.kind:
+        return None
+    removed = msgspec.json.decode(event.body, type=Removed)
+    return removed.stream, removed.end
 
 
 def _after(position: int, limit: int) -> Select[Any]:

@@ -134,7 +134,7 @@ guest: Final = Table(
 # --- runner -----------------------------------------------------------------------------------
 
 #: A run. `number` counts for people; `request_id` makes a start happen once; `summary` is the run as
-#: the list shows it.
+#: the list shows it; `archived_as` is where its events are once they are not here any more.
 run: Final = Table(
     "run",
     RUNNER,
@@ -157,9 +157,12 @@ run: Final = Table(
     Column("result", Text),
     Column("stopped_by", Text),
     Column("summary", JSON, nullable=False),
+    Column("archived_at", BigInteger),
+    Column("archived_as", Text),
     Index(None, "graph", "number"),
     Index(None, "engine", "number"),
     Index(None, "state"),
+    Index(None, "archived_at", "ended_at"),
 )
 
 #: A robot that somebody registered, under its wake word.

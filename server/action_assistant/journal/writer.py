@@ -104,6 +104,10 @@ class Pen:
         self._heads[stream] = head
         return head.seq
 
+    def end(self, stream: str) -> Head:
+        """Where a stream ends, with what earlier jobs of this transaction added to it."""
+        return self._head(stream)
+
     def attempt(self, job: Job[Any], database: Database) -> Outcome:
         """One job. Raises what makes it impossible to store anything; all else is its outcome."""
         position = self._position

@@ -24,6 +24,7 @@ from action_assistant.runner.events import Author
 from action_assistant.runner.live import Hub, Stopping, attend
 from action_assistant.runner.review import routes as review
 from action_assistant.runner.review.desk import Desk
+from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.runs import State
 from action_assistant.web.access import Needs, person_of, refuse, require
 from action_assistant.web.crowd import Crowd
@@ -41,6 +42,7 @@ class House:
     crowd: Crowd
     journal: Journal
     desk: Desk
+    retention: Retention
 
 
 class StopAsked(msgspec.Struct, frozen=True):
@@ -66,7 +68,7 @@ def routes(house: House) -> list[ControllerRouterHandler]:
         *_moves(house),
         *_reads(house),
         *robots_api.routes(house),
-        *review.routes(lambda: house.desk),
+        *review.routes(lambda: house.desk, lambda: house.retention),
         _live(house),
     ]
 
@@ -200,7 +202,8 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
         found = await house.desk.known(run)
         opened = house.control.open.get(run)
         recorded = opened is None or opened.recorder.recorded
-        return shapes.whole(found, umrf, recorded=recorded)
+        place = await house.desk.place(run)
+        return shapes.whole(found, umrf, recorded=recorded, place=place)
 
     @get("/api/runs/{run:str}/events", summary="A run's events as they are stored (SSE)")
     async def events(run: str, request: _Asking) -> Stream | Response[None]:
@@ -261,13 +264,7 @@ def _listed(opened: OpenRun | None, row: Row[Any], labels: list[str]) -> shapes.
         found = shapes.summary_of_row(row)
     else:
         found = shapes.summary(opened.run, recorded=opened.recorder.recorded)
-    return shapes.listed(
-        found,
-        cause=row.summary.get("cause", ""),
-        pinned=bool(row.pinned),
-        note=row.note or "",
-        labels=labels,
-    )
+    return shapes.listed(found, row, labels)
 
 
 async def _labels(house: House, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:

@@ -18,8 +18,10 @@ from action_assistant.runner.links.port import Reach
 from action_assistant.runner.live import Hub
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review.desk import Desk
+from action_assistant.runner.review.retention import Retention
+from action_assistant.runner.review.shelf import Shelf
 from action_assistant.runner.robots import Robots
-from action_assistant.settings import RunnerSettings
+from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.addresses import addresses_of
 from action_assistant.web.asgi import Readiness, application
 from action_assistant.web.crowd import Crowd
@@ -40,15 +42,30 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
     journal = await Journal.open(_database(settings), branch="runner", fold=archive.fold)
     try:
         reach = ros2_reach(wall_clock)
-        recordings = Recordings(settings.data / "recordings", anyio.to_thread.run_sync)
+        keep, aside = (
+            settings.keep or Keep(folder=settings.data / ARCHIVE),
+            anyio.to_thread.run_sync,
+        )
+        folder, prunes = settings.data / "recordings", keep.raw is None
+        recordings = Recordings(folder, aside, prunes=prunes)
         robots = Robots(reach=reach, recordings=recordings)
-        async with _kept(reach), Control.opened(journal, robots, wall=wall_clock) as control:
+        shelf = Shelf(journal, keep.folder, aside)
+        async with _kept(reach), Control.opened(shelf, robots, wall=wall_clock) as control:
             house.control, house.hub = control, Hub(control, wall_clock)
             house.crowd = Crowd(limits=settings.limits, keeps_one=True)
             house.journal = journal
-            house.desk = Desk(control, journal, anyio.to_thread.run_sync, wall_clock)
+            house.desk = Desk(control, shelf, aside, wall_clock)
+            house.retention = Retention(
+                journal,
+                recordings,
+                keep,
+                is_open=control.open.__contains__,
+                wall=wall_clock,
+                aside=aside,
+            )
             async with anyio.create_task_group() as tasks:
                 tasks.start_soon(house.desk.run)
+                tasks.start_soon(house.retention.run)
                 yield house
                 tasks.cancel_scope.cancel()
     finally:

@@ -9,7 +9,7 @@ import gzip
 import logging
 from collections import deque
 from collections.abc import Iterable
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -57,7 +57,8 @@ class Recording(msgspec.Struct, frozen=True):
 
 
 class Recordings:
-    """Writes while `run` goes. `kept_bytes` bounds all robots together."""
+    """Writes while `run` goes. `kept_bytes` bounds all robots together. Unless it `prunes`, somebody
+    else has to take away what is `due`."""
 
     def __init__(
         self,
@@ -66,8 +67,10 @@ class Recordings:
         *,
         kept_days: int = _KEPT_DAYS,
         kept_bytes: int = _KEPT_BYTES,
+        prunes: bool = True,
     ) -> None:
         self._folder = folder
+        self._prunes = prunes
         self._aside = aside
         self._kept_days = kept_days
         self._kept_bytes = kept_bytes
@@ -118,20 +121,29 @@ class Recordings:
             path.parent.mkdir(parents=True, exist_ok=True)
             with path.open("ab") as file:
                 file.write(gzip.compress(b"\n".join(found) + b"\n"))
-            if is_new:
-                self._prune()
+            if is_new and self._prunes:
+                for each in self.due(self._kept_days):
+                    each.unlink()
 
-    def _prune(self) -> None:
-        """The oldest go: by age, then by what all of it takes."""
+    def due(self, kept_days: float) -> list[Path]:
+        """What has been kept long enough: by age, then by what all of it takes; the oldest first.
+        The newest hour never is."""
         found = sorted(self._folder.glob(f"*/*{_ENDING}"), key=lambda path: path.name)
         sizes = {path: path.stat().st_size for path in found}
-        newest = datetime.strptime(found[-1].name, f"%Y-%m-%dT%H{_ENDING}")  # noqa: DTZ007 - an hour of UTC
         total = sum(sizes.values())
+        due: list[Path] = []
         for path in found[:-1]:
-            age = newest - datetime.strptime(path.name, f"%Y-%m-%dT%H{_ENDING}")  # noqa: DTZ007
-            if age.days >= self._kept_days or total > self._kept_bytes:
-                path.unlink()
+            age = _hour_of(found[-1]) - _hour_of(path)
+            if age >= timedelta(days=kept_days) or total > self._kept_bytes:
+                due.append(path)
                 total -= sizes[path]
+        return due
+
+    async def of(self, robot: str, since: int, until: int) -> list[Recording]:
+        """The files of a robot that may hold anything from these moments (microseconds UTC)."""
+        first, last = hours(since, until)
+        found = await self.listed(robot)
+        return [each for each in found if first <= each.name.removesuffix(_ENDING) <= last]
 
     async def listed(self, robot: str) -> list[Recording]:
         """The files of a robot, newest first."""
@@ -148,3 +160,13 @@ class Recordings:
         if name not in {each.name for each in await self.listed(robot)}:
             raise NotFound("There is no such recording.")
         return await self._aside((self._folder / robot / name).read_bytes)
+
+
+def hours(since: int, until: int) -> tuple[str, str]:
+    """The names of the first and the last hour (UTC) between two moments, without the ending."""
+    first, last = (datetime.fromtimestamp(each / 1e6, UTC) for each in (since, until))
+    return f"{first:%Y-%m-%dT%H}", f"{last:%Y-%m-%dT%H}"
+
+
+def _hour_of(path: Path) -> datetime:
+    return datetime.strptime(path.name, f"%Y-%m-%dT%H{_ENDING}").replace(tzinfo=UTC)

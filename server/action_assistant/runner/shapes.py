@@ -83,6 +83,13 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     recorded: bool
 
 
+class ArchivedShown(msgspec.Struct, frozen=True):
+    """Since when the events of a run are in an archive, and in which file of its folder."""
+
+    at: datetime
+    file: str
+
+
 class Listed(Summary, frozen=True, kw_only=True):
     """A run of the list, with what people noted about it, and in one sentence why it did not end
     well, as far as that is recorded."""
@@ -91,6 +98,7 @@ class Listed(Summary, frozen=True, kw_only=True):
     pinned: bool
     note: str
     labels: list[str]
+    archived: ArchivedShown | None
 
 
 class RunShown(Summary, frozen=True, kw_only=True):
@@ -108,6 +116,7 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
     override: Override | None
     sent: dict[str, dict[str, str]]
     despite: list[Overridden]
+    archived: ArchivedShown | None
 
 
 def time(us: int) -> datetime:
@@ -126,7 +135,7 @@ def shown(run: Run, *, recorded: bool = True) -> RunShown:
     return RunShown(**_fields(run, recorded), actions=actions, log=_log(run, _LINES))
 
 
-def whole(run: Run, umrf: str, *, recorded: bool = True) -> RunWhole:
+def whole(run: Run, umrf: str, *, recorded: bool = True, place: Row[Any] | None = None) -> RunWhole:
     """All there is."""
     actions = _actions(run, _WHOLE)
     raw = msgspec.Raw(umrf.encode())
@@ -138,6 +147,7 @@ def whole(run: Run, umrf: str, *, recorded: bool = True) -> RunWhole:
         override=run.override,
         despite=list(run.despite),
         sent=sent(umrf),
+        archived=archived(place),
     )
 
 
@@ -173,10 +183,24 @@ def summary_of_row(row: Row[Any]) -> Summary:
     )
 
 
-def listed(found: Summary, *, cause: str, pinned: bool, note: str, labels: list[str]) -> Listed:
-    """A summary with its marks."""
+def listed(found: Summary, row: Row[Any], labels: list[str]) -> Listed:
+    """A summary with the marks of its row."""
     fields = {name: getattr(found, name) for name in Summary.__struct_fields__}
-    return Listed(**fields, cause=cause, pinned=pinned, note=note, labels=labels)
+    return Listed(
+        **fields,
+        cause=row.summary.get("cause", ""),
+        pinned=bool(row.pinned),
+        note=row.note or "",
+        labels=labels,
+        archived=archived(row),
+    )
+
+
+def archived(row: Row[Any] | None) -> ArchivedShown | None:
+    """Where the events of a run are, from its row; None when they are here."""
+    if row is None or row.archived_at is None:
+        return None
+    return ArchivedShown(time(row.archived_at), row.archived_as)
 
 
 def _fields(run: Run, recorded: bool) -> dict[str, Any]:

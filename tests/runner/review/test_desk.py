@@ -12,6 +12,7 @@ import msgspec
 import pytest
 from mcap.reader import make_reader
 
+from action_assistant.cli import main
 from action_assistant.umrf import codec
 from action_assistant.umrf.semantics import script_from
 from runner.process import RunnerProcess, over, started
@@ -173,7 +174,7 @@ def test_a_run_is_saved_as_what_is_expected_and_can_be_retired(
         assert client.delete("/api/expectations/reviewed goes well").status_code == 404
 
 
-def test_sums_and_marks_are_the_same_after_a_rebuild_and_a_restart(
+def test_sums_marks_and_archives_are_the_same_after_restarts(
     own_process: RunnerProcess,
 ) -> None:
     with own_process.client() as client:
@@ -189,3 +190,34 @@ def test_sums_and_marks_are_the_same_after_a_rebuild_and_a_restart(
         assert msgspec.json.encode(whole["actions"]) == msgspec.json.encode(run["actions"])
         film = client.get(f"/api/runs/{run['id']}/film").json()
         assert film["frames"][-1]["head"]["state"] == run["state"]
+        assert whole["archived"] is None
+        export = client.get(f"/api/runs/{run['id']}/export", params={"format": "jsonl"}).text
+        assert client.post("/api/archive", json={"runs": 1}).json()["runs"] == 0
+        swept = client.post("/api/archive", json={"runs": 0}).json()
+        assert (swept["runs"], swept["problems"]) == (1, [])
+        assert client.get("/api/runs").json()[0]["archived"]["file"].startswith("runs/")
+        after = client.get(f"/api/runs/{run['id']}").json()
+        assert after.pop("archived") is not None
+        assert after == {name: value for name, value in whole.items() if name != "archived"}
+        assert client.get(f"/api/runs/{run['id']}/film").json() == film
+        path = f"/api/runs/{run['id']}/export"
+        assert client.get(path, params={"format": "jsonl"}).text == export
+        raw = client.get(f"/api/runs/{run['id']}/raw").json()
+        assert (raw["hours"], raw["text"]) == ([], "A simulated engine sends no messages.")
+        (file,) = (own_process.data / "archive").glob("runs/*/*.gz")
+        moved = file.rename(own_process.data / file.name)
+    own_process.end()
+    own_process.start()
+    with own_process.client() as client:
+        gone = client.get(f"/api/runs/{run['id']}")
+        assert (gone.status_code, gone.json()["title"]) == (
+            410,
+            "The run is in an archive that is not here",
+        )
+        assert client.get("/api/statistics", params={"graph": "kept"}).json()["judged"] == 1
+        assert main(["runs", "restore", str(moved), "--data", str(own_process.data)]) == 0
+        assert client.get(f"/api/runs/{run['id']}").status_code == 200
+    assert main(["runs", "archive", "--check", "--data", str(own_process.data)]) == 0
+    assert main(["runs", "restore", str(own_process.data / "runner.db")]) == 1
+    own_process.end()
+    assert main(["verify", "--data", str(own_process.data)]) == 0

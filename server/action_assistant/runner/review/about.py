@@ -6,7 +6,7 @@ did. The tables here are folds of these streams.
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import msgspec
 from sqlalchemy import Executable, delete, func, insert, update
@@ -68,6 +68,19 @@ class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
     cause: str = ""
 
 
+class Put(msgspec.Struct, frozen=True):
+    """The events of a run were put into an archive and taken out of the journal. `file` lies in the
+    folder of archives; `by` is the number of the removal; `row` is the run as lists show it."""
+
+    kind: ClassVar[str] = "run.archived.v1"
+
+    at: int
+    file: str
+    sha256: str
+    by: int
+    row: dict[str, Any]
+
+
 def stream_about(run: str) -> str:
     """The stream of what is told about a run."""
     return f"{_PREFIX}{run}"
@@ -78,7 +91,7 @@ def is_about(stream: str) -> bool:
     return stream.startswith(_PREFIX)
 
 
-def draft(event: Marked | SummedUp) -> Draft:
+def draft(event: Marked | SummedUp | Put) -> Draft:
     """The event before it has a place."""
     author = event.author.id if isinstance(event, Marked) else ""
     return Draft(event.kind, author, msgspec.json.encode(event))
@@ -120,6 +133,8 @@ def fold(event: Event) -> Sequence[Executable]:
             return _mark(run, msgspec.json.decode(event.body, type=Marked).marks)
         case SummedUp.kind:
             return _put_sum(run, msgspec.json.decode(event.body, type=SummedUp))
+        case Put.kind:
+            return (_put_away(run, msgspec.json.decode(event.body, type=Put)),)
         case _:
             return ()
 
@@ -157,6 +172,13 @@ def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
         delete(action_sum).where(action_sum.c.run == run),
         *(insert(action_sum).values(rows[i : i + 100]) for i in range(0, len(rows), 100)),
     ]
+
+
+def _put_away(run_id: str, put: Put) -> Executable:
+    """The row stays, also when it is made again without the events."""
+    row: Mapping[str, Any] = {**put.row, "archived_at": put.at, "archived_as": put.file}
+    statement = upsert(runs).values(id=run_id, **row)
+    return statement.on_conflict_do_update(index_elements=["id"], set_=dict(row))
 
 
 def _review(run: str, fields: Mapping[str, object]) -> Executable:

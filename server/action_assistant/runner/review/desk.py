@@ -22,7 +22,9 @@ from action_assistant.runner.review import about, again, exports, statistics
 from action_assistant.runner.review.cause import causes, words
 from action_assistant.runner.review.compare import Comparison, compare
 from action_assistant.runner.review.film import Film, film
-from action_assistant.runner.review.reel import APART, Archive, Reels
+from action_assistant.runner.review.raw import Raw, RawPut, raw_of, stream_of_raw
+from action_assistant.runner.review.reel import APART, Reels
+from action_assistant.runner.review.shelf import Archived, Shelf
 from action_assistant.runner.runs import Run
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Graph
@@ -75,7 +77,7 @@ class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
 class Desk:
     """Looks back on runs. Nothing here commands a robot."""
 
-    def __init__(self, control: Control, ledger: Archive, aside: Aside, wall: Clock) -> None:
+    def __init__(self, control: Control, ledger: Shelf, aside: Aside, wall: Clock) -> None:
         self.reels = Reels(ledger, aside)
         self._control = control
         self._ledger = ledger
@@ -158,6 +160,21 @@ class Desk:
             )
         return shown
 
+    async def place(self, run_id: str) -> Row[Any] | None:
+        """Where the events of a run are, when they are in an archive."""
+        return await self._ledger.place(stream_of(run_id))
+
+    async def raw(self, run_id: str) -> Raw:
+        """The raw messages of its robot from its time. Raises NotFound."""
+        run_ = await self.known(run_id)
+        since = run_.started_at or run_.requested_at
+        until = run_.ended_at or self._wall()
+        kept = self._control.robots.recordings
+        here = [] if run_.simulated or kept is None else await kept.of(run_.engine, since, until)
+        told = await self._ledger.read(stream_of_raw(run_.engine))
+        gone = (msgspec.json.decode(event.body, type=RawPut) for event in told)
+        return raw_of(run_, here, gone, until)
+
     async def film(self, run_id: str, after: int) -> Film:
         """A page of the run's film. Raises NotFound."""
         return await film(self.reels, run_id, after=after)
@@ -236,10 +253,10 @@ class Desk:
         return await self._aside(lambda: statistics.statistics(rows, sums, newest))
 
     async def _graph(self, run_id: str) -> Graph | None:
-        text = await self._control.history.umrf(run_id)
         try:
+            text = await self._control.history.umrf(run_id)
             return codec.read(text.encode()).graph
-        except codec.Unreadable:
+        except (codec.Unreadable, Archived):
             return None
 
     async def take_in(self, texts: Sequence[bytes], author: Author) -> list[str]:

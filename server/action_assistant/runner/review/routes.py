@@ -20,6 +20,8 @@ from action_assistant.runner.review import about, again
 from action_assistant.runner.review.compare import Comparison
 from action_assistant.runner.review.desk import CauseShown, Desk, Expectation, Format, Marked
 from action_assistant.runner.review.film import Film
+from action_assistant.runner.review.raw import Raw
+from action_assistant.runner.review.retention import Retention, Swept
 from action_assistant.runner.review.statistics import Statistics
 from action_assistant.web.access import Needs, person_of
 
@@ -46,9 +48,31 @@ class Fit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     fault: again.Fault | None = None
 
 
-def routes(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
-    """All routes. `desk` is there before the first request."""
-    return [*_of_one(desk), *_of_many(desk), *_expecting(desk)]
+class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Put away what is older than so many days; null leaves it here."""
+
+    runs: Annotated[float, msgspec.Meta(ge=0)] | None = None
+    raw: Annotated[float, msgspec.Meta(ge=0)] | None = None
+
+
+def routes(
+    desk: Callable[[], Desk], retention: Callable[[], Retention]
+) -> list[ControllerRouterHandler]:
+    """All routes. `desk` and `retention` are there before the first request."""
+    return [*_of_one(desk), *_of_many(desk), *_expecting(desk), _archiving(retention)]
+
+
+def _archiving(retention: Callable[[], Retention]) -> ControllerRouterHandler:
+    @post(
+        "/api/archive",
+        status_code=200,
+        summary="Put some of what is old into archives; ask again while there is more",
+        guards=[Needs("restore")],
+    )
+    async def archive(data: Sweep) -> Swept:
+        return await retention().sweep(data.runs, data.raw)
+
+    return archive
 
 
 def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
@@ -83,6 +107,7 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="What a run did, as a script for another version of its graph",
         operation_class=FitOperation,
+        guards=[Needs("see")],
     )
     async def fit(run: str, request: _Asking) -> again.Recorded:
         asked = decoded(await request.body(), Fit)
@@ -99,7 +124,11 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
         content = await desk().export(run, form)
         return Response(content, media_type=_TYPES[form], headers=head)
 
-    return [film, found_causes, umrf, marks, mark, script, fit, export]
+    @get("/api/runs/{run:str}/raw", summary="Where the raw messages from the time of a run are")
+    async def raw(run: str) -> Raw:
+        return await desk().raw(run)
+
+    return [film, found_causes, umrf, marks, mark, script, fit, export, raw]
 
 
 def _of_many(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:

@@ -1,0 +1,51 @@
+"""Streams that were taken out of a journal after they were stored elsewhere.
+
+The log says so before the first event goes, with the end of the stream and the chain up to it, so that
+`verify` knows which events are missing on purpose, and what they must be where they are kept. Events
+go from the newest to the oldest: what is left at any time is a sound beginning.
+"""
+
+from typing import ClassVar, Final
+
+import msgspec
+from sqlalchemy import Connection, delete, func, select
+
+from action_assistant.errors import Conflict
+from action_assistant.journal.chain import Head
+from action_assistant.journal.tables import editor_event, editor_snapshot
+
+#: The stream of all removals.
+STREAM: Final = "removed"
+_SLICE: Final = 1_000  # events deleted in one transaction: others want to write, too
+
+
+class Removed(msgspec.Struct, frozen=True):
+    """A stream ends at `seq` with `chain` (hex) and is kept as `kept`, whose SHA-256 is `sha256`."""
+
+    kind: ClassVar[str] = "stream.removed.v1"
+
+    stream: str
+    seq: int
+    chain: str
+    kept: str
+    sha256: str
+
+    @property
+    def end(self) -> Head:
+        """Where the stream ended."""
+        return Head(self.seq, bytes.fromhex(self.chain))
+
+
+def delete_some(connection: Connection, stream: str, by: int) -> bool:
+    """Delete the newest events of a stream that the removal number `by` names; whether any are left.
+    Raises Conflict."""
+    event = editor_event.c
+    said = select(event.body).where(event.stream == STREAM, event.seq == by)
+    body = connection.execute(said).scalar()
+    if body is None or msgspec.json.decode(body, type=Removed).stream != stream:
+        raise Conflict(f"Nothing says where {stream} is kept; it stays.")
+    newest = connection.execute(select(func.max(event.seq)).where(event.stream == stream)).scalar()
+    first = (newest or 0) - _SLICE
+    connection.execute(delete(editor_event).where(event.stream == stream, event.seq > first))
+    connection.execute(delete(editor_snapshot).where(editor_snapshot.c.stream == stream))
+    return first > 0

@@ -1,0 +1,187 @@
+"""What is old is put away, proven before it is deleted, and can be looked at as before."""
+
+import asyncio
+import multiprocessing
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from action_assistant.journal.events import Event
+from action_assistant.journal.tables import run
+from action_assistant.runner.events import Author
+from action_assistant.runner.recorder import stream_of
+from action_assistant.runner.review import about, bundle
+from action_assistant.runner.review.film import film
+from action_assistant.runner.review.reel import Reels
+from action_assistant.runner.review.shelf import Archived
+from runner.review.old_runs import (
+    LENGTHS,
+    copies,
+    everything,
+    filled,
+    opened,
+    put_away,
+    raw_messages,
+    retention,
+    shelf,
+    waited,
+)
+
+#: A process is killed at each such step of a sweep.
+EVERY = int(os.environ.get("SOAK_ARCHIVE_EVERY", "13"))
+
+
+@pytest.fixture(scope="module")
+def old(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    data = tmp_path_factory.mktemp("old")
+    asyncio.run(filled(data))
+    return data
+
+
+@pytest.fixture
+def data(old: Path, tmp_path: Path) -> Path:
+    """A data folder with three old runs."""
+    return next(copies(old, tmp_path))
+
+
+async def test_an_archived_run_looks_as_it_did(data: Path) -> None:
+    journal = await opened(data)
+    before = await everything(journal, data)
+    shelved = shelf(journal, data)
+    film_before = await film(Reels(shelved, asyncio.to_thread), "r2", after=2_000)
+    rows = await journal.query(select(run.c.id, run.c.summary, run.c.state, run.c.result))
+    swept = await retention(journal, data).sweep(30, None)
+    assert (swept.runs, swept.more, swept.problems) == (3, False, [])
+    assert await journal.read("run/r2") == []
+    assert [await shelved.read(stream_of(each)) for each in LENGTHS] == list(before.values())
+    assert await shelved.read("run/r2", after=10, limit=3) == before["r2"][10:13]
+    assert await shelved.read("run/r2", after=10, upto=11) == before["r2"][10:11]
+    assert await film(Reels(shelved, asyncio.to_thread), "r2", after=2_000) == film_before
+    assert (await retention(journal, data).sweep(30, None)).runs == 0
+    for _ in range(2):
+        again = select(run.c.id, run.c.summary, run.c.state, run.c.result).order_by(run.c.number)
+        assert await journal.query(again) == rows
+        (place,) = await journal.query(select(run.c.archived_as).where(run.c.id == "r2"))
+        assert place.archived_as == "runs/1970-01/run-000002-r2.jsonl.gz"
+        await journal.rebuild()  # without the events
+    assert await journal.verify() == []
+    await journal.close()
+
+
+async def test_pinned_and_young_and_open_runs_stay(data: Path) -> None:
+    journal = await opened(data)
+    marked = about.Marked(1, Author("ann", "Ann"), about.Marks(pinned=True))
+    await journal.append(about.stream_about("r1"), [about.draft(marked)])
+    only = retention(journal, data, is_open=lambda each: each == "r2")
+    assert (await only.sweep(98, None)).runs == 0
+    assert (await only.sweep(30, None)).runs == 1
+    assert [len(await journal.read(stream_of(each))) for each in LENGTHS] == [12, 2_300, 0]
+    await journal.close()
+
+
+async def test_an_archive_that_is_gone_or_damaged_is_named(data: Path) -> None:
+    journal = await opened(data)
+    await retention(journal, data).sweep(30, None)
+    path = data / "archive" / "runs" / "1970-01" / "run-000001-r1.jsonl.gz"
+    moved = path.rename(data / "moved.gz")
+    with pytest.raises(Archived, match=r"archived on 1970-04-11 as runs/.*runs restore"):
+        await shelf(journal, data).read("run/r1")
+    whole = moved.read_bytes()
+    path.write_bytes(whole[:200] + b"?" + whole[201:])
+    with pytest.raises(bundle.Damaged):
+        await shelf(journal, data).read("run/r1")
+    shutil.copy(path.parent / "run-000003-r3.jsonl.gz", path)
+    with pytest.raises(bundle.Damaged):
+        await shelf(journal, data).read("run/r1")
+    path.write_bytes(whole)
+    assert len(await shelf(journal, data).read("run/r1")) == 12
+    await journal.close()
+
+
+async def test_what_cannot_be_written_stays_and_is_told(data: Path) -> None:
+    (data / "archive").mkdir()
+    (data / "archive" / "runs").write_text("in the way")
+    (data / "archive" / "raw").write_text("in the way")
+    journal = await opened(data)
+    before = await everything(journal, data)
+    swept = await retention(journal, data).sweep(30, 7)
+    assert (swept.runs, swept.raw, len(swept.problems)) == (0, 0, 5)
+    assert await everything(journal, data) == before
+    assert len(raw_messages(data)) == 3
+    await journal.close()
+
+
+async def test_a_damaged_run_is_not_put_away(data: Path) -> None:
+    journal = await opened(data)
+
+    async def spoilt(stream: str, **more: int) -> list[object]:
+        events = await read(stream, **more)
+        return events[1:] if stream == "run/r3" else events
+
+    read = journal.read
+    journal.read = spoilt  # type: ignore[method-assign,assignment]
+    swept = await retention(journal, data).sweep(30, None)
+    assert swept.runs == 2
+    assert "Run 3 stays here" in swept.problems[0]
+    assert len(await read("run/r3")) == 12
+    assert not list((data / "archive").glob("**/*r3*"))
+    await journal.close()
+
+
+async def test_raw_messages_go_sooner_and_it_is_said_where_they_are(data: Path) -> None:
+    journal = await opened(data)
+    swept = await retention(journal, data).sweep(None, 7)
+    assert (swept.runs, swept.raw) == (0, 2)
+    assert [path.name for path in (data / "recordings" / "David").iterdir()] == [
+        "1970-04-10T23.jsonl.gz"
+    ]
+    assert raw_messages(data) == {"1970-03-01T07", "1970-03-01T08", "1970-04-10T23"}
+    told = await journal.read("raw/David")
+    assert [event.kind for event in told] == ["raw.archived.v1"] * 2
+    await journal.close()
+
+
+def test_a_kill_at_any_step_leaves_every_event_in_the_log_or_in_a_whole_archive(
+    old: Path, tmp_path: Path
+) -> None:
+    before, raw = asyncio.run(told(old)), raw_messages(old)
+    fork = multiprocessing.get_context("forkserver")
+    fork.set_forkserver_preload(["runner.review.old_runs"])
+    point, ends = 1, []
+    for data in copies(old, tmp_path):
+        process = fork.Process(target=put_away, args=(data, point))
+        process.start()
+        ends.append(waited(process))
+        assert raw_messages(data) == raw, f"killed at step {point}"
+        assert asyncio.run(told_and_finished(data)) == (before, before), f"killed at step {point}"
+        assert not list(data.glob("**/*.part"))
+        shutil.rmtree(data)
+        if ends[-1] == 0:
+            break
+        point += EVERY
+    assert set(ends[:-1]) == {-9}
+    assert len(ends) > 40 // EVERY
+
+
+async def told(data: Path) -> dict[str, list[Event]]:
+    """All runs as they are told."""
+    journal = await opened(data)
+    try:
+        return await everything(journal, data)
+    finally:
+        await journal.close()
+
+
+async def told_and_finished(data: Path) -> tuple[dict[str, list[Event]], dict[str, list[Event]]]:
+    """All runs as they are told now, and after the next process has put everything away."""
+    journal = await opened(data)
+    try:
+        now = await everything(journal, data)
+        assert (await retention(journal, data).sweep(30, 7)).problems == []
+        assert await journal.read("run/r2") == []
+        return now, await everything(journal, data)
+    finally:
+        await journal.close()
