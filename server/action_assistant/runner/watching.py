@@ -86,10 +86,10 @@ class Watch:
             self._stop_sent = next(self._order)
 
     def feed(self, ours: tuple[Snapshot, ...]) -> None:
-        """Feedback of this run, oldest first."""
-        overtaken, self._answered = self._answered, False
+        """Feedback of this run, oldest first. That of others says nothing about an answer to us."""
         if not ours:
             return
+        overtaken, self._answered = self._answered, False
         self.seen_at = self._wall()
         if news := fresh(self._it.run, ours) if overtaken else ours:
             self._it.observe(news)

@@ -69,7 +69,7 @@ async def add_run(journal: Journal, run: str, number: int, length: int, ended_at
         await journal.append(stream_of(run), drafts[i : i + 500])
     told = replay(events)
     assert told is not None
-    await journal.append(about.stream_about(run), [about.draft(about.sum_of(told, ended_at))])
+    await journal.append(about.stream_about(run), [about.draft(about.sum_of(told, None, ended_at))])
 
 
 def retention(journal: Journal, data: Path, **more: Any) -> Retention:
