@@ -1,0 +1,116 @@
+"""What real engine nodes sent folds into histories that agree with what the recordings' index says.
+
+The recordings are large and lie elsewhere (`UMRF_SHARED`); a few small ones of the same form, made up
+after them, are always folded.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from action_assistant.runner.runs import ENDED, Run, key_of
+from runner.recorded import Index, Told, history, index_of
+
+OWN = Path(__file__).parents[1] / "data" / "recordings"
+#: Recordings in which one engine is given one graph by its text.
+NAMES = (
+    "seq3", "seq3_nopoll", "fork_join", "false_branch", "error_bypass_exit", "error_handler",
+    "loop3", "single_error", "halt", "param_missing", "sub_graph", "long_stop", "stop_twice",
+    "stop_finished", "stop_unknown", "pause_resume", "pause_stop", "pause_unhandled",
+    "unknown_action", "seq200", "seq200_nopoll", "par30_nopoll", "seq40_50ms", "get_busy",
+    "engine_sigkill", "engine_restart", "engine_sigint", "engine_sigterm", "engine_frozen",
+    "late_client", "modify_running", "start_again_running", "start_again_finished",
+    "burst_start_stop",
+)  # fmt: skip
+_ENDS = {"FINISHED": "finished", "HALTED": "halted", "STOPPED": "stopped", "ERROR": "error"}
+_MOVES = set("RSPQ")
+#: Somebody starts the same graph again, or the engine is not the same any more: the last get says
+#: nothing of the run.
+_TAKEN = ("engine_restart", "start_again", "pause_stop")
+#: It was frozen, and the recording ends before it was seen at rest for long enough.
+_SHORT = ("engine_frozen",)
+
+
+def check(run: Run, told: Index, name: str) -> None:
+    """Whether the history says what the index says, and nothing beyond it."""
+    check_end(run, told, name)
+    for graph in told.feedback.keys() | told.get.keys():
+        check_nodes(run, graph, told)
+    for action in run.actions.values():
+        for visit in action.visits:
+            assert visit.not_before <= visit.start
+            if visit.until is not None:
+                assert visit.not_after is not None
+                assert visit.start <= visit.until <= visit.not_after
+            assert visit.result in {None, "error", "stopped"}  # the engine tells no other
+
+
+def check_end(run: Run, told: Index, name: str) -> None:
+    last = (told.last or {}).get(run.graph_name)
+    if name.startswith(_TAKEN):
+        assert run.end in {"lost", "finished", "error"}
+    elif not told.polled or last not in _ENDS:
+        assert run.state not in ENDED - {"lost"}  # no answer has ever proven an end
+    else:
+        assert run.end == _ENDS[last] or (name.startswith(_SHORT) and run.end is None)
+        assert run.graph_state == last
+
+
+def check_nodes(run: Run, graph: str, told: Index) -> None:
+    nothing = Told({}, told.feedback.keys() != set() or told.get.keys() != set())
+    feedback, get = told.feedback.get(graph, nothing), told.get.get(graph, nothing)
+    named = feedback.nodes.keys() | get.nodes.keys()
+    for node in named:
+        letters = feedback.nodes.get(node, "") + get.nodes.get(node, "")
+        action = run.actions.get(key_of(run, graph, node))
+        visits = action.visits if action is not None else ()
+        laps = max(_laps(feedback.nodes.get(node, "")), _laps(get.nodes.get(node, "")))
+        assert len(visits) <= max(laps, 1), node
+        if not set(letters) & _MOVES:
+            assert all(visit.how == "inferred" for visit in visits), node
+        if "E" not in letters:
+            assert all(visit.result != "error" for visit in visits), node
+        if "S" not in letters:
+            assert all(visit.result != "stopped" for visit in visits), node
+        if run.end in {"finished", "halted", "stopped", "error"} and _laps(letters):
+            assert visits, node  # somebody saw it, so it is in the history
+    if feedback.whole and get.whole:
+        for name, action in run.actions.items():
+            if "/" not in name and graph == run.graph_name and name not in named:
+                assert action.visits == (), name
+
+
+def _laps(letters: str) -> int:
+    """How often it began, at least: each beginning shows as R, or as an end that nothing preceded."""
+    began, moving = 0, False
+    for letter in letters:
+        if letter in _MOVES:
+            began, moving = began + (not moving), True
+        elif letter in "FE":
+            began, moving = began + (not moving and began == 0), False
+        else:
+            moving = False
+    return began
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_recording_of_a_real_node_is_told_as_its_index_says(shared: Path, name: str) -> None:
+    folder = shared / "ros2-recordings"
+    if not folder.is_dir():
+        pytest.skip(f"no recordings of a real engine node in {folder}")
+    files = [
+        path
+        for path in folder.glob(f"{name}*.jsonl")
+        if path.name.split(".")[0].split("__")[0] == name
+    ]
+    assert files
+    for file in sorted(files):
+        try:
+            check(history(file), index_of(file), name)
+        except AssertionError as error:
+            raise AssertionError(f"{file.name}: {error}") from error
+
+
+@pytest.mark.parametrize("file", sorted(OWN.glob("*.jsonl")), ids=lambda file: file.stem)
+def test_a_small_recording_is_told_as_its_index_says(file: Path) -> None:
+    check(history(file), index_of(file), file.stem)
