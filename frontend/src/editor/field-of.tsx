@@ -1,7 +1,9 @@
-/** A field that several people may write in: who has the caret there is shown to the others. */
-import { type FocusEvent, type ReactNode, useEffect, useRef } from "react";
+/** A field that several people may write in: who has the caret there, and what is wrong there. */
+import { IconAlertTriangle } from "@tabler/icons-react";
+import { type FocusEvent, type ReactNode, use, useEffect, useRef } from "react";
 import { useEditors, usePeople, useRoom } from "../room/use-room";
 import { colorsOf } from "../ui/robot";
+import { ProblemsContext, problemsAt } from "./details/problem-places";
 import style from "./field-of.module.css";
 import { Initial, onePerId } from "./people";
 
@@ -35,7 +37,24 @@ export function FieldOf({ of, field, children }: Props) {
     <div className={style.field} onFocus={come} onBlur={() => leave.current()}>
       {children}
       <Writers id={id} />
+      <Wrong of={of} field={field} />
     </div>
+  );
+}
+
+/** What is wrong here; the whole sentence stands above the form too. */
+function Wrong({ of, field }: { of: string; field: string }) {
+  const here = problemsAt(use(ProblemsContext), of, field);
+  const [worst] = here;
+  if (worst === undefined) return null;
+  return (
+    <p className={style.wrong} data-severity={worst.severity}>
+      <IconAlertTriangle size={12} aria-hidden />
+      <span title={here.map(({ message }) => message).join("\n")}>
+        {[...new Set(here.map(({ code }) => code))].join(", ")}
+        <span className="visually-hidden">: {here.map(({ message }) => message).join(" ")}</span>
+      </span>
+    </p>
   );
 }
 

@@ -1,12 +1,13 @@
 /** The panel on the right: properties of what is selected, JSON, problems. */
 import { Tabs } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";
-import type { Problems } from "../../api/graphs";
+import type { Problem, Problems } from "../../api/graphs";
 import type { Thread } from "../../graph/comments";
 import { relationId } from "../../graph/layout";
 import { EXIT } from "../../graph/model";
 import { notesOf } from "../../graph/notes";
 import { type Bench, type Panel, selectedActions, selectedRelations, useBench } from "../bench";
+import { FieldOf } from "../field-of";
 import { Comments } from "../talk/comments";
 import { ActionForm } from "./action-form";
 import style from "./details.module.css";
@@ -14,9 +15,12 @@ import { GraphForm } from "./graph-form";
 import { JsonView } from "./json-view";
 import { LookOnly } from "./look-only";
 import { NoteForm } from "./note-form";
+import { ProblemsContext } from "./problem-places";
 import { ProblemList, ProblemsHere } from "./problems";
 import { RelationForm } from "./relation-form";
 import { RunsWhen } from "./runs-when";
+
+const NONE: readonly Problem[] = [];
 
 interface Props {
   id: string;
@@ -109,11 +113,15 @@ export function Details({ id, seq, panel, problems, threads }: Props) {
       <Tabs.Panel value="details" className={style.panel ?? ""}>
         <LookOnly>
           <ProblemsHere problems={problems} />
-          <Properties />
+          <ProblemsContext value={problems?.problems ?? NONE}>
+            <Properties />
+          </ProblemsContext>
         </LookOnly>
       </Tabs.Panel>
       <Tabs.Panel value="json" className={style.panel ?? ""} data-fill>
-        <JsonView graph={id} seq={seq} />
+        <FieldOf of="graph" field="json">
+          <JsonView graph={id} seq={seq} />
+        </FieldOf>
       </Tabs.Panel>
       <Tabs.Panel value="comments" className={style.panel ?? ""}>
         <Comments threads={threads} />

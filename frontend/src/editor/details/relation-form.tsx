@@ -7,6 +7,7 @@ import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../../grap
 import { ignoredWords, relationWords } from "../../graph/words";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
 import { endName, useBench } from "../bench";
+import { FieldOf } from "../field-of";
 import style from "./details.module.css";
 import { Remaps } from "./remaps";
 
@@ -45,20 +46,24 @@ export function RelationForm({ relation }: { relation: Relation }) {
       ) : (
         <>
           <section className={style.section}>
-            {OUTCOMES.map((outcome) => (
-              <div className={style.answer} key={outcome}>
-                <span className={style.when} style={{ color: outcomeColor[outcome] }}>
-                  <OutcomeSign outcome={outcome} /> {outcomeWord[outcome]}
-                </span>
-                <Select
-                  aria-label={`When ${parent} is ${outcomeWord[outcome]}`}
-                  data={responses}
-                  value={relation.conditions[outcome]}
-                  onChange={(next) => setResponse(doc, id, outcome, (next ?? "ignore") as Response)}
-                  flex={1}
-                />
-              </div>
-            ))}
+            <FieldOf of={id} field="conditions">
+              {OUTCOMES.map((outcome) => (
+                <div className={style.answer} key={outcome}>
+                  <span className={style.when} style={{ color: outcomeColor[outcome] }}>
+                    <OutcomeSign outcome={outcome} /> {outcomeWord[outcome]}
+                  </span>
+                  <Select
+                    aria-label={`When ${parent} is ${outcomeWord[outcome]}`}
+                    data={responses}
+                    value={relation.conditions[outcome]}
+                    onChange={(next) =>
+                      setResponse(doc, id, outcome, (next ?? "ignore") as Response)
+                    }
+                    flex={1}
+                  />
+                </div>
+              ))}
+            </FieldOf>
           </section>
           <div className={style.say}>
             <div>
@@ -68,17 +73,23 @@ export function RelationForm({ relation }: { relation: Relation }) {
               {nothing !== null && <p>{nothing}</p>}
             </div>
           </div>
-          <Switch
-            label={`${child} waits for this`}
-            description={
-              relation.required
-                ? `It ${relation.child === EXIT ? "ends the graph" : "runs"} only after all that it waits for have reported.`
-                : "Optional: it need not report."
-            }
-            checked={relation.required}
-            onChange={(event) => setRequired(doc, id, event.currentTarget.checked)}
-          />
-          {relation.child !== EXIT && <Remaps relation={relation} />}
+          <FieldOf of={id} field="required">
+            <Switch
+              label={`${child} waits for this`}
+              description={
+                relation.required
+                  ? `It ${relation.child === EXIT ? "ends the graph" : "runs"} only after all that it waits for have reported.`
+                  : "Optional: it need not report."
+              }
+              checked={relation.required}
+              onChange={(event) => setRequired(doc, id, event.currentTarget.checked)}
+            />
+          </FieldOf>
+          {relation.child !== EXIT && (
+            <FieldOf of={id} field="remap">
+              <Remaps relation={relation} />
+            </FieldOf>
+          )}
         </>
       )}
       <Button
