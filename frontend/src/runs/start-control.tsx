@@ -47,7 +47,7 @@ export function StartControl({ graph, name, seq, settle, obstacle, compact = fal
       {simulated ? (
         <HoldButton
           icon={icon}
-          label={compact ? words : `${words} …`}
+          label={words}
           name={why === null ? `Start ${label} in the simulator` : `Start ${label}: ${why}`}
           question={
             goes

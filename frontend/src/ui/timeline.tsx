@@ -1,5 +1,5 @@
 /** Lanes of a run over time: one for each action, with what is not known left hatched. */
-import { Fragment, type PointerEvent } from "react";
+import { Fragment, type PointerEvent, useEffect, useRef } from "react";
 import { begun, ended, progressOf, type Tone } from "../api/progress";
 import type { Run, Visit } from "../api/runs";
 import type { Lane } from "./lanes";
@@ -147,6 +147,7 @@ function LaneRow({ run, lane, axis, unsure, selected, onPick }: RowProps) {
   return (
     <li
       className={style.lane}
+      data-lane={lane.name}
       data-selected={(lane.aid !== null && lane.aid === selected) || undefined}
     >
       <button
@@ -199,12 +200,34 @@ function LaneRow({ run, lane, axis, unsure, selected, onPick }: RowProps) {
 
 const NOTHING: readonly never[] = [];
 
+/** What begins to run comes into view, within the list only. */
+function useNewestInView(lanes: Props["lanes"], run: Run, live: boolean) {
+  const list = useRef<HTMLUListElement>(null);
+  const newest = live
+    ? lanes.findLast(({ name }) => {
+        const action = run.actions?.[name];
+        return action !== undefined && progressOf(action, run, false)?.tone === "run";
+      })?.name
+    : undefined;
+  useEffect(() => {
+    const box = list.current;
+    if (box === null || newest === undefined) return;
+    const lane = box.querySelector<HTMLElement>(`[data-lane="${CSS.escape(newest)}"]`);
+    if (lane === null) return;
+    const [view, at] = [box.getBoundingClientRect(), lane.getBoundingClientRect()];
+    if (at.bottom > view.bottom) box.scrollTop += at.bottom - view.bottom;
+    else if (at.top < view.top) box.scrollTop -= view.top - at.top;
+  }, [newest]);
+  return list;
+}
+
 export function Timeline(props: Props) {
   const { run, lanes, until, unsure, selected = null, onPick, onSeek, cursor = null } = props;
   const start = instant(run.started_at) ?? until;
   const tracks: readonly Track[] = [{ run, lanes }, ...(props.others ?? NOTHING)];
   const end = instant(run.ended_at) ?? until;
   const span = Math.max(1000, end - start);
+  const list = useNewestInView(lanes, run, run.ended_at === null && cursor === null);
   const share = (at: number) => Math.min(100, Math.max(0, ((at - start) / span) * 100));
   const seek = (event: PointerEvent<HTMLElement>) => {
     if (onSeek === undefined || (event.type === "pointermove" && event.buttons === 0)) return;
@@ -231,7 +254,7 @@ export function Timeline(props: Props) {
         signs={props.signs ?? NOTHING}
         gaps={props.gaps ?? NOTHING}
       />
-      <ul className={style.lanes} aria-label="Actions of the run over time">
+      <ul ref={list} className={style.lanes} aria-label="Actions of the run over time">
         {tracks.flatMap((track) =>
           track.lanes.map((lane) => (
             <LaneRow
