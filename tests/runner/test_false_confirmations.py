@@ -278,6 +278,11 @@ class Story:
     def judge(self, opened: OpenRun) -> None:
         """Called at every change: what is shown must be true at that moment."""
         run = opened.run
+        if run.moves_again_at is not None and run.id in self.judged:
+            self.judged.discard(run.id)
+            where = self.moving().get(run.id) if run.id not in self.replayed else None
+            if self.still.pop(run.id, None) is not None and where is not None:
+                self.false.append(f"called still, then moving again at {now()}: {where}")
         if run.state not in STILL or run.incarnation is None:
             return
         if run.id not in self.judged:

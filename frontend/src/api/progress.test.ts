@@ -15,6 +15,7 @@ const run: Run = {
   desired: "running",
   proof_at: null,
   unknown_since: null,
+  moves_again_at: null,
   result: null,
   requested_at: "2026-01-01T00:00:00Z",
   started_at: "2026-01-01T00:00:00Z",
@@ -69,4 +70,10 @@ test("a run is called stopped or finished only by its own state", () => {
   const stopped = { ...run, state: "stopped", stopped_by: { id: "q", name: "Mari" } } as const;
   expect(endWords(stopped)).toBe("stopped by Mari");
   expect(runWord({ ...run, state: "finished", result: "on_error" }).tone).toBe("error");
+});
+
+test("a run that moves again is never called by the end that it had", () => {
+  const again = { ...run, desired: "stopped", state: "stopping", moves_again_at: "t" } as const;
+  expect(runWord(again)).toEqual({ tone: "error", word: "MOVES AGAIN" });
+  expect(runWord({ ...again, state: "unknown", unknown_since: "t" }).word).toBe("MOVES AGAIN");
 });

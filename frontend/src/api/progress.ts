@@ -130,6 +130,7 @@ const runWords: Record<Run["state"], { tone: Tone; word: string }> = {
 
 /** The run's state, with the result where it has one that says more. */
 export function runWord(run: Run): { tone: Tone; word: string } {
+  if (run.moves_again_at) return { tone: "error", word: "MOVES AGAIN" };
   if (run.state === "unknown" && run.unknown_since) {
     return { tone: "unknown", word: `unknown since ${clockOf(run.unknown_since)}` };
   }

@@ -54,6 +54,8 @@ export interface Run {
   desired: "running" | "paused" | "stopped";
   proof_at: string | null;
   unknown_since: string | null;
+  /** It had ended, and its engine shows it moving; null at its next end. */
+  moves_again_at: string | null;
   result: RunResult | null;
   requested_at: string;
   started_at: string | null;

@@ -10,6 +10,7 @@ const SIGNS: Record<string, TimeSign["tone"]> = {
   "run.resume_requested.v1": "run",
   "run.proof.v1": "true",
   "run.alarm_raised.v1": "error",
+  "run.moves_again.v1": "error",
 };
 
 /** A mark in one sentence; empty for what needs none. */

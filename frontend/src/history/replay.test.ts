@@ -29,6 +29,7 @@ const RUN: Run = {
   desired: "running",
   proof_at: null,
   unknown_since: null,
+  moves_again_at: null,
   result: "on_true",
   requested_at: at(0),
   started_at: at(1),

@@ -45,6 +45,7 @@ export function blank(run: Run): Run {
     result: null,
     proof_at: null,
     unknown_since: null,
+    moves_again_at: null,
     started_at: null,
     ended_at: null,
     stopped_by: null,

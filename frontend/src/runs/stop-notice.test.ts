@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import type { LiveNow, StopAsked } from "../api/live";
 import type { Run } from "../api/runs";
 import { meantBy } from "./stop-button";
-import { noticeOf, othersNotice } from "./stop-notice";
+import { movingAgain, noticeOf, othersNotice } from "./stop-notice";
 
 const stop: StopAsked = { id: "s", run: "r", at: 1000, state: "heard", detail: "" };
 
@@ -73,4 +73,17 @@ test("beside a graph, Stop means its run or the group it is in, and else everyth
   expect(meantBy([one])?.id).toBe("a");
   expect(meantBy([one, two])).toEqual({ id: "g", words: "the 2 runs of patrol" });
   expect(meantBy([one, { ...two, group: null }])).toBeNull();
+});
+
+test("a run that was called stopped and moves again is shouted before anything else", () => {
+  const text = "MOVES AGAIN: David shows Work_0 moving in patrol, after it was called stopped.";
+  const alarms = [{ code: "moves_again", at: "", text }];
+  const moves = { state: "stopping", desired: "stopped", moves_again_at: "t", alarms } as const;
+  expect(movingAgain(now(null))).toBeNull();
+  expect(movingAgain(now({ state: "stopped", ended_at: "t" }))).toBeNull();
+  const notice = movingAgain(now(moves as unknown as Partial<Run>));
+  expect(notice).toMatchObject({ tone: "loud", stays: true });
+  expect(notice?.text).toContain("MOVES AGAIN: run 7: David shows Work_0 moving");
+  expect(notice?.text).toContain("It is being stopped again.");
+  expect(notice?.text).toContain("hardware stop");
 });

@@ -4,7 +4,7 @@ import { useState } from "react";
 import type { LiveNow, StopAsked } from "../api/live";
 import type { Run } from "../api/runs";
 import { foreignGraphs, openRuns, useLive } from "../api/use-live";
-import { duration, useNow } from "../ui/when";
+import { clock, duration, useNow } from "../ui/when";
 import style from "./stop-notice.module.css";
 
 const LOUD = 2_500; // ms without proof until the notice shouts
@@ -76,6 +76,22 @@ export function noticeOf(stop: StopAsked, now: LiveNow, at: number): Notice {
   return { tone: "done", text: `${ends}.` };
 }
 
+/** A run that was said to be over and is not: nothing else is as urgent. */
+export function movingAgain(now: LiveNow): Notice {
+  const runs = openRuns(now).filter((run) => run.moves_again_at);
+  if (runs.length === 0) return null;
+  const each = runs.map((run) => {
+    const told = run.alarms.findLast((alarm) => alarm.code === "moves_again");
+    const text = (told?.text ?? "").replace(/^MOVES AGAIN: /, "");
+    const then =
+      run.desired === "stopped" ? "It is being stopped again." : "Nobody has asked to stop it.";
+    return `run ${run.number}: ${text} ${then}`;
+  });
+  const since = now.link === "down" ? ` Runner unknown since ${clock(now.since)}.` : "";
+  const text = `MOVES AGAIN: ${each.join(" ")}${since} Use the hardware stop if it must not move.`;
+  return { tone: "loud", stays: true, text };
+}
+
 /** What somebody else has asked for and what is not proven either: everybody is told. */
 export function othersNotice(now: LiveNow): Notice {
   if (now.link === "down") return null;
@@ -97,7 +113,8 @@ export function StopNotice() {
   const busy =
     watching && (open > 0 || last.state !== "heard" || Date.now() - last.at < GONE + 1000);
   const at = useNow(200, busy);
-  const notice = (watching ? noticeOf(last, now, at) : null) ?? othersNotice(now);
+  const notice =
+    movingAgain(now) ?? (watching ? noticeOf(last, now, at) : null) ?? othersNotice(now);
   if (notice === null) return null;
   return (
     <div

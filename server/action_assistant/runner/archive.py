@@ -30,6 +30,7 @@ from action_assistant.runner.events import (
     AlarmRaised,
     Answered,
     Ended,
+    MovesAgain,
     Proof,
     Published,
     Requested,
@@ -87,6 +88,8 @@ def fold(event: Event) -> Sequence[Executable]:
             text = msgspec.json.encode({"code": alarm.code, "at": alarm.at, "text": alarm.text})
             more = func.json_insert(run.c.summary, "$.alarms[#]", func.json(text.decode()))
             return (change.values(summary=more),)
+        case MovesAgain() as again_:
+            return _open_again(event.stream.removeprefix("run/"), again_)
         case Ended() as end:
             return (
                 change.values(
@@ -98,6 +101,18 @@ def fold(event: Event) -> Sequence[Executable]:
             )
         case _:
             return ()
+
+
+def _open_again(id_: str, moves: MovesAgain) -> Sequence[Executable]:
+    """A run that was over is not; its sum is made anew at its next end."""
+    text = msgspec.json.encode({"code": "moves_again", "at": moves.at, "text": moves.text})
+    more = func.json_insert(run.c.summary, "$.alarms[#]", func.json(text.decode()))
+    summary = func.json_remove(more, "$.proof_at", "$.unknown_since", "$.detail")
+    values = {"state": _OPEN, "ended_at": None, "summary": summary}
+    return (
+        update(run).where(run.c.id == id_).values(**values),
+        update(review).where(review.c.run == id_).values(summed=False),
+    )
 
 
 def _run(asked: Requested) -> Executable:

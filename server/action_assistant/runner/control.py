@@ -19,7 +19,7 @@ from action_assistant.runner.admission import SIMULATOR, StartRequest
 from action_assistant.runner.booking import Book, booked
 from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.events import Author, Ended
+from action_assistant.runner.events import Author, Ended, MovesAgain
 from action_assistant.runner.flight import Commanded
 from action_assistant.runner.history import Aside, History, Ledger
 from action_assistant.runner.links.absent import AbsentLink
@@ -28,7 +28,8 @@ from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.registered import Robot
 from action_assistant.runner.robots import Ground, Robots
 from action_assistant.runner.runs import ENDED, Run
-from action_assistant.runner.starting import Cleared, GroupRequest, Starting
+from action_assistant.runner.starting import Cleared, Grouped, GroupRequest, Started, Starting
+from action_assistant.runner.stragglers import Stragglers
 from action_assistant.umrf.facts import SIMULATED
 
 log: Final = logging.getLogger(__name__)
@@ -37,22 +38,6 @@ _LOST: Final = (
     "The runner ended while this simulation went on, and the simulated engine with it. Nothing "
     "shows how it would have ended."
 )
-
-
-class Started(msgspec.Struct, frozen=True):
-    """The answer to a start. `fresh` is false when the request had been carried out before."""
-
-    run: Run
-    fresh: bool
-
-
-class Grouped(msgspec.Struct, frozen=True):
-    """The answer to the start of a group. `failed`: the engines that nothing was sent to, and why."""
-
-    group: str
-    runs: list[Run]
-    failed: dict[str, str]
-    fresh: bool
 
 
 class Control:
@@ -78,6 +63,9 @@ class Control:
             aside=aside,
             taken=self._taken,
             going=lambda: frozenset(self.open),
+        )
+        self._stragglers = Stragglers(
+            self.open, self.history, robots, self._tasks, wall=wall, reopen=self._reopen
         )
         self._robot_watchers: list[Callable[[], None]] = []
         self._number = 0
@@ -241,12 +229,16 @@ class Control:
     async def _drive(self, opened: OpenRun, order: Order | None, incarnation: str = "") -> None:
         await opened.drive(order, incarnation)
         self.open.pop(opened.run.id, None)
+        self._stragglers.ended(opened.run, opened.recorder.seq)
         self._news.set()
         self._news = anyio.Event()
 
     def _changed(self, opened: OpenRun) -> None:
         self._news.set()
         self._news = anyio.Event()
+        engine = self.robots.link(opened.run.engine)
+        if engine is not None and opened.run.end is not None:
+            engine.look_closely()
         for watcher in self._watchers:
             watcher(opened)
 
@@ -341,6 +333,7 @@ class Control:
 
     def _foreign(self, engine: KnownEngine, command: ForeignCommand) -> Commanded:
         """Somebody else has told a robot something: which run of ours that concerns."""
+        self._stragglers.sent_by_others(command)
         run = self._taken(engine.registration.name)
         if run is not None:
             self.open[run.id].hear_of(command)
@@ -361,7 +354,13 @@ class Control:
         """Adopt what an earlier process left: pending stops first of all; nothing is started."""
         self._number = (await self._ledger.query(archive.last_number()))[0][0]
         ground = Ground(
-            self._ledger, self._tasks, self._wall, self._aside, self._robots_changed, self._foreign
+            self._ledger,
+            self._tasks,
+            self._wall,
+            self._aside,
+            self._robots_changed,
+            self._foreign,
+            self._stragglers.shows,
         )
         self.robots.open(ground)
         for row in await self._ledger.query(archive.all_robots()):
@@ -384,6 +383,13 @@ class Control:
                 log.error("run %s: table and events differ; `rebuild` mends the table", row.id)
                 continue
             self._adopt(run, seq)
+
+    def _reopen(self, run: Run, seq: int, event: MovesAgain) -> None:
+        """A run that was over and stored moves again."""
+        link = self.robots.link(run.engine) or AbsentLink("there is no link to this robot any more")
+        opened = self._opened(run, link, own=False, seq=seq)
+        opened.tell(event)
+        self._tasks.start_soon(self._drive, opened, None)
 
     def _adopt(self, run: Run, seq: int) -> None:
         link = self.robots.link(run.engine) or AbsentLink("there is no link to this robot any more")

@@ -18,6 +18,7 @@ from action_assistant.runner.events import (
     Ended,
     EngineSaid,
     ModifyRequested,
+    MovesAgain,
     Observed,
     PauseRequested,
     Published,
@@ -83,13 +84,16 @@ class OpenRun:
         self.revision = 0
         self.published = anyio.Event()
         self.recorder = Recorder(store, run.id, seq, self._touch)
-        self.watch = Watch(self, link, exact=owns_link, wall=wall, aside=aside)
         self._link = link
         self._owns_link = owns_link
         self._wall = wall
+        self._aside = aside
+        self.watch = self._watched()
         self._lines = 0
         self._changed = changed
         self._over = anyio.Event()
+        self._again = anyio.Event()
+        self._is_left = False
         self._stop_wanted = anyio.Event()
         self._stop_ids: set[str] = {""}
         self._stop_asked: tuple[str, float] = ("", 0.0)
@@ -157,7 +161,7 @@ class OpenRun:
 
     def tell(self, event: RunEvent, author: str = "") -> None:
         """Show an event to everybody and store it as soon as the journal can."""
-        if self.run.end is not None and not isinstance(event, AlarmRaised):
+        if self.run.end is not None and not isinstance(event, AlarmRaised | MovesAgain):
             return
         self.run = follow(self.run, event)
         self.recorder.put(event, author or self.run.engine)
@@ -182,12 +186,50 @@ class OpenRun:
                     await self._live()
                 if self._owns_link:
                     await self._link.aclose()
-                await self.recorder.flushed()
+                while await self._opens_again():
+                    with self._link.listen(self._hear):
+                        await self._live()
             except anyio.get_cancelled_exc_class():
                 with anyio.move_on_after(1, shield=True):
                     await self.recorder.flushed()
                 raise
             outer.cancel_scope.cancel()
+
+    def moves_again(self, event: MovesAgain) -> bool:
+        """It had ended and moves: it is open again. False when it is stored and left already."""
+        if self._is_left or self.run.end is None:
+            return not self._is_left
+        self.watch = self._watched()
+        self._over = anyio.Event()
+        self.tell(event)
+        self._again.set()
+        return True
+
+    def _watched(self) -> Watch:
+        rested_at = self.run.ended_at
+        return Watch(
+            self,
+            self._link,
+            exact=self._owns_link,
+            wall=self._wall,
+            aside=self._aside,
+            rested_at=rested_at,
+        )
+
+    async def _opens_again(self) -> bool:
+        """Wait until everything is stored, or until it moves before that."""
+        async with anyio.create_task_group() as tasks:
+
+            async def wait_until_stored() -> None:
+                await self.recorder.flushed()
+                tasks.cancel_scope.cancel()
+
+            tasks.start_soon(wait_until_stored)
+            await self._again.wait()
+            tasks.cancel_scope.cancel()
+        self._again = anyio.Event()
+        self._is_left = self.run.end is not None
+        return not self._is_left
 
     async def _live(self) -> None:
         async with anyio.create_task_group() as tasks:

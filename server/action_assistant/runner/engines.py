@@ -26,6 +26,7 @@ from action_assistant.runner.links.port import (
     Standing,
 )
 from action_assistant.runner.recordings import Recordings
+from action_assistant.runner.seen import Snapshot
 from action_assistant.umrf import codec
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph, Signature
@@ -34,6 +35,8 @@ from action_assistant.umrf.signatures import signature_of
 log: Final = logging.getLogger(__name__)
 
 _IDLE_S: Final = 10.0
+_CLOSE_S: Final = 1.0
+_AFTERWARDS_S: Final = 30.0
 _GET_S: Final = 1.0
 _SHARE: Final = 20  # at most one part in so many of the time goes into asking an idle engine
 _FRESH_S: Final = 60.0  # for so long an engine that came back is called restarted
@@ -55,7 +58,8 @@ class KnownEngine:
     """Watched from `watch` on, until that is cancelled.
 
     `changed` is called whenever people would see something else; `foreign` for each command of
-    somebody else; `became` when the engine is in another state than before.
+    somebody else; `became` when the engine is in another state than before; `shows` for all graphs
+    that an answer or feedback shows.
     """
 
     def __init__(
@@ -68,6 +72,7 @@ class KnownEngine:
         changed: Callable[[], None] = lambda: None,
         became: "Callable[[KnownEngine], None]" = lambda _: None,
         foreign: "Callable[[KnownEngine, ForeignCommand], None]" = lambda _, __: None,
+        shows: "Callable[[KnownEngine, tuple[Snapshot, ...]], None]" = lambda _, __: None,
         recordings: Recordings | None = None,
     ) -> None:
         self.registration = registration
@@ -83,10 +88,12 @@ class KnownEngine:
         self._changed = changed
         self._became = became
         self._foreign = foreign
+        self._shows = shows
         self._recordings = recordings
         self._look = anyio.Event()
         self._tried_at = -_IDLE_S
         self._restarted: float | None = None
+        self._close_until = 0.0
         self._index: tuple[tuple[tuple[str, ...], tuple[str, ...]], Index] = ((), ()), Index()
 
     # --- the link -----------------------------------------------------------------------------
@@ -156,6 +163,7 @@ class KnownEngine:
 
     async def watch(self) -> None:
         """Keep the link going and know how the engine is, until cancelled."""
+        self.look_closely()
         with self._link.listen(self._hear):
             try:
                 async with anyio.create_task_group() as tasks:
@@ -176,7 +184,8 @@ class KnownEngine:
     async def _ask(self) -> None:
         """Every ten seconds, more rarely when answers are dear, at once when there is news."""
         while True:
-            rest = max(_IDLE_S, _SHARE * (self.took_ms or 0) / 1000)
+            pace = _CLOSE_S if anyio.current_time() < self._close_until else _IDLE_S
+            rest = max(pace, _SHARE * (self.took_ms or 0) / 1000)
             due = self._tried_at + rest - anyio.current_time()
             if due > 0:
                 with anyio.move_on_after(due) as waited:
@@ -193,7 +202,15 @@ class KnownEngine:
                 log.exception("asking %s failed", self.registration.name)
                 await anyio.sleep(0.5)
 
+    def look_closely(self) -> None:
+        """A run has ended there: whether it stays so is asked more often for a while."""
+        if anyio.current_time() >= self._close_until:
+            self._look.set()
+        self._close_until = anyio.current_time() + _AFTERWARDS_S
+
     def _hear(self, report: Report) -> None:
+        if isinstance(report, Feedback):
+            self._shows(self, report.snapshots)
         match report:
             case EngineChanged(state=("gone" | "busy") as state, why=why):
                 self._turn(state, why)
@@ -220,6 +237,7 @@ class KnownEngine:
         self._turn("restarted" if fresh else "answering", "")
         if known is None or _held(known) != _held(answer):
             self._changed()
+        self._shows(self, answer.graphs)
 
     def _silent(self, why: str) -> None:
         standing = self._link.standing

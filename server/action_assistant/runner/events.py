@@ -192,6 +192,16 @@ class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
     detail: str = ""
 
 
+class MovesAgain(msgspec.Struct, frozen=True):
+    """After its end the engine shows the run moving: it is open again, and what was said of its end
+    is taken back. `text` says what moves and what the run had been called."""
+
+    kind: ClassVar[str] = "run.moves_again.v1"
+
+    at: int
+    text: str
+
+
 class Unknown(msgspec.Struct, frozen=True):
     """An event of a kind that this version does not know: kept, and passed over."""
 
@@ -213,6 +223,7 @@ RunEvent: TypeAlias = (
     | AlarmRaised
     | EngineSaid
     | Ended
+    | MovesAgain
     | Unknown
 )
 
@@ -233,6 +244,7 @@ _KINDS: Final[Mapping[str, type[RunEvent]]] = {
         AlarmRaised,
         EngineSaid,
         Ended,
+        MovesAgain,
     )
 }
 

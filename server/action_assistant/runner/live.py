@@ -184,7 +184,7 @@ class Outbox:
 
     def mark(self, opened: OpenRun) -> None:
         """A run has changed."""
-        if opened.run.id not in self._changed:
+        if self._changed.get(opened.run.id) is not opened:
             self._changed[opened.run.id] = opened
             self._news.set()
 

@@ -26,6 +26,7 @@ from action_assistant.runner.registered import (
     check_registration,
     seen,
 )
+from action_assistant.runner.seen import Snapshot
 from action_assistant.runner.silencing import Silencing, wanted
 from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
 
@@ -35,7 +36,8 @@ _NO_LINK: Final = "Nothing can be started or stopped there from here."
 
 
 class Ground(msgspec.Struct, frozen=True):
-    """What the registry stands on. `foreign` hears of each command of somebody else."""
+    """What the registry stands on. `foreign` hears of each command of somebody else,
+    `shows` of all graphs that an engine shows."""
 
     ledger: Ledger
     tasks: TaskGroup
@@ -43,6 +45,7 @@ class Ground(msgspec.Struct, frozen=True):
     aside: Aside
     changed: Callable[[], None]
     foreign: Callable[[KnownEngine, ForeignCommand], Commanded]
+    shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None]
 
 
 class Robots:
@@ -120,6 +123,7 @@ class Robots:
             changed=ground.changed,
             became=self._note_state,
             foreign=self._note_command,
+            shows=ground.shows,
             recordings=self.recordings,
         )
         self._engines[name] = engine

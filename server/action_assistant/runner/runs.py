@@ -18,6 +18,7 @@ from action_assistant.runner.events import (
     Ended,
     EngineSaid,
     ModifyRequested,
+    MovesAgain,
     Observed,
     Overridden,
     Override,
@@ -120,6 +121,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     detail: str = ""
     unknown_since: int | None = None
     proof_at: int | None = None
+    moves_again_at: int | None = None  # it had ended, and was seen to move; until its next end
     stop_requested_at: int | None = None
     stopped_by: Author | None = None
     stops_sent: int = 0
@@ -195,7 +197,7 @@ def begin(event: Requested) -> Run:
 
 def follow(run: Run, event: RunEvent) -> Run:
     """The run after one more event. Total: no event that can be decoded is refused."""
-    if run.end is not None and not isinstance(event, AlarmRaised):
+    if run.end is not None and not isinstance(event, AlarmRaised | MovesAgain):
         return run
     match event:
         case Published():
@@ -234,6 +236,8 @@ def follow(run: Run, event: RunEvent) -> Run:
         case AlarmRaised():
             alarm = Alarm(event.code, event.at, event.text)
             return replace(run, alarms=(*run.alarms, alarm)[-KEPT:])
+        case MovesAgain():
+            return _reopen(run, event)
         case EngineSaid():
             return replace(run, log=(*run.log, Message(event.at, event.text))[-KEPT:])
         case Ended():
@@ -294,6 +298,21 @@ def _thin(run: Run, shown: Snapshot) -> Snapshot:
     return replace(shown, nodes=news, messages=said, inputs=inputs, same=True)
 
 
+def _reopen(run: Run, event: MovesAgain) -> Run:
+    """What was proven before proves nothing now. What people wanted last is still wanted."""
+    alarm = Alarm("moves_again", event.at, event.text)
+    return replace(
+        run,
+        end=None,
+        ended_at=None,
+        proof_at=None,
+        unknown_since=None,
+        detail="",
+        moves_again_at=event.at,
+        alarms=(*run.alarms, alarm)[-KEPT:],
+    )
+
+
 def _end(run: Run, event: Ended) -> Run:
     """An end that nothing proves leaves the actions as they were seen last, without an end."""
     return replace(
@@ -302,6 +321,7 @@ def _end(run: Run, event: Ended) -> Run:
         ended_at=event.at,
         result=event.result or run.result,
         detail=event.detail,
+        moves_again_at=None,
         unknown_since=run.unknown_since if event.state == "lost" else None,
     )
 

@@ -73,6 +73,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     result: str | None
     proof_at: datetime | None
     unknown_since: datetime | None
+    moves_again_at: datetime | None
     group: str | None
     requested_at: datetime
     started_at: datetime | None
@@ -170,6 +171,7 @@ def summary_of_row(row: Row[Any]) -> Summary:
         result=row.result,
         proof_at=_time(more.get("proof_at")),
         unknown_since=_time(more.get("unknown_since")) if row.state == "lost" else None,
+        moves_again_at=None,
         group=more.get("group"),
         requested_at=time(row.requested_at),
         started_at=_time(row.started_at),
@@ -219,6 +221,7 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "result": run.result,
         "proof_at": _time(run.proof_at),
         "unknown_since": _time(run.unknown_since),
+        "moves_again_at": _time(run.moves_again_at),
         "group": run.group,
         "requested_at": time(run.requested_at),
         "started_at": _time(run.started_at),

@@ -74,6 +74,22 @@ class Cleared(msgspec.Struct, frozen=True, kw_only=True):
     despite: tuple[Overridden, ...] = ()
 
 
+class Started(msgspec.Struct, frozen=True):
+    """The answer to a start. `fresh` is false when the request had been carried out before."""
+
+    run: Run
+    fresh: bool
+
+
+class Grouped(msgspec.Struct, frozen=True):
+    """The answer to the start of a group. `failed`: the engines that nothing was sent to, and why."""
+
+    group: str
+    runs: list[Run]
+    failed: dict[str, str]
+    fresh: bool
+
+
 class Starting:
     """Looks before starts. `taken(engine)` is the run that an engine has from here, if any;
     `going()` the ids of all open ones."""

@@ -52,10 +52,17 @@ class Watched(Protocol):
 
 class Watch:
     """Evidence of one run. `trouble`: why its stop is not proven yet; `seen_at`: when its engine last
-    showed it."""
+    showed it. `rested_at`: when it was last seen to be over, for one that moves again."""
 
     def __init__(
-        self, it: Watched, link: Link, *, exact: bool, wall: Callable[[], int], aside: Aside
+        self,
+        it: Watched,
+        link: Link,
+        *,
+        exact: bool,
+        wall: Callable[[], int],
+        aside: Aside,
+        rested_at: int | None = None,
     ) -> None:
         self.trouble = ""
         self.seen_at: int | None = None
@@ -70,7 +77,7 @@ class Watch:
         self._answered = False  # by a get, since the last feedback
         self._rest = Rest(exact=exact)
         self._heard_at = self._began_at = anyio.current_time()
-        self._seen_wall: int | None = None
+        self._seen_wall = rested_at
 
     def look(self) -> None:
         """Ask now."""

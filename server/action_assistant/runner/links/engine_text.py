@@ -44,6 +44,14 @@ class _Named(msgspec.Struct, frozen=True):
     graph_name: str
 
 
+class _Marked(msgspec.Struct, frozen=True):
+    gui_attributes: msgspec.Raw = msgspec.Raw(b"{}")
+
+
+class _Sent(msgspec.Struct, frozen=True):
+    actions: tuple[_Marked, ...] = ()
+
+
 class _Ours(msgspec.Struct, frozen=True):
     run: str | None = None
 
@@ -53,6 +61,7 @@ class _Attributes(msgspec.Struct, frozen=True):
 
 
 _GRAPH = msgspec.json.Decoder(_Graph)
+_SENT = msgspec.json.Decoder(_Sent)
 _NAMED = msgspec.json.Decoder(_Named)
 _ATTRIBUTES = msgspec.json.Decoder(_Attributes)
 _RUNTIME = msgspec.json.Decoder(_Runtime)
@@ -90,13 +99,21 @@ def name_of(text: str) -> str:
         return ""
 
 
-def _run(actions: tuple[_Action, ...]) -> str | None:
+def run_in(text: str) -> str | None:
+    """The run whose mark a graph carries that somebody sent; None where there is none."""
+    try:
+        return _run(_SENT.decode(text).actions)
+    except (msgspec.DecodeError, RecursionError, UnicodeError):
+        return None
+
+
+def _run(actions: tuple[_Action, ...] | tuple[_Marked, ...]) -> str | None:
     """The run whose mark every action carries; a graph that was put together from others has none."""
     marks = {_mark(each) for each in actions}
     return marks.pop() if len(marks) == 1 else None
 
 
-def _mark(action: _Action) -> str | None:
+def _mark(action: _Action | _Marked) -> str | None:
     try:
         return _ATTRIBUTES.decode(action.gui_attributes).action_assistant.run
     except msgspec.DecodeError:  # others may keep there what they like

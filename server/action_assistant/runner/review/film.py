@@ -23,6 +23,7 @@ _HEAD: Final = (
     "result",
     "proof_at",
     "unknown_since",
+    "moves_again_at",
     "started_at",
     "ended_at",
     "detail",

@@ -17,6 +17,7 @@ from action_assistant.journal.events import Event, Snapshot
 from action_assistant.runner.events import (
     AlarmRaised,
     Ended,
+    MovesAgain,
     Observed,
     PauseRequested,
     Requested,
@@ -232,7 +233,7 @@ def words(told: RunEvent) -> tuple[str, str]:
             return "", told.failed or f"attempt {told.attempt}"
         case Silent():
             return "", told.why
-        case AlarmRaised():
+        case AlarmRaised() | MovesAgain():
             return "", told.text
         case Ended():
             return "", told.detail

@@ -1,0 +1,167 @@
+"""Runs that are over and move again: an action that was still being loaded begins after the proof.
+
+An engine neither counts nor shows an action that it loads, so nothing can be proven about one that
+takes longer than people would wait. What can be done is to look on, and to take back what was said.
+"""
+
+import logging
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from typing import Final, TypeAlias, TypeVar
+
+import anyio
+import msgspec
+from anyio.abc import TaskGroup
+
+from action_assistant.errors import Refused
+from action_assistant.runner.driving import Clock, OpenRun
+from action_assistant.runner.engines import KnownEngine
+from action_assistant.runner.events import MovesAgain
+from action_assistant.runner.flight import Commanded
+from action_assistant.runner.history import History
+from action_assistant.runner.links.engine_text import run_in
+from action_assistant.runner.links.port import ForeignCommand, NoAnswer
+from action_assistant.runner.robots import Robots
+from action_assistant.runner.runs import Run
+from action_assistant.runner.seen import ACTIVE, Snapshot
+
+log: Final = logging.getLogger(__name__)
+
+_GET_S: Final = 1.0
+_PATIENCE_S: Final = 3.0  # until feedback counts although no answer has said the same
+_AGAIN_S: Final = 0.5
+_KEPT: Final = 200
+_TOLD: Final = 500  # newest entries of a flight record
+
+T = TypeVar("T")
+Reopen: TypeAlias = Callable[[Run, int, MovesAgain], None]
+
+
+class Stragglers:
+    """Watches what engines show for runs that are over. `open` are the runs that are not;
+    `reopen` is given a run as stored, the seq of its last event, and what opens it again."""
+
+    def __init__(
+        self,
+        open_: Mapping[str, OpenRun],
+        history: History,
+        robots: Robots,
+        tasks: TaskGroup,
+        *,
+        wall: Clock,
+        reopen: Reopen,
+    ) -> None:
+        self._open = open_
+        self._history = history
+        self._robots = robots
+        self._tasks = tasks
+        self._wall = wall
+        self._reopen = reopen
+        self._looking: set[str] = set()
+        self._ended: OrderedDict[str, tuple[Run, int]] = OrderedDict()
+        self._others: OrderedDict[str, None] = OrderedDict()
+
+    def ended(self, run: Run, seq: int) -> None:
+        """A run is over and stored; its end is known without the journal then."""
+        _put(self._ended, run.id, (run, seq))
+
+    def sent_by_others(self, command: ForeignCommand) -> None:
+        """Whoever plays a start of ours again has started it, not we: it is a graph of theirs."""
+        run = run_in(command.umrf) if command.umrf else None
+        if run is not None:
+            _put(self._others, run, None)
+
+    def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
+        """An engine shows these graphs, in an answer or by feedback. Never waits."""
+        for each in snapshots:
+            if each.run is not None and each.active and self._is_over(each.run):
+                self._looking.add(each.run)
+                self._tasks.start_soon(self._look_into, engine, each, each.run)
+
+    def _is_over(self, run: str) -> bool:
+        if run in self._looking or run in self._others:
+            return False
+        opened = self._open.get(run)
+        return opened is None or opened.run.end is not None
+
+    async def _look_into(self, engine: KnownEngine, shown: Snapshot, run: str) -> None:
+        try:
+            moving = shown if shown.source == "get" else await _asked(engine, shown, run)
+            if moving is not None and self._is_over_still(run):
+                await self._take_back(engine, moving, run)
+        except Exception:
+            log.exception("whether run %s moves again cannot be told", run)
+        finally:
+            self._looking.discard(run)
+
+    def _is_over_still(self, run: str) -> bool:
+        opened = self._open.get(run)
+        return run not in self._others and (opened is None or opened.run.end is not None)
+
+    async def _take_back(self, engine: KnownEngine, shown: Snapshot, run: str) -> None:
+        opened = self._open.get(run)
+        if opened is not None and opened.moves_again(self._told(opened.run, shown)):
+            return
+        while run in self._open:  # noqa: ASYNC110 - it is just being left
+            await anyio.sleep(0.01)
+        found = await self._known(run, engine.registration.name)
+        if found is None or not _is_of(found[0], engine):
+            _put(self._others, run, None)
+            return
+        self._reopen(*found, self._told(found[0], shown))
+
+    async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:
+        """A run that is over, and its last seq; None when there is no such run here, or when an
+        earlier process has recorded that somebody else played its start again."""
+        if run in self._ended:
+            return self._ended.pop(run)
+        while True:
+            try:
+                told = await self._robots.flight.newest(robot, _TOLD)
+                found, seq = await self._history.replayed(run)
+            except Refused:
+                await anyio.sleep(_AGAIN_S)
+            except msgspec.DecodeError:
+                return None
+            else:
+                played = any(
+                    isinstance(each, Commanded) and run_in(each.umrf) == run for _, each in told
+                )
+                return None if played or found is None or found.end is None else (found, seq)
+
+    def _told(self, run: Run, shown: Snapshot) -> MovesAgain:
+        nodes = ", ".join(name for name, state in shown.nodes.items() if state in ACTIVE)
+        text = (
+            f"MOVES AGAIN: {run.engine} shows {nodes} moving in {run.graph_name}, after the run "
+            f"had been called {run.end}."
+        )
+        return MovesAgain(self._wall(), text)
+
+
+async def _asked(engine: KnownEngine, shown: Snapshot, run: str) -> Snapshot | None:
+    """What an answer says about what feedback has shown, which may be late or made up; without any
+    answer the feedback is believed."""
+    with anyio.move_on_after(_PATIENCE_S):
+        while True:
+            try:
+                with anyio.fail_after(_GET_S):
+                    answer = await engine.get()
+            except (NoAnswer, TimeoutError):
+                await anyio.sleep(0.1)
+            else:
+                return next(
+                    (each for each in answer.graphs if each.run == run and each.active), None
+                )
+    return shown
+
+
+def _is_of(run: Run, engine: KnownEngine) -> bool:
+    """Whether a run went to this life of this engine."""
+    lives = {run.incarnation, engine.standing.incarnation} - {None, ""}
+    return run.engine == engine.registration.name and len(lives) <= 1
+
+
+def _put(kept: OrderedDict[str, T], key: str, value: T) -> None:
+    kept[key] = value
+    while len(kept) > _KEPT:
+        kept.popitem(last=False)
