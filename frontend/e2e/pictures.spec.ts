@@ -221,7 +221,8 @@ test.describe("robots", () => {
   const eve = new StandIn("Eve");
 
   test.beforeAll(async () => {
-    for (const robot of [david, eve]) robot.start(product.data, { after_s: 20, stop_s: 0.05 });
+    for (const robot of [david, eve])
+      robot.start(product.data, { "*": { after_s: 20, stop_s: 0.05 } });
     for (const { name, path } of [david, eve, new StandIn("Rover")]) {
       await product.ask(
         "/api/robots",

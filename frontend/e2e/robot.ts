@@ -48,6 +48,16 @@ class Speaker {
     return this.#signal("SIGKILL");
   }
 
+  /** SIGSTOP: it is there, and neither hears nor answers. */
+  freeze(): void {
+    this.#process?.kill("SIGSTOP");
+  }
+
+  /** SIGCONT. */
+  thaw(): void {
+    this.#process?.kill("SIGCONT");
+  }
+
   async #signal(signal: NodeJS.Signals): Promise<void> {
     const child = this.#process;
     this.#process = undefined;
@@ -58,8 +68,8 @@ class Speaker {
   }
 }
 
-/** A stand-in whose actions all do as `behaviour` says. */
-export class StandIn extends Speaker {
+/** Whatever answers on a path of its own, under a name. */
+abstract class Engine extends Speaker {
   readonly name: string;
 
   constructor(name: string) {
@@ -71,14 +81,26 @@ export class StandIn extends Speaker {
   get path(): string {
     return `/${this.name}/umrf_graph_get`;
   }
+}
 
-  start(folder: string, behaviour: object): void {
+/** A stand-in whose actions do as `behaviours` say, by their names. `quirks`: `NAME=VALUE`. */
+export class StandIn extends Engine {
+  start(folder: string, behaviours: Record<string, object>, ...quirks: string[]): void {
     const script = join(folder, `${this.name}.json`);
-    writeFileSync(script, JSON.stringify({ behaviours: { "*": [behaviour] } }));
+    const each = Object.entries(behaviours).map(([name, behaviour]) => [name, [behaviour]]);
+    writeFileSync(script, JSON.stringify({ behaviours: Object.fromEntries(each) }));
     this.begin([
       ...["-m", "action_assistant", "simulate-robot", this.name],
       ...["--domain", String(DOMAIN), "--namespace", this.name, "--script", script],
+      ...quirks.flatMap((quirk) => ["--quirk", quirk]),
     ]);
+  }
+}
+
+/** An engine that was built with another generation of messages. */
+export class OlderEngine extends Engine {
+  start(): void {
+    this.begin(["-c", readFileSync(join(import.meta.dirname, "older.py"), "utf8"), this.name]);
   }
 }
 

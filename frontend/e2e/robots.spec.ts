@@ -1,47 +1,74 @@
-/** Robots, from the page to a stand-in over real rclpy and back: to the end, to a stop, and worse. */
+/** Robots, from the page to stand-ins over real rclpy and back: to the end, to a stop, and worse. */
 
 import { expect, type Page, test } from "@playwright/test";
 import { saved } from "./bench";
 import { type Person, Product } from "./product";
-import { DOMAIN, NO_ROS, StandIn, Stranger } from "./robot";
+import { DOMAIN, NO_ROS, OlderEngine, StandIn, Stranger } from "./robot";
 
 test.skip(NO_ROS !== "", NO_ROS);
-test.skip(process.env.E2E_ALL !== "1", "takes a minute that CI does not have: E2E_ALL=1");
 test.describe.configure({ mode: "serial" });
 
 const product = new Product();
 const david = new StandIn("David");
 const eve = new StandIn("Eve");
+const late = new StandIn("Late");
+const old = new OlderEngine("Old");
 const stranger = new Stranger();
-const SLOW = { after_s: 60, stop_s: 0.05 };
+/** Everything goes on for a minute, and a graph of one action ends soon. */
+const SCRIPT = { "*": { after_s: 60, stop_s: 0.05 }, "chain_1/Wait_0": { after_s: 1 } };
 let ada: Person;
 
 test.beforeAll(async ({ browser }) => {
+  for (const robot of [david, eve]) robot.start(product.data, SCRIPT);
+  late.start(product.data, SCRIPT, "late_ms=5000");
+  old.start();
   await product.start();
-  david.start(product.data, { after_s: 3 });
-  eve.start(product.data, SLOW);
+  for (const { name, path } of [eve, late, old]) {
+    await post("/api/robots", { name, domain: DOMAIN, get_service: path });
+  }
   ada = await product.person(browser, "Ada");
 });
 
 test.afterAll(async () => {
-  for (const each of [stranger, david, eve]) await each.kill();
+  for (const each of [stranger, david, eve, late, old]) await each.kill();
   await product.dispose();
 });
 
+interface Run {
+  id: string;
+  number: number;
+  state: string;
+  proof_at: string | null;
+  group: string | null;
+}
+
 const card = (page: Page, robot: string) => page.getByRole("article", { name: robot });
 const alarm = (page: Page) => page.getByRole("alert").filter({ hasText: "STOP UNCONFIRMED" });
+const runs = () => product.ask<Run[]>("/api/runs", {}, product.runnerUrl);
+
+function post<T>(path: string, body: object, base = product.runnerUrl): Promise<T> {
+  const headers = { "content-type": "application/json" };
+  return product.ask<T>(path, { method: "POST", body: JSON.stringify(body), headers }, base);
+}
+
+/** Waits until a robot answers and nothing stands in the way of proofs. */
+async function answering(page: Page, robot: string): Promise<void> {
+  const there = card(page, robot);
+  await expect(there.getByText("answers", { exact: true })).toBeVisible({ timeout: 30_000 });
+  await expect(there.getByText("A stop can be proven")).toBeVisible({ timeout: 30_000 });
+}
 
 async function hold(page: Page, name: RegExp): Promise<void> {
   const button = page.getByRole("button", { name });
   await expect(button).toBeEnabled({ timeout: 15_000 });
   await button.focus();
   await page.keyboard.down("Enter");
-  await page.waitForTimeout(900);
+  await expect(page.getByRole("dialog")).toBeHidden();
   await page.keyboard.up("Enter");
 }
 
-/** Chooses robots in the start dialog and holds Start. */
-async function startOn(page: Page, graph: string, robots: string[]): Promise<void> {
+/** Opens the start dialog of a graph and chooses robots. */
+async function choose(page: Page, graph: string, robots: string[]): Promise<void> {
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
   await page.getByRole("button", { name: "Choose where to start" }).click();
@@ -49,43 +76,49 @@ async function startOn(page: Page, graph: string, robots: string[]): Promise<voi
     const box = page.getByRole("checkbox", { name: new RegExp(`^${robot}`) });
     if (!(await box.isChecked())) await box.check();
   }
+}
+
+const lookedAt = (page: Page, robot: string) =>
+  page.getByRole("list", { name: `Looked at on ${robot}` });
+
+/** Chooses robots in the start dialog and holds Start. */
+async function startOn(page: Page, graph: string, robots: string[]): Promise<void> {
+  await choose(page, graph, robots);
   for (const robot of robots) {
-    const list = page.getByRole("list", { name: `Looked at on ${robot}` });
-    await expect(list.getByText("A stop can be proven")).toBeVisible();
+    await expect(lookedAt(page, robot).getByText("A stop can be proven")).toBeVisible();
   }
   await hold(page, new RegExp(`^Start v\\d+ on ${robots.join(", ")}`));
-  await expect(page.getByRole("dialog")).toBeHidden();
 }
 
-interface Run {
-  number: number;
-  state: string;
-  proof_at: string | null;
-  group: string | null;
+/** Starts a graph as a program does; its number. */
+async function begin(robot: string, graph: string): Promise<number> {
+  const version = await post<{ id: string; digest: string; umrf: unknown }>(
+    `/api/graphs/${graph}/versions`,
+    {},
+    product.url,
+  );
+  const run = await post<Run>("/api/runs", {
+    ...{ version: version.id, digest: version.digest, umrf: version.umrf },
+    ...{ engine: robot, graph, request_id: `${robot} ${graph}` },
+  });
+  return run.number;
 }
-
-const runs = () => product.ask<Run[]>("/api/runs", {}, product.runnerUrl);
 
 test("a robot is registered in the page and shows how it is", async () => {
   const { page } = ada;
   await page.goto(`${product.url}/robots`);
-  for (const robot of [david, eve]) {
-    await page.getByRole("button", { name: "Register a robot" }).click();
-    await page.getByRole("textbox", { name: "Name" }).fill(robot.name);
-    await page.getByRole("textbox", { name: "ROS domain" }).fill(String(DOMAIN));
-    await page.getByRole("button", { name: "Path, middleware and engine …" }).click();
-    await page.getByRole("textbox", { name: "Path of its get service" }).fill(robot.path);
-    await page.getByRole("button", { name: "Register", exact: true }).click();
-    await expect(card(page, robot.name).getByText("answers", { exact: true })).toBeVisible({
-      timeout: 20_000,
-    });
-    await expect(card(page, robot.name).getByText("A stop can be proven")).toBeVisible();
-  }
+  await page.getByRole("button", { name: "Register a robot" }).click();
+  await page.getByRole("textbox", { name: "Name" }).fill(david.name);
+  await page.getByRole("textbox", { name: "ROS domain" }).fill(String(DOMAIN));
+  await page.getByRole("button", { name: "Path, middleware and engine …" }).click();
+  await page.getByRole("textbox", { name: "Path of its get service" }).fill(david.path);
+  await page.getByRole("button", { name: "Register", exact: true }).click();
+  for (const robot of [david, eve, late]) await answering(page, robot.name);
 });
 
 test("a graph runs on the robot to its end, live in the page", async () => {
   const { page } = ada;
-  await startOn(page, await product.chain(2), ["David"]);
+  await startOn(page, await product.chain(1), ["David"]);
   await expect(page.locator('[data-tone="run"]').first()).toBeVisible();
   await expect(page.getByText(/proof \d+\.\d s ago/)).toBeVisible();
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 20_000 }).toBe("finished");
@@ -94,37 +127,24 @@ test("a graph runs on the robot to its end, live in the page", async () => {
 
 test("two robots run together, and one press of keys stops both until it is proven", async () => {
   const { page } = ada;
-  await david.end();
-  david.start(product.data, SLOW);
-  await page.goto(`${product.url}/robots`);
-  await expect(
-    card(page, "David")
-      .getByText(/answers|restarted/)
-      .first(),
-  ).toBeVisible({
-    timeout: 40_000,
-  });
   await startOn(page, await product.chain(3), ["David", "Eve"]);
   await expect
     .poll(async () => (await runs()).slice(0, 2).map((run) => run.state))
     .toEqual(["running", "running"]);
   await page.getByRole("textbox").first().focus(); // also while somebody types
   await page.keyboard.press("Control+.");
-  await expect(page.getByText(/Run \d+: stopped · Run \d+: stopped/)).toBeVisible();
-  await expect
-    .poll(async () => (await runs()).slice(0, 2).map((run) => run.state), {
-      timeout: 15_000,
-    })
-    .toEqual(["stopped", "stopped"]);
+  await expect(page.getByText(/Run \d+: stopped · Run \d+: stopped/)).toBeVisible({
+    timeout: 15_000,
+  });
   const [one, other] = await runs();
+  expect([one?.state, other?.state]).toEqual(["stopped", "stopped"]);
   expect(one?.proof_at).not.toBeNull();
   expect(one?.group).toBe(other?.group);
 });
 
 test("a start of somebody else is seen, named, imported and stopped", async () => {
   const { page } = ada;
-  const id = await product.chain(1);
-  const graph = await product.ask<Record<string, unknown>>(`/api/graphs/${id}/umrf`);
+  const graph = await product.ask<object>(`/api/graphs/${await product.chain(2)}/umrf`);
   stranger.start("Eve", JSON.stringify({ ...graph, graph_name: "theirs" }));
   await page.goto(`${product.url}/robots`);
   const there = card(page, "Eve");
@@ -141,28 +161,96 @@ test("a start of somebody else is seen, named, imported and stopped", async () =
   await stranger.end();
 });
 
-test("of a robot that died nothing is claimed, and its stop is loud", async () => {
-  const { page } = ada;
-  await expect
-    .poll(
-      async () => {
-        const engine = await product.ask<{ others: number }>(
-          "/api/robots/Eve",
-          {},
-          product.runnerUrl,
-        );
-        return engine.others;
-      },
-      { timeout: 40_000 },
-    )
-    .toBe(0);
-  await startOn(page, await product.chain(2), ["Eve"]);
-  await expect.poll(async () => (await runs())[0]?.state).toBe("running");
-  await eve.kill();
-  await expect(page.getByText(/unknown since/).first()).toBeVisible({ timeout: 20_000 });
-  await page.getByRole("button", { name: /^Stop run/ }).click();
-  await expect(alarm(page)).toContainText("Eve");
-  const [newest] = await runs();
-  expect(["unknown", "stopping"]).toContain(newest?.state);
-  expect(ada.failures).toEqual([]);
+test.describe("what the page shows of an engine that", () => {
+  /** A run on its robot's card, in one word. */
+  const word = (robot: string, run: number) =>
+    card(ada.page, robot)
+      .getByRole("listitem")
+      .filter({ hasText: `Run ${run} of` });
+
+  test.beforeEach(async () => {
+    await ada.page.goto(`${product.url}/robots`);
+    for (const robot of ["David", "Eve"]) {
+      const others = card(ada.page, robot).getByText(/other program/);
+      await expect(others).toBeHidden({ timeout: 30_000 });
+    }
+  });
+
+  test("falls silent, and speaks again", async () => {
+    const run = await begin("Eve", await product.chain(4));
+    await expect(word("Eve", run)).toContainText("running");
+    eve.freeze();
+    await expect(word("Eve", run)).toContainText("unknown since", { timeout: 15_000 });
+    await expect(card(ada.page, "Eve").getByText("there, but silent")).toBeVisible();
+    eve.thaw();
+    await expect(word("Eve", run)).toContainText("running");
+    await ada.page.keyboard.press("Control+.");
+    await expect(word("Eve", run)).toBeHidden({ timeout: 15_000 });
+  });
+
+  test("gets its start late", async () => {
+    const run = await begin("Late", await product.chain(4));
+    await expect(word("Late", run)).toContainText("starting");
+    await expect(word("Late", run)).toContainText("unknown since", { timeout: 15_000 });
+    await expect(word("Late", run)).toContainText("running", { timeout: 15_000 });
+    await ada.page.keyboard.press("Control+.");
+    await expect(word("Late", run)).toBeHidden({ timeout: 15_000 });
+  });
+
+  test("runs a graph of the same name as another one, and is not meant", async () => {
+    const graph = await product.chain(5);
+    const run = await begin("David", graph);
+    const other = await begin("Eve", await product.chain(5));
+    for (const [robot, number] of [
+      ["David", run],
+      ["Eve", other],
+    ] as const) {
+      await expect(word(robot, number)).toContainText("running");
+    }
+    await ada.page.goto(`${product.url}/graphs/${graph}`);
+    await ada.page.getByRole("button", { name: `Stop run ${run} of chain_5` }).click();
+    await expect(ada.page.getByText(`Run ${run}: stopped`)).toBeVisible({ timeout: 15_000 });
+    await ada.page.goto(`${product.url}/robots`);
+    await expect(word("Eve", other)).toContainText("running");
+    await expect(card(ada.page, "David").getByText("Nothing runs there.")).toBeVisible();
+    await ada.page.keyboard.press("Control+.");
+    await expect(word("Eve", other)).toBeHidden({ timeout: 15_000 });
+  });
+
+  test("is started anew", async () => {
+    const run = await begin("David", await product.chain(4));
+    await expect(word("David", run)).toContainText("running");
+    await david.end();
+    await expect(word("David", run)).toContainText("unknown since", { timeout: 15_000 });
+    david.start(product.data, SCRIPT);
+    await expect(word("David", run)).toBeHidden({ timeout: 30_000 });
+    await expect(card(ada.page, "David").getByText(/· restarted \d/)).toBeVisible();
+    const [newest] = await runs();
+    await ada.page.goto(`${product.url}/runs/${newest?.id}`);
+    await expect(ada.page.getByText("lost: nothing proves its end").first()).toBeVisible();
+    await expect(ada.page.getByText(/look at the robot/).first()).toBeVisible();
+  });
+
+  test("speaks another generation of messages", async () => {
+    const { page } = ada;
+    const older = "Speaks an older generation of messages: it cannot be used";
+    await expect(card(page, "Old").getByText(older)).toBeVisible();
+    await choose(page, await product.chain(2), ["Old"]);
+    await expect(lookedAt(page, "Old").getByText(/generation/)).toBeVisible();
+    await expect(page.getByRole("button", { name: /^Start v\d+ on/ })).toBeDisabled();
+  });
+
+  test("was killed: nothing is claimed, and its Stop is loud", async () => {
+    const { page } = ada;
+    const graph = await product.chain(4);
+    const run = await begin("Eve", graph);
+    await expect(word("Eve", run)).toContainText("running");
+    await eve.kill();
+    await expect(word("Eve", run)).toContainText("unknown since", { timeout: 20_000 });
+    await page.goto(`${product.url}/graphs/${graph}`);
+    await page.getByRole("button", { name: /^Stop run/ }).click();
+    await expect(alarm(page)).toContainText("Eve");
+    expect(["unknown", "stopping"]).toContain((await runs())[0]?.state);
+    expect(ada.failures).toEqual([]);
+  });
 });

@@ -85,7 +85,8 @@ async def test_a_robot_that_falls_silent_is_busy_and_one_that_left_is_gone() -> 
         await until(lambda: control.robots.robot("David").state == "answering")
         told = [event for _, event in await control.robots.flight.newest("David", 99)]
     states = [event.state for event in told if isinstance(event, EngineBecame)]
-    assert states[-3:] == ["busy", "gone", "answering"]
+    assert states.index("busy") < states.index("gone")
+    assert states[-1] == "answering"
 
 
 @virtual

@@ -9,6 +9,7 @@ refusals that only its log knows (SPEC 4, and recordings of real nodes).
 import random
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 from heapq import heappop, heappush
 from itertools import count
 from math import inf
@@ -123,6 +124,12 @@ class StandIn:
     def hear(self, message: Message, at_ms: float) -> None:
         """A command has arrived; it may wait, and be overwritten while it does."""
         self._pass(at_ms)
+        if isinstance(message, Start) and self.quirks.late_ms:
+            self._later(self.quirks.late_ms, partial(self._arrive, message))
+        else:
+            self._arrive(message)
+
+    def _arrive(self, message: Message) -> None:
         if self._deaf or self.gone:
             return
         waiting = self._waiting[message.topic]

@@ -28,6 +28,7 @@ class Quirks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     `ring`: snapshots between two messages of feedback. `newest_first`: the order inside one.
     `loss`: the chance that a snapshot is lost, more when many come at once. `loading_ms`: how long an
     action is not yet RUNNING although it was started. `reaction_ms`: until a message is taken up.
+    `late_ms`: how long a start is on its way.
     """
 
     depth: int = 1
@@ -44,6 +45,7 @@ class Quirks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     loss: float = 0.15
     loading_ms: float = 3.0
     reaction_ms: float = 1.0
+    late_ms: float = 0.0
 
 
 # --- in ---------------------------------------------------------------------------------------------
