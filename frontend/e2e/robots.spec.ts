@@ -15,7 +15,7 @@ const late = new StandIn("Late");
 const old = new OlderEngine("Old");
 const stranger = new Stranger();
 /** Everything goes on for a minute, and a graph of one action ends soon. */
-const SCRIPT = { "*": { after_s: 60, stop_s: 0.05 }, "chain_1/Wait_0": { after_s: 1 } };
+const SCRIPT = { "*": { after_s: 60, stop_s: 0.05 }, "chain_1/Wait_0": { after_s: 4 } };
 let ada: Person;
 
 test.beforeAll(async ({ browser }) => {

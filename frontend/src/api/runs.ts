@@ -154,6 +154,17 @@ export function steerRun(runner: string, run: string, way: "pause" | "resume"): 
   return ask(`${runner}/api/runs/${encodeURIComponent(run)}/${way}`, { method: "POST", body: {} });
 }
 
+/** Gives a run another version of its graph, by value. Its engine pauses it for that. */
+export function modifyRun(
+  runner: string,
+  run: string,
+  version: { id: string; digest: string; umrf: string },
+): Promise<Run> {
+  const head = JSON.stringify({ version: version.id, digest: version.digest });
+  const body = `${head.slice(0, -1)},"umrf":${version.umrf}}`;
+  return ask(`${runner}/api/runs/${encodeURIComponent(run)}/modify`, { method: "POST", body });
+}
+
 export function useRuns(runner: string | undefined, graph?: string) {
   const filter = graph === undefined ? "" : `&graph=${encodeURIComponent(graph)}`;
   return useQuery({

@@ -66,6 +66,7 @@ function Inside({ id }: { id: string }) {
     entered.current = who;
     room.reconnect(); // under the session and the name that the person has now
   }, [who, room]);
+  const settle = () => room.settled(AbortSignal.timeout(NAMED_MS)).catch(unnamed);
   if (link.state === "refused" && link.why === "no-such-graph" && link.seq === 0) return <Gone />;
   return (
     <Editor
@@ -77,7 +78,14 @@ function Inside({ id }: { id: string }) {
       bar={(parts) => <TitledBar id={id} {...parts} />}
       list={(place) => <Sidebar current={id} onNew={create} onImport={choose} onPlace={place} />}
       status={(shown: Shown) => (
-        <DraftWord run={live} label={label} graph={shown.graph} seq={shown.seq} />
+        <DraftWord
+          run={live}
+          label={label}
+          graph={shown.graph}
+          seq={shown.seq}
+          settle={settle}
+          obstacle={shown.obstacle}
+        />
       )}
       start={(shown: Shown) =>
         mayStart && (
@@ -85,7 +93,7 @@ function Inside({ id }: { id: string }) {
             graph={id}
             name={shown.graph.name || "untitled"}
             seq={shown.seq}
-            settle={() => room.settled(AbortSignal.timeout(NAMED_MS)).catch(unnamed)}
+            settle={settle}
             obstacle={shown.obstacle}
             compact={shown.compact}
           />

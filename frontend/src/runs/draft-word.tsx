@@ -1,39 +1,43 @@
-/** Whether what runs is what is on screen, in words. */
-import { useQuery } from "@tanstack/react-query";
+/** Whether what runs is what is on screen, in words; where it is not, the way to send it. */
 import { useMemo } from "react";
-import { keys, type Version } from "../api/graphs";
-import { ask } from "../api/http";
 import type { Run } from "../api/runs";
 import type { Graph } from "../graph/model";
-import { fromUmrf } from "../ui/canvas/from-umrf";
-import { meaning } from "../ui/canvas/meaning";
+import { differences } from "../ui/canvas/meaning";
 import style from "./draft-word.module.css";
+import { SendChange } from "./send-change";
+import { useRunning } from "./use-running";
 
 interface Props {
   run: Run | null;
   label: string;
   graph: Graph;
   seq: number;
+  /** The name of the moment on screen. */
+  settle: () => Promise<number>;
+  /** Why this moment cannot be sent; null when it can. */
+  obstacle: string | null;
 }
 
-export function DraftWord({ run, label, graph, seq }: Props) {
-  const goes = run !== null && run.ended_at === null;
-  const version = useQuery({
-    queryKey: keys.version(run?.version ?? ""),
-    queryFn: ({ signal }) =>
-      ask<Version>(`/api/versions/${encodeURIComponent(run?.version ?? "")}`, { signal }),
-    enabled: goes && run.version !== null,
-    staleTime: Number.POSITIVE_INFINITY,
-  }).data;
-  const running = useMemo(() => (version ? meaning(fromUmrf(version.umrf)) : null), [version]);
-  const differs = useMemo(
-    () => goes && version?.seq !== seq && running !== null && running !== meaning(graph),
-    [goes, version, seq, running, graph],
+export function DraftWord({ run, label, graph, seq, settle, obstacle }: Props) {
+  const running = useRunning(run);
+  const found = useMemo(
+    () => (running === null || running.seq === seq ? [] : differences(running.graph, graph)),
+    [running, seq, graph],
   );
-  if (!goes) return null;
+  if (run === null || run.ended_at !== null) return null;
   return (
-    <span className={style.word} data-differs={differs || undefined}>
-      {differs ? "Draft differs from running" : "Running"} <i>{label}</i>
+    <span className={style.word} data-differs={found.length > 0 || undefined}>
+      {found.length > 0 ? "Draft differs from running" : "Running"} <i>{label}</i>
+      {found.length > 0 && (
+        <SendChange
+          run={run}
+          label={label}
+          found={found}
+          seq={seq}
+          settle={settle}
+          obstacle={obstacle}
+        />
+      )}
     </span>
   );
 }

@@ -20,6 +20,17 @@ export interface Order {
   override?: { codes: readonly string[]; reason: string };
 }
 
+/** A moment as a version, and its graph exactly as the editor wrote it. */
+export async function published(
+  graph: string,
+  seq: number,
+): Promise<{ version: Version; umrf: string }> {
+  const text = await publish(graph, seq);
+  const umrf = memberText(text, "umrf");
+  if (umrf === null) throw new Error("The editor gave no graph with the version.");
+  return { version: JSON.parse(text) as Version, umrf };
+}
+
 /** The name that a start of this moment will have. */
 export function nextLabel(versions: readonly Version[], seq: number): string {
   const same = versions.find((version) => version.seq === seq);
@@ -36,11 +47,8 @@ export function useStart(graph: string) {
   return useMutation({
     mutationFn: async ({ seq, engines, digest, script, override }: Order) => {
       if (runner === undefined) throw new Error("The runner is not known yet.");
-      const text = await publish(graph, await seq);
-      const version = JSON.parse(text) as Version;
+      const { version, umrf } = await published(graph, await seq);
       void client.invalidateQueries({ queryKey: keys.versions(graph) });
-      const umrf = memberText(text, "umrf");
-      if (umrf === null) throw new Error("The editor gave no graph with the version.");
       if (digest !== null && digest !== version.digest) {
         throw new Error("The graph is not the one that was looked at. Nothing was sent.");
       }

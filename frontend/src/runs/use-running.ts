@@ -1,0 +1,23 @@
+/** The graph that a run has, as it was sent last; null until it is known or when nothing runs. */
+import { useQuery } from "@tanstack/react-query";
+import { useMemo } from "react";
+import { keys, type Version } from "../api/graphs";
+import { ask } from "../api/http";
+import type { Run } from "../api/runs";
+import type { Graph } from "../graph/model";
+import { fromUmrf } from "../ui/canvas/from-umrf";
+
+export function useRunning(run: Run | null): { seq: number; graph: Graph } | null {
+  const goes = run !== null && run.ended_at === null;
+  const version = useQuery({
+    queryKey: keys.version(run?.version ?? ""),
+    queryFn: ({ signal }) =>
+      ask<Version>(`/api/versions/${encodeURIComponent(run?.version ?? "")}`, { signal }),
+    enabled: goes && run.version !== null,
+    staleTime: Number.POSITIVE_INFINITY,
+  }).data;
+  return useMemo(
+    () => (goes && version ? { seq: version.seq, graph: fromUmrf(version.umrf) } : null),
+    [goes, version],
+  );
+}
