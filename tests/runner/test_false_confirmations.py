@@ -33,6 +33,9 @@ from runner.air_link import AirLink
 from runner.world import ANN, BEN, World, carousel, live_through, order, sequence, two_ends
 
 HISTORIES = int(os.environ.get("TEST_HISTORIES", "40"))
+#: A history that once went wrong: somebody played a start of ours again while the last answer of the
+#: proof was on its way.
+KNOWN = (3378,)
 FIRST = int(os.environ.get("TEST_HISTORIES_FROM", "0"))
 NAME = "David"
 #: Ends that say that nothing moves any more.
@@ -350,7 +353,7 @@ def test_nothing_is_called_stopped_or_finished_that_moves() -> None:
     false: list[str] = []
     stuck: list[str] = []
     confirmed = 0
-    for seed in range(FIRST, FIRST + HISTORIES):
+    for seed in (*KNOWN, *range(FIRST, FIRST + HISTORIES)):
         story = lived(seed)
         confirmed += len(story.judged)
         false += [f"seed {seed}: {each}" for each in story.false]

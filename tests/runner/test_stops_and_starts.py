@@ -14,6 +14,7 @@ import anyio
 import pytest
 
 from action_assistant.errors import Refused
+from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.events import Override
 from action_assistant.runner.standin_wire import Message, Quirks, Start, Stop
 from action_assistant.umrf import codec
@@ -228,3 +229,32 @@ async def test_an_engine_of_another_generation_is_refused_in_a_sentence_and_sent
         assert "older generation" in refused.value.detail
         assert scene.air.sent == []
         assert control.open == {}
+
+
+async def replayed_after(wait_s: float) -> list[float]:
+    """Somebody plays a start of ours again so long after our Stop, while answers are on their way
+    for up to half a second. When it was called stopped although it moves."""
+    scene = Scene(8)
+    false: list[float] = []
+    async with scene.played() as control:
+        robot = scene.nodes["David"].robot
+
+        def judge(opened: OpenRun) -> None:
+            if opened.run.state == "stopped" and robot.moving:
+                false.append(now())
+
+        run = (await control.start(asked(), ANN)).run.id
+        await until(lambda: shown(control, run).state == "running")
+        scene.air.old_s = 0.5
+        control.watch(judge)
+        await control.stop(run, BEN)
+        await anyio.sleep(wait_s)
+        scene.air.carry(scene.starts()[0], "bag")
+        await until(lambda: run not in control.open)
+    return false
+
+
+@virtual
+async def test_an_answer_from_before_a_start_of_somebody_else_proves_nothing() -> None:
+    found = [await replayed_after(hundredths / 100) for hundredths in range(60, 240, 6)]
+    assert [each for each in found if each] == []

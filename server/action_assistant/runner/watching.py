@@ -73,6 +73,7 @@ class Watch:
         self._look = anyio.Event()
         self._order = itertools.count(1)
         self._stop_sent: int | None = None
+        self._disturbed = 0
         self._sent: Graph | None = None  # until it was compared with what the engine shows
         self._answered = False  # by a get, since the last feedback
         self._rest = Rest(exact=exact)
@@ -91,6 +92,11 @@ class Watch:
         """A stop message has left: whatever is asked from now on may prove it."""
         if self._stop_sent is None:
             self._stop_sent = next(self._order)
+
+    def disturbed(self) -> None:
+        """Somebody else may just have set it going: what was asked before proves nothing any more."""
+        self._disturbed = next(self._order)
+        self._rest.forget()
 
     def feed(self, ours: tuple[Snapshot, ...]) -> None:
         """Feedback of this run, oldest first. That of others says nothing about an answer to us."""
@@ -207,6 +213,8 @@ class Watch:
             )
 
     def _conclude(self, shown: list[Snapshot], answer: Answer, order: int, asked: float) -> None:
+        if order < self._disturbed:
+            return
         own, at_rest = shown[0], self._rest.seen(shown, asked)
         if self._it.run.desired != "stopped":
             end = self._it.run.apparent_end
