@@ -106,8 +106,9 @@ export class OlderEngine extends Engine {
 
 /** Somebody who publishes one start from elsewhere, and then stays on the domain for a while. */
 export class Stranger extends Speaker {
-  start(robot: string, graph: string): void {
+  /** `listeners`: how many hear starts on the domain, the runner among them. */
+  start(robot: string, graph: string, listeners: number): void {
     const code = readFileSync(join(import.meta.dirname, "stranger.py"), "utf8");
-    this.begin(["-c", code, robot], graph);
+    this.begin(["-c", code, robot, String(listeners)], graph);
   }
 }

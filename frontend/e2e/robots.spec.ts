@@ -1,7 +1,7 @@
 /** Robots, from the page to stand-ins over real rclpy and back: to the end, to a stop, and worse. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { saved } from "./bench";
+import { saved, seenRunning, watch } from "./bench";
 import { type Person, Product } from "./product";
 import { DOMAIN, NO_ROS, OlderEngine, StandIn, Stranger } from "./robot";
 
@@ -15,7 +15,7 @@ const late = new StandIn("Late");
 const old = new OlderEngine("Old");
 const stranger = new Stranger();
 /** Everything goes on for a minute, and a graph of one action ends soon. */
-const SCRIPT = { "*": { after_s: 60, stop_s: 0.05 }, "chain_1/Wait_0": { after_s: 4 } };
+const SCRIPT = { "*": { after_s: 60, stop_s: 0.05 }, "chain_1/Wait_0": { after_s: 2 } };
 let ada: Person;
 
 test.beforeAll(async ({ browser }) => {
@@ -118,11 +118,12 @@ test("a robot is registered in the page and shows how it is", async () => {
 
 test("a graph runs on the robot to its end, live in the page", async () => {
   const { page } = ada;
-  await startOn(page, await product.chain(1), ["David"]);
-  await expect(page.locator('[data-tone="run"]').first()).toBeVisible();
-  await expect(page.getByText(/proof \d+\.\d s ago/)).toBeVisible();
+  await choose(page, await product.chain(1), ["David"]);
+  await watch(page);
+  await hold(page, /^Start v\d+ on David/);
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 20_000 }).toBe("finished");
   await expect(page.getByText("finished", { exact: true }).first()).toBeVisible();
+  expect(await seenRunning(page)).toEqual(["Wait"]);
 });
 
 test("two robots run together, and one press of keys stops both until it is proven", async () => {
@@ -131,6 +132,7 @@ test("two robots run together, and one press of keys stops both until it is prov
   await expect
     .poll(async () => (await runs()).slice(0, 2).map((run) => run.state))
     .toEqual(["running", "running"]);
+  await expect(page.getByText(/proof \d+\.\d s ago/)).toBeVisible();
   await page.getByRole("textbox").first().focus(); // also while somebody types
   await page.keyboard.press("Control+.");
   await expect(page.getByText(/Run \d+: stopped · Run \d+: stopped/)).toBeVisible({
@@ -145,7 +147,7 @@ test("two robots run together, and one press of keys stops both until it is prov
 test("a start of somebody else is seen, named, imported and stopped", async () => {
   const { page } = ada;
   const graph = await product.ask<object>(`/api/graphs/${await product.chain(2)}/umrf`);
-  stranger.start("Eve", JSON.stringify({ ...graph, graph_name: "theirs" }));
+  stranger.start("Eve", JSON.stringify({ ...graph, graph_name: "theirs" }), 4);
   await page.goto(`${product.url}/robots`);
   const there = card(page, "Eve");
   await expect(there.getByText("not started from here")).toBeVisible({ timeout: 30_000 });

@@ -1,5 +1,6 @@
-/** Stop whatever else is broken: the editor frozen or dead, ten tabs, the runner out of reach. */
+/** Stop whatever else is broken: the editor frozen or dead, ten tabs, a full disk, no runner. */
 
+import { execFileSync } from "node:child_process";
 import { expect, type Page, test } from "@playwright/test";
 import { saved, start } from "./bench";
 import { Product } from "./product";
@@ -87,5 +88,28 @@ test("while it cannot be sent the page says so, and goes on trying until it is p
   }
   await expect.poll(async () => (await states())[0], { timeout: 20_000 }).toBe("stopped");
   await expect(page.getByText("stopped by Ada").first()).toBeVisible();
+  await context.close();
+});
+
+test("while the runner's disk is full, and the page says that it is not recorded", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await running(page);
+  const files = (longest: string) =>
+    execFileSync("prlimit", ["--pid", String(product.pid("runner")), `--fsize=${longest}`]);
+  files("0:unlimited"); // whatever it writes now fails
+  try {
+    await page.getByRole("button", { name: /^Stop run/ }).click();
+    await expect(page.getByText(/Run \d+: stopped/)).toBeVisible();
+    await expect(page.getByText("not recorded")).toBeVisible();
+    await start(page); // nothing is sent that could not be recorded
+    await expect(page.getByText("Not started")).toBeVisible();
+  } finally {
+    files("unlimited:unlimited");
+  }
+  await expect(page.getByText("not recorded")).toBeHidden();
+  await expect.poll(async () => (await states())[0]).toBe("stopped");
+  expect(failures).toEqual([]);
   await context.close();
 });

@@ -1,4 +1,7 @@
-"""Somebody else on the domain: publishes the graph of its input as one start for a robot."""
+"""Somebody else on the domain: publishes the graph of its input as one start for a robot.
+
+`stranger.py ROBOT LISTENERS`: it waits until so many listen, the runner among them.
+"""
 
 import json
 import signal
@@ -15,7 +18,7 @@ signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 node = rclpy.create_node("somebody_else")
 publisher = node.create_publisher(UmrfGraphStart, "/umrf_graph_start", 10)
 try:
-    while publisher.get_subscription_count() < 2:  # the robot, and the runner that listens
+    while publisher.get_subscription_count() < int(sys.argv[2]):
         time.sleep(0.02)
     time.sleep(1.0)
     name = json.loads(text)["graph_name"]

@@ -72,6 +72,16 @@ async def test_each_beat_tells_when_an_idle_robot_answered_although_nothing_has_
 
 
 @virtual
+async def test_somebody_who_joins_the_domain_is_shown_without_a_word_of_the_engine() -> None:
+    david = Open()
+    async with fleet(World(), David=david) as control:
+        told: list[int] = []
+        control.watch_robots(lambda: told.append(control.robots.robot("David").others))
+        david.others = 1
+        await until(lambda: told == [1], patience=2)
+
+
+@virtual
 async def test_a_robot_that_falls_silent_is_busy_and_one_that_left_is_gone() -> None:
     david = Open()
     async with fleet(World(), David=david) as control:

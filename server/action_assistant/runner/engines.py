@@ -36,6 +36,7 @@ log: Final = logging.getLogger(__name__)
 
 _IDLE_S: Final = 10.0
 _CLOSE_S: Final = 1.0
+_AROUND_S: Final = 1.0
 _AFTERWARDS_S: Final = 30.0
 _GET_S: Final = 1.0
 _SHARE: Final = 20  # at most one part in so many of the time goes into asking an idle engine
@@ -169,6 +170,7 @@ class KnownEngine:
                 async with anyio.create_task_group() as tasks:
                     tasks.start_soon(self._keep_link)
                     tasks.start_soon(self._ask)
+                    tasks.start_soon(self._look_around)
             finally:
                 with anyio.CancelScope(shield=True):
                     await self._link.aclose()
@@ -180,6 +182,16 @@ class KnownEngine:
             except Exception:
                 log.exception("the link to %s failed and is begun again", self.registration.name)
             await anyio.sleep(0.5)
+
+    async def _look_around(self) -> None:
+        """Who else is there changes without a word of the engine."""
+        told = self._link.standing
+        while True:
+            await anyio.sleep(_AROUND_S)
+            now = self._link.standing
+            if now != told:
+                told = now
+                self._changed()
 
     async def _ask(self) -> None:
         """Every ten seconds, more rarely when answers are dear, at once when there is news."""
