@@ -6,6 +6,7 @@ import { type Person, Product } from "./product";
 import { DOMAIN, NO_ROS, OlderEngine, StandIn, Stranger } from "./robot";
 
 test.skip(NO_ROS !== "", NO_ROS);
+test.skip(process.env.E2E_ALL !== "1", "takes a minute that CI does not have: E2E_ALL=1");
 test.describe.configure({ mode: "serial" });
 
 const product = new Product();
