@@ -235,6 +235,22 @@ def test_events_of_a_run_can_be_followed_to_its_end_and_taken_up_again(
         assert events(client, run["id"], len(all_of_them)) == []
 
 
+def test_a_program_whose_connection_breaks_after_every_event_misses_none(
+    process: RunnerProcess,
+) -> None:
+    with process.client() as client:
+        run = started(client, order(sequence(actions=2), script={"*": [{"after_s": 0.2}]}))
+        path, seen = f"/api/runs/{run['id']}/events", list[int]()
+        while True:
+            headers = {"last-event-id": str(seen[-1])} if seen else {}
+            with client.stream("GET", path, headers=headers) as answer:
+                if answer.status_code == 204:
+                    break
+                ids = (line for line in answer.iter_lines() if line.startswith("id: "))
+                seen.append(int(next(ids).removeprefix("id: ")))
+        assert seen == [each["seq"] for each in events(client, run["id"])]
+
+
 def test_a_loop_goes_on_until_it_is_stopped(process: RunnerProcess) -> None:
     with process.client() as client:
         run = started(client, order(carousel(), script={"*": [{"after_s": 0.0}]}))

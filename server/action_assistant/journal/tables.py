@@ -11,12 +11,15 @@ from sqlalchemy import (
     BigInteger,
     Boolean,
     Column,
+    ColumnElement,
     Index,
     Integer,
     LargeBinary,
     MetaData,
     Table,
     Text,
+    literal_column,
+    text,
 )
 
 _NAMES: Final = {
@@ -133,6 +136,11 @@ guest: Final = Table(
 
 # --- runner -----------------------------------------------------------------------------------
 
+#: Runs that ended badly: a list of them must not read all the others. Of an index, so word for word.
+FAILED: Final[ColumnElement[bool]] = literal_column(
+    "(run.state IN ('error', 'refused', 'lost', 'halted') OR run.result = 'on_error')"
+)
+
 #: A run. `number` counts for people; `request_id` makes a start happen once; `summary` is the run as
 #: the list shows it; `archived_as` is where its events are once they are not here any more.
 run: Final = Table(
@@ -160,9 +168,11 @@ run: Final = Table(
     Column("archived_at", BigInteger),
     Column("archived_as", Text),
     Index(None, "graph", "number"),
+    Index(None, "graph_name", "number"),
     Index(None, "engine", "number"),
     Index(None, "state"),
     Index(None, "archived_at", "ended_at"),
+    Index("ix_run_failed", "number", sqlite_where=text(str(FAILED).replace("run.", ""))),
 )
 
 #: A robot that somebody registered, under its wake word.

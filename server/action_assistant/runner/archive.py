@@ -20,12 +20,13 @@ from sqlalchemy import (
     not_,
     or_,
     select,
+    union_all,
     update,
 )
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Event
-from action_assistant.journal.tables import review, robot, run, run_label
+from action_assistant.journal.tables import FAILED, review, robot, run, run_label
 from action_assistant.runner.events import (
     AlarmRaised,
     Answered,
@@ -42,7 +43,6 @@ from action_assistant.runner.registered import Registered, Removed
 from action_assistant.runner.review import about, again
 
 _OPEN: Final = "open"
-_BAD: Final = ("error", "refused", "lost", "halted")
 
 
 def fold(event: Event) -> Sequence[Executable]:
@@ -185,27 +185,39 @@ class Filter(msgspec.Struct, frozen=True, kw_only=True):
 def listed(wanted: Filter, limit: int) -> Select[Any]:
     """Runs and what was noted about them, newest first. Which of its states an open run is in the
     table does not know: with `states` all open ones are there, too."""
-    noted = (review.c.pinned, review.c.note)
-    query = select(run, *noted).outerjoin(review, review.c.run == run.c.id)
-    query = query.order_by(run.c.number.desc()).limit(limit)
+    query = select(run, review.c.pinned, review.c.note)
+    query = query.outerjoin(review, review.c.run == run.c.id)
+    if wanted.graph is None:
+        return _newest(query, wanted, limit)
+    ids = select(run.c.id).outerjoin(review, review.c.run == run.c.id)
+    # each by an index in the order of the numbers: one question for both would read all runs
+    named = union_all(
+        *(
+            select(_newest(ids.where(column == wanted.graph), wanted, limit).subquery())
+            for column in (run.c.graph, run.c.graph_name)
+        )
+    )
+    return query.where(run.c.id.in_(named)).order_by(run.c.number.desc()).limit(limit)
+
+
+def _newest(query: Select[Any], wanted: Filter, limit: int) -> Select[Any]:
     for condition in _conditions(wanted):
         query = query.where(condition)
     if wanted.before is not None:
         number = select(run.c.number).where(run.c.id == wanted.before).scalar_subquery()
         query = query.where(run.c.number < number)
-    return query
+    return query.order_by(run.c.number.desc()).limit(limit)
 
 
 def _conditions(wanted: Filter) -> Iterator[ColumnElement[bool]]:
-    if wanted.graph is not None:
-        yield or_(run.c.graph == wanted.graph, run.c.graph_name == wanted.graph)
     if wanted.engine is not None:
         yield run.c.engine == wanted.engine
     if wanted.states:
         yield run.c.state.in_([*wanted.states, _OPEN])
     if wanted.failed is not None:
-        bad = or_(run.c.state.in_(_BAD), func.coalesce(run.c.result, "") == "on_error")
-        yield and_(run.c.state != _OPEN, bad if wanted.failed else not_(bad))
+        yield (
+            FAILED if wanted.failed else and_(run.c.state != _OPEN, func.coalesce(not_(FAILED), 1))
+        )
     if wanted.version is not None:
         yield or_(run.c.version == wanted.version, run.c.digest.startswith(wanted.version))
     if wanted.person is not None:

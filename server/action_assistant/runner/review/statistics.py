@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import msgspec
-from sqlalchemy import Row, Select, or_, select
+from sqlalchemy import Row, Select, select, union_all
 
 from action_assistant.journal.tables import action_sum, run
 from action_assistant.umrf.model import EXIT, PRECONDITIONS, Graph
@@ -61,13 +61,18 @@ class Statistics(msgspec.Struct, frozen=True, kw_only=True):
 
 def runs_of(graph: str, engine: str | None, last: int) -> Select[Any]:
     """The newest runs of a graph (id or name) that are over."""
-    query = (
-        select(run.c.id, run.c.number, run.c.state, run.c.result, run.c.started_at, run.c.ended_at)
-        .where(or_(run.c.graph == graph, run.c.graph_name == graph), run.c.ended_at.is_not(None))
+    newest = [
+        select(run.c.id)
+        .where(column == graph, run.c.ended_at.is_not(None))
+        .where(*([] if engine is None else [run.c.engine == engine]))
         .order_by(run.c.number.desc())
         .limit(last)
-    )
-    return query if engine is None else query.where(run.c.engine == engine)
+        .subquery()
+        for column in (run.c.graph, run.c.graph_name)
+    ]
+    wanted = (run.c.id, run.c.number, run.c.state, run.c.result, run.c.started_at, run.c.ended_at)
+    named = union_all(*(select(each) for each in newest))
+    return select(*wanted).where(run.c.id.in_(named)).order_by(run.c.number.desc()).limit(last)
 
 
 def sums_of(runs: Sequence[str]) -> Select[Any]:

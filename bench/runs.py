@@ -1,0 +1,329 @@
+"""Runs looked back on: lists of many, runs of many events, and what all of it takes on the disk."""
+
+import asyncio
+import itertools
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import anyio
+import msgspec
+from sqlalchemy import NullPool, create_engine, insert, select
+from table import Table, seconds
+
+from action_assistant.journal.events import Draft
+from action_assistant.journal.journal import Journal
+from action_assistant.journal.tables import action_sum, review, run_label
+from action_assistant.journal.tables import run as runs
+from action_assistant.runner import archive, shapes
+from action_assistant.runner.events import Author, Ended, Observed, Published, Requested, encode
+from action_assistant.runner.history import Aside
+from action_assistant.runner.recorder import stream_of
+from action_assistant.runner.recordings import Recordings
+from action_assistant.runner.review import bundle
+from action_assistant.runner.review import statistics as sums
+from action_assistant.runner.review.film import film
+from action_assistant.runner.review.reel import APART, Reels
+from action_assistant.runner.runs import replay
+from action_assistant.runner.seen import NodeResult, NodeState
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from runner.record_streams import Place
+from runner.world import at_once, live_through, sequence
+
+TITLE = "Lists of runs, runs of many events, and the room that they take"
+SIZES: Final = (1_000, 10_000, 100_000)
+TIMES: Final = 5
+_GRAPHS: Final = 20
+_ANN: Final = Author("ann", "Ann")
+_ASIDE: Final[Aside] = anyio.to_thread.run_sync
+
+
+def tables() -> Iterator[Table]:
+    """Lists; one run; room."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield asyncio.run(_lists(Path(folder)))
+    with tempfile.TemporaryDirectory() as folder:
+        yield asyncio.run(_long_runs(Path(folder)))
+    yield _room()
+
+
+# --- lists ------------------------------------------------------------------------------------
+
+
+async def _lists(folder: Path) -> Table:
+    journal = await _opened(folder)
+    rows: list[list[str]] = []
+    there = 0
+    for size in SIZES:
+        await _ASIDE(lambda a=there, b=size: _add_runs(folder / "runner.db", a, b))  # type: ignore[misc]
+        there = size
+        (middle,) = await journal.query(select(runs.c.id).where(runs.c.number == size // 2))
+        rows.append([f"{size:,}", *[await _took(ask) for ask in _questions(journal, middle.id)]])
+    await journal.close()
+    head = ("newest 200", "200 from the middle", "of one graph", "failed", "label", "rare word")
+    return Table(["runs", *head, "statistics of a graph"], rows)
+
+
+def _questions(journal: Journal, middle: str) -> list[Callable[[], Awaitable[Any]]]:
+    def page(**wanted: Any) -> Callable[[], Awaitable[Any]]:
+        async def ask() -> None:
+            rows = await journal.query(archive.listed(archive.Filter(**wanted), 200))
+            await journal.query(archive.labels_of([row.id for row in rows]))
+            msgspec.json.encode([shapes.listed(shapes.summary_of_row(r), r, []) for r in rows])
+
+        return ask
+
+    async def summed() -> None:
+        rows = await journal.query(sums.runs_of("g7", None, 200))
+        sums.statistics(rows, await journal.query(sums.sums_of([row.id for row in rows])), None)
+
+    pages = ({}, {"before": middle}, {"graph": "g7"}, {"failed": True}, {"label": "demo"})
+    return [*(page(**wanted) for wanted in pages), page(text="needle 7 "), summed]
+
+
+def _add_runs(path: Path, after: int, upto: int) -> None:
+    """As rows of the tables, which are all that a list looks at."""
+    engine = create_engine(f"sqlite:///{path}", poolclass=NullPool)
+    with engine.begin() as connection:
+        for first in range(after + 1, upto + 1, 1_000):
+            numbers = range(first, min(first + 1_000, upto + 1))
+            connection.execute(insert(runs), [_row(number) for number in numbers])
+            connection.execute(insert(review), [_noted(number) for number in numbers])
+            connection.execute(insert(action_sum), [each for n in numbers for each in _sums(n)])
+            labels = [{"run": f"run-{n}", "label": "demo"} for n in numbers if n % 50 == 0]
+            connection.execute(insert(run_label), labels)
+    engine.dispose()
+
+
+def _row(number: int) -> dict[str, Any]:
+    asked = _asked(number)
+    return {
+        "id": asked.run,
+        "number": number,
+        "graph": asked.graph,
+        "graph_name": asked.graph_name,
+        "version": asked.version,
+        "digest": asked.digest,
+        "engine": asked.engine,
+        "author_id": asked.author.id,
+        "author_name": asked.author.name,
+        "state": ("finished", "error", "stopped")[number % 3 if number % 500 == 0 else 0],
+        "desired": "running",
+        "simulated": False,
+        "request_id": asked.request_id,
+        "requested_at": asked.at,
+        "started_at": asked.at,
+        "ended_at": asked.at + 9_000_000,
+        "result": "on_true",
+        "summary": {"alarms": []},
+    }
+
+
+def _noted(number: int) -> dict[str, Any]:
+    words = f"needle {number} in a stack of words that nobody ever looks for twice"
+    return {
+        "run": f"run-{number}",
+        "pinned": False,
+        "note": "",
+        "words": words,
+        "summed": True,
+    }
+
+
+def _sums(number: int) -> list[dict[str, Any]]:
+    fields = {"visits": 1, "results": {"true": 1}, "inferred": 0, "took": [2_000_000]}
+    return [
+        {"run": f"run-{number}", "action": f"Work_{i}", "aid": f"a{i}", **fields} for i in range(3)
+    ]
+
+
+def _asked(number: int) -> Requested:
+    name = f"g{number % _GRAPHS}"
+    return Requested(
+        at=1_800_000_000_000_000 + number * 60_000_000,
+        run=f"run-{number}",
+        number=number,
+        request_id=f"q{number}",
+        author=_ANN,
+        graph=name,
+        graph_name=name,
+        version="v1",
+        digest=f"{number % 97:064x}",
+        engine=f"Robot{number % 7}",
+        simulated=False,
+        actions={f"Work_{i}": f"a{i}" for i in range(12)},
+        umrf="{}",
+    )
+
+
+# --- one run ----------------------------------------------------------------------------------
+
+
+async def _long_runs(folder: Path) -> Table:
+    journal = await _opened(folder)
+    rows: list[list[str]] = []
+    for number, size in enumerate(SIZES, 1):
+        events = _long_run(number, size)
+        run, drafts = f"run-{number}", _drafts(events)
+        for i in range(0, size, 5_000):
+            await journal.append(stream_of(run), drafts[i : i + 5_000])
+        started = time.perf_counter()
+        told = replay(events)
+        folded = time.perf_counter() - started
+        assert told is not None
+        rows.append([f"{size:,}", seconds(folded), *await _opening(journal, run, size)])
+    await journal.close()
+    head = ("folded in memory", "opened the first time", "opened", "first page of its film")
+    return Table(["events", *head, "a page in the middle", "any moment"], rows)
+
+
+async def _opening(journal: Journal, run: str, size: int) -> list[str]:
+    """The first time keyframes are made; after that they are in the journal."""
+
+    async def opened(reels: Reels) -> None:
+        key = (await reels.reel(run)).keys[-1]
+        msgspec.json.encode(shapes.whole(key.run, "{}"))
+
+    started = time.perf_counter()
+    await opened(Reels(journal, _ASIDE))
+    first = seconds(time.perf_counter() - started)
+    known = Reels(journal, _ASIDE)
+    middle = size // 2 - size // 2 % APART
+
+    async def page(after: int) -> None:
+        msgspec.json.encode(await film(known, run, after=after))
+
+    return [
+        first,
+        await _took(lambda: opened(Reels(journal, _ASIDE))),  # as another process would
+        await _took(lambda: page(0)),
+        await _took(lambda: page(middle)),
+        await _took(lambda: known.at(run, size // 3 + 1)),
+    ]
+
+
+def _long_run(number: int, size: int) -> list[Any]:
+    """Twelve actions take turns, each with a state or a result per event."""
+    asked = _asked(number)
+    events: list[Any] = [asked, Published(asked.at, "life")]
+    names = itertools.cycle(asked.actions)
+    at = asked.at
+    while len(events) < size - 1:
+        name = next(names)
+        for what in ("RUNNING", "on_true", "FINISHED"):
+            at += 100_000
+            seen = (
+                NodeResult(at, asked.graph_name, name, what, "done")
+                if what == "on_true"
+                else NodeState(at, asked.graph_name, name, what)
+            )
+            events.append(Observed(at, (seen,)))
+    return [*events[: size - 1], Ended(at, "finished", "on_true")]
+
+
+# --- room -------------------------------------------------------------------------------------
+
+
+def _room() -> Table:
+    rows = [_measured(actions, took) for actions, took in ((10, 360.0), (100, 36.0), (1_000, 0.36))]
+    head = ["events", "sent by the engine", "journal", "raw messages, gzipped", "archive"]
+    return Table(["a run", *head], rows)
+
+
+def _measured(actions: int, took: float) -> list[str]:
+    """In virtual time: so many actions, one after the other."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        place, sent = live_through(lambda: _lived(folder, actions, took))
+        (events,) = (v for k, v in place.world.ledger.streams.items() if k.startswith("run/"))
+        journal = asyncio.run(_stored(folder, events))
+        raw = sum(path.stat().st_size for path in folder.glob("recordings/*/*"))
+        archived = (folder / "one.jsonl.gz").stat().st_size
+    return [
+        f"{actions:,} actions of {took:g} s",
+        f"{len(events):,}",
+        *(_size(each) for each in (sent, journal, raw, archived)),
+    ]
+
+
+async def _lived(folder: Path, actions: int, took: float) -> tuple[Place, int]:
+    place = Place({"*": [{"after_s": took, "message": "done"}]})
+    recordings = Recordings(folder / "recordings", at_once)
+    link: Any = place.world.links["Robin"]
+    sent = 0
+    asked = link.get
+
+    async def get() -> Any:
+        nonlocal sent
+        answer = await asked()
+        sent += sum(map(len, answer.texts.values()))
+        recordings.heard("Robin", answer)
+        return answer
+
+    def hear(report: Any) -> None:
+        if hasattr(report, "snapshots"):
+            recordings.fed("Robin", report)
+
+    link.get = get
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(place.air.blow)
+        tasks.start_soon(recordings.run)
+        place.robot("Robin")
+        await anyio.sleep(0.5)
+        async with place.world.runner() as place.control:
+            await anyio.sleep(1.5)
+            with link.listen(hear):
+                await place.start(sequence("hour", actions))
+                while place.control.open:  # noqa: ASYNC110 - an hour, in virtual time
+                    await anyio.sleep(5)
+        await anyio.sleep(3)
+        tasks.cancel_scope.cancel()
+    return place, sent
+
+
+async def _stored(folder: Path, events: Sequence[Any]) -> int:
+    """Bytes in the database, and an archive of the run."""
+    journal = await _opened(folder)
+    empty = (folder / "runner.db").stat().st_size
+    drafts = [Draft(each.kind, each.author, each.body) for each in events]
+    for i in range(0, len(drafts), 500):
+        await journal.append(events[0].stream, drafts[i : i + 500])
+    end, stored = await journal.end(events[0].stream), await journal.read(events[0].stream)
+    file = bundle.Bundle(folder / "one.jsonl.gz", events[0].stream, "one", end)
+    file.add(stored)
+    file.close()
+    await journal.close()
+    return (folder / "runner.db").stat().st_size - empty
+
+
+def _size(number: int) -> str:
+    return f"{number / 1e6:.1f} MB" if number >= 1e6 else f"{number / 1e3:.0f} kB"
+
+
+# --- all --------------------------------------------------------------------------------------
+
+
+async def _opened(folder: Path) -> Journal:
+    return await Journal.open(
+        f"sqlite:///{folder / 'runner.db'}", branch="runner", fold=archive.fold
+    )
+
+
+def _drafts(events: Sequence[Any]) -> tuple[Draft, ...]:
+    return tuple(Draft(each.kind, "ann", encode(each)) for each in events)
+
+
+async def _took(work: Callable[[], Awaitable[Any]]) -> str:
+    """The median of some times, after one that is not counted."""
+    taken: list[float] = []
+    for _ in range(TIMES + 1):
+        started = time.perf_counter()
+        await work()
+        taken.append(time.perf_counter() - started)
+    return seconds(statistics.median(taken[1:]))

@@ -1,0 +1,119 @@
+"""What is shown of a run on a robot was seen, live and afterwards alike, however much gets lost."""
+
+from typing import Any
+
+import anyio
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from action_assistant.runner import shapes
+from action_assistant.runner.links.port import Feedback, Report
+from action_assistant.runner.runs import ENDED, replay
+from action_assistant.runner.seen import ACTIVE, Snapshot
+from action_assistant.runner.standin_engine import StandIn
+from action_assistant.runner.standin_wire import Quirks, index_of
+from runner import world
+from runner.air import now_ms
+from runner.record_streams import Place
+from runner.world import BEN, live_through, sequence
+
+RESULTS = ("on_true", "on_false", "on_error")
+CALLS = st.fixed_dictionaries(
+    {
+        "after_s": st.floats(0.02, 4.0),
+        "result": st.sampled_from(RESULTS),
+        "stop_s": st.just(0.3),
+    }
+)
+
+
+class Witness:
+    """Everything that a link has told, and everything that people were shown."""
+
+    def __init__(self, place: Place) -> None:
+        self.active: set[str] = set()
+        self.place = place
+        link: Any = place.world.links["Robin"]
+        asked = link.get
+
+        async def get() -> Any:
+            answer = await asked()
+            self._saw(answer.graphs)
+            return answer
+
+        link.get = get
+        self.listening = link.listen(self._hear)
+
+    def _hear(self, report: Report) -> None:
+        if isinstance(report, Feedback):
+            self._saw(report.snapshots)
+
+    def _saw(self, snapshots: tuple[Snapshot, ...]) -> None:
+        for shown in snapshots:
+            self.active |= {node for node, state in shown.nodes.items() if state in ACTIVE}
+
+
+async def lived(calls: list[dict[str, Any]], loss: float, seed: int, stop: float | None) -> Witness:
+    """A sequence of such actions on a robot, up to its end."""
+    script = {f"Work_{i}": [call] for i, call in enumerate(calls)}
+    place = Place(script)
+    witness = Witness(place)
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(place.air.blow)
+        robot = StandIn(
+            "Robin",
+            script=place.script,
+            index=index_of([], []),
+            quirks=Quirks(loss=loss),
+            seed=seed,
+            born_ms=now_ms(),
+            epoch_ms=world.EPOCH // 1000,
+        )
+        place.air.join(robot, "/Robin")
+        await anyio.sleep(0.5)
+        async with place.world.runner() as place.control:
+            await anyio.sleep(1.5)
+            with witness.listening:
+                run = await place.start(sequence("told", len(calls)))
+                if stop is not None:
+                    await anyio.sleep(stop)
+                    await place.control.stop(run, BEN)
+                await place.over()
+        tasks.cancel_scope.cancel()
+    return witness
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    calls=st.lists(CALLS, min_size=1, max_size=5),
+    loss=st.sampled_from([0.0, 0.3, 0.9]),
+    seed=st.integers(0, 1000),
+    stop=st.none() | st.floats(0.1, 8.0),
+)
+def test_nothing_is_shown_that_was_not_seen_and_live_is_as_it_is_told_later(
+    calls: list[dict[str, Any]], loss: float, seed: int, stop: float | None
+) -> None:
+    witness: Witness = live_through(lambda: lived(calls, loss, seed, stop))
+    ledger = witness.place.world.ledger
+    (stream,) = [each for each in ledger.streams if each.startswith("run/")]
+    events = ledger.told(stream.removeprefix("run/"))
+    run = replay(events)
+    assert run is not None
+    assert run.state in ENDED
+    for number, call in enumerate(calls):
+        visits = run.actions[f"Work_{number}"].visits
+        assert len(visits) <= 1  # every action runs once
+        for visit in visits:
+            assert visit.how == "inferred" or f"Work_{number}" in witness.active
+            assert (visit.inputs is None) == (f"Work_{number}" not in witness.active)
+            failed = call["result"] == "on_error"
+            assert visit.result in {None, "stopped", *(["error"] if failed else [])}
+    live = [shapes.shown(shown) for _, shown in witness.place.world.shown]
+    later = [
+        shapes.shown(found) for n in range(1, len(events) + 1) if (found := replay(events[:n]))
+    ]
+    assert list(_changes(live)) == list(_changes(later))
+
+
+def _changes(shown: list[shapes.RunShown]) -> list[shapes.RunShown]:
+    return [each for n, each in enumerate(shown) if n == 0 or each != shown[n - 1]]
