@@ -83,7 +83,7 @@ async def lived(calls: list[dict[str, Any]], loss: float, seed: int, stop: float
     return witness
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     calls=st.lists(CALLS, min_size=1, max_size=5),
     loss=st.sampled_from([0.0, 0.3, 0.9]),
@@ -105,7 +105,7 @@ def test_nothing_is_shown_that_was_not_seen_and_live_is_as_it_is_told_later(
         assert len(visits) <= 1  # every action runs once
         for visit in visits:
             assert visit.how == "inferred" or f"Work_{number}" in witness.active
-            assert (visit.inputs is None) == (f"Work_{number}" not in witness.active)
+            assert visit.inputs is None or f"Work_{number}" in witness.active
             failed = call["result"] == "on_error"
             assert visit.result in {None, "stopped", *(["error"] if failed else [])}
     live = [shapes.shown(shown) for _, shown in witness.place.world.shown]
