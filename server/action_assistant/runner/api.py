@@ -208,7 +208,7 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
     @get("/api/runs/{run:str}/events", summary="A run's events as they are stored (SSE)")
     async def events(run: str, request: _Asking) -> Stream | Response[None]:
         after = _last_event_id(request)
-        found = await house.control.find(run)
+        found = await house.desk.known(run)
         if found.end is not None and not await house.control.history.events(run, after, 1):
             return Response(None, status_code=204)  # tells an EventSource not to come again
         return Stream(

@@ -36,6 +36,7 @@ _LAST: Final = 1_000  # runs in one statistics
 _CAUSES: Final = 10  # in one answer
 _AT_ONCE: Final = 200  # runs summed up between two looks
 _ROWS: Final = 400  # parameters of one query
+_CLOCK: Final = 3_600_000_000  # microseconds by which a clock may be set back
 
 Format: TypeAlias = Literal["jsonl", "csv", "mcap"]
 
@@ -84,10 +85,13 @@ class Desk:
         self._aside = aside
         self._wall = wall
         self._ended = anyio.Event()
+        self._summed_up: int | None = None  # all runs that had ended by then are summed up
         control.watch(self._saw)
 
     def _saw(self, opened: OpenRun) -> None:
         if opened.run.end is not None:
+            if not opened.recorder.recorded:
+                self._summed_up = None  # it may be stored long after it ended
             self._ended.set()
 
     async def run(self) -> None:
@@ -109,16 +113,19 @@ class Desk:
 
     async def _sum_up_some(self) -> bool:
         """Sum up the newest runs that are over and are not yet. Whether any was."""
-        done = select(review.c.run).where(review.c.summed)
+        before, since = self._wall(), self._summed_up
+        done = select(review.c.run).where(review.c.run == run.c.id, review.c.summed)
         query = (
             select(run.c.id)
-            .where(run.c.ended_at.is_not(None), run.c.id.not_in(done))
+            .where(run.c.archived_at.is_(None), run.c.ended_at > (since or 0), ~done.exists())
             .order_by(run.c.number.desc())
             .limit(_AT_ONCE)
         )
         rows = await self._ledger.query(query)
         for row in rows:
             await self._sum_up(row.id)
+        if not rows:
+            self._summed_up = before - _CLOCK
         return bool(rows)
 
     async def _sum_up(self, run_id: str) -> None:
@@ -272,6 +279,7 @@ class Desk:
                 begin = recorded_runs.numbered(first, self._control.next_number())
                 await self._ledger.append(stream, [begin, *rest], expected=0)
             taken.append(first.run)
+        self._summed_up = None  # they ended long ago
         self._ended.set()
         return taken
 
