@@ -72,6 +72,7 @@ async function begun(
   );
   const { umrf } = await product.ask<{ umrf: unknown }>(`/api/versions/${version.id}`);
   const answer = await page.request.post(`${product.runnerUrl}/api/runs`, {
+    headers: { origin: product.url },
     data: {
       version: version.id,
       digest: version.digest,
