@@ -12,7 +12,7 @@ import { Editor, type Shown } from "../editor/editor";
 import { useKnownActions } from "../library/known";
 import { Sidebar } from "../library/sidebar";
 import { roomUrl } from "../room/connect";
-import { RoomProvider, useLink, useRoom } from "../room/use-room";
+import { RoomProvider, useLinkPart, useRoom } from "../room/use-room";
 import { DraftWord } from "../runs/draft-word";
 import { LiveWord } from "../runs/live-word";
 import { RecordRehearsed } from "../runs/record-rehearsed";
@@ -57,7 +57,9 @@ function Inside({ id }: { id: string }) {
   const { live, run, label, unsure } = useRunHere(id);
   const progress = useMemo(() => progressByAid(live, unsure), [live, unsure]);
   const mayStart = useMay("simulate");
-  const link = useLink();
+  const gone = useLinkPart(
+    ({ state, why, seq }) => state === "refused" && why === "no-such-graph" && seq === 0,
+  );
   const { room } = useRoom();
   const who = `${visit} ${person.role} ${person.name}`;
   const entered = useRef(who);
@@ -67,7 +69,7 @@ function Inside({ id }: { id: string }) {
     room.reconnect(); // under the session and the name that the person has now
   }, [who, room]);
   const settle = () => room.settled(AbortSignal.timeout(NAMED_MS)).catch(unnamed);
-  if (link.state === "refused" && link.why === "no-such-graph" && link.seq === 0) return <Gone />;
+  if (gone) return <Gone />;
   return (
     <Editor
       id={id}

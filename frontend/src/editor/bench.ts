@@ -106,11 +106,13 @@ export function useBench(): Bench {
 }
 
 export function selectedActions(bench: Bench): Action[] {
+  if (bench.selection.size === 0) return [];
   return bench.graph.actions.filter((action) => bench.selection.has(action.key));
 }
 
 /** Keys of the notes and frames that are chosen. */
 export function selectedNotes(bench: Bench): string[] {
+  if (bench.selection.size === 0) return [];
   return notesOf(bench.graph).flatMap(({ key }) => (bench.selection.has(key) ? [key] : []));
 }
 
@@ -126,6 +128,7 @@ export function putPlaces(bench: Bench, moved: ReadonlyMap<string, Position>): v
 }
 
 export function selectedRelations(bench: Bench): Relation[] {
+  if (bench.selection.size === 0) return [];
   return bench.graph.relations.filter((relation) => bench.selection.has(relationId(relation)));
 }
 

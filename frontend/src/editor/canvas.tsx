@@ -97,20 +97,23 @@ function useNoteDesk(bench: Bench, writing: string | null, setResized: NoteDesk[
   const [only, ...others] = bench.selection;
   const alone = only !== undefined && others.length === 0 ? only : null;
   const { doc, graph, open, select, mayEdit } = bench;
+  const change = useSteady<Parameters<NoteDesk["change"]>, void>((key, change) => {
+    changeNote(doc, graph, key, change);
+  });
   return useMemo<NoteDesk | null>(() => {
     if (!mayEdit) return null;
     return {
       editing: writing,
       alone,
       edit: (key) => (key === null ? open(null) : open({ kind: "note", key })),
-      change: (key, change) => void changeNote(doc, graph, key, change),
+      change,
       resizing: setResized,
       remove: (key) => {
         removeNotes(doc, [key.slice(2)]);
         select([]);
       },
     };
-  }, [doc, graph, open, select, mayEdit, writing, alone, setResized]);
+  }, [doc, change, open, select, mayEdit, writing, alone, setResized]);
 }
 
 /** What hands do on the canvas: functions that stay the same, since each card and arrow has them. */

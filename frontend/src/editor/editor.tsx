@@ -8,7 +8,8 @@ import type { Progress } from "../api/progress";
 import type { Script } from "../api/rehearsal";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
-import { useLink } from "../room/use-room";
+import type { Link } from "../room/connect";
+import { useCalmLink } from "../room/use-room";
 import { marksOf } from "../ui/canvas/marks";
 import { actionCarrier } from "../ui/carry";
 import { useIsPhone, useIsWide } from "../ui/screen";
@@ -89,11 +90,7 @@ const PANES = [
   { value: "run", label: "Run" },
 ];
 
-function obstacleOf(
-  bench: Bench,
-  link: ReturnType<typeof useLink>,
-  problems: Problems | undefined,
-) {
+function obstacleOf(bench: Bench, link: Link, problems: Problems | undefined) {
   if (link.state !== "live") return "not connected to the editor";
   if (link.unsaved > 0) return "saving";
   if (bench.graph.actions.length === 0) return "nothing to run yet";
@@ -143,7 +140,7 @@ export function Editor(props: Props) {
     id,
     onPanel,
   );
-  const link = useLink();
+  const link = useCalmLink();
   const problems = useProblems(id, link.seq).data;
   const marks = useMemo(() => marksOf(problems?.problems ?? []), [problems]);
   const threads = useThreads();

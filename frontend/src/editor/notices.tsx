@@ -3,7 +3,13 @@ import { Button, CloseButton, Modal, Text } from "@mantine/core";
 import { IconArchive, IconHistory, IconInfoCircle, IconLock, IconUsers } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";
 import type { OtherPerson } from "../room/device";
-import { useGraphPart, useLink, useMyName, useNotice, useOthersWaiting } from "../room/use-room";
+import {
+  useGraphPart,
+  useLinkPart,
+  useMyName,
+  useNotice,
+  useOthersWaiting,
+} from "../room/use-room";
 import type { Notice } from "../room/visit";
 import { othersWait } from "../room/words";
 import { ChoiceDialog, useChoosing } from "./choice";
@@ -38,7 +44,7 @@ function Say({ icon, tone, children, action }: SayProps) {
 
 /** Nobody can change this graph: why, and what can be done. */
 function ReadOnly() {
-  const { readOnly } = useLink();
+  const readOnly = useLinkPart((link) => link.readOnly);
   if (readOnly === undefined) return null;
   return (
     <Say icon={<IconLock size={16} />} tone="warn">

@@ -1,5 +1,5 @@
 /** The robots of a graph: what each is called, its colour, and putting one in the light. */
-import { useMemo } from "react";
+import { memo, useMemo } from "react";
 import { spotlight, useRobotInLight } from "../ui/canvas/spotlight";
 import { robotColor } from "../ui/robot";
 import { useBench } from "./bench";
@@ -13,7 +13,7 @@ export function robotsOf(actors: readonly string[]): [name: string, actions: num
 }
 
 /** Nothing where there is only one robot. */
-export function Robots() {
+export const Robots = memo(function Robots() {
   const { graph } = useBench();
   const robots = useMemo(() => robotsOf(graph.actions.map(({ actor }) => actor)), [graph.actions]);
   const lit = useRobotInLight();
@@ -40,4 +40,4 @@ export function Robots() {
       ))}
     </fieldset>
   );
-}
+});

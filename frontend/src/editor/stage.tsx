@@ -2,10 +2,10 @@
 import { Button, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
-import { type ReactNode, useEffect, useRef } from "react";
+import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import type { Progress } from "../api/progress";
 import type { Key, Position } from "../graph/model";
-import { useLink } from "../room/use-room";
+import { useGraph, useLinkPart } from "../room/use-room";
 import type { Marks } from "../ui/canvas/marks";
 import { Empty } from "../ui/empty";
 import { type Bench, useBench } from "./bench";
@@ -50,8 +50,11 @@ function Inside({
   record,
   corner,
 }: Props) {
-  const bench = useBench();
-  const link = useLink();
+  const calm = useBench();
+  const graph = useGraph();
+  // The canvas keeps up with the hands of others; what stands beside it comes after.
+  const bench = useMemo<Bench>(() => ({ ...calm, graph }), [calm, graph]);
+  const arrived = useLinkPart(({ seq }) => seq > 0);
   const canvas = useCanvas({
     me,
     graph: bench.graph,
@@ -63,7 +66,6 @@ function Inside({
   const { flow, places, sizes } = canvas;
   const frame = useRef<HTMLDivElement>(null);
   const pointer = useRef<Position | null>(null);
-  const arrived = link.seq > 0;
   const begun = arrived && bench.graph.actions.length > 0;
   const { view, lost, onPanned, onFollow } = useView({
     flow,

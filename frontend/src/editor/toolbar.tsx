@@ -1,7 +1,7 @@
 /** Tools on the canvas, and the menu of every deed. */
 import { ActionIcon, Menu, Tooltip } from "@mantine/core";
 import { IconDots } from "@tabler/icons-react";
-import { Fragment } from "react";
+import { Fragment, memo } from "react";
 import { useBench } from "./bench";
 import {
   add,
@@ -98,7 +98,7 @@ export function DeedMenu() {
   );
 }
 
-export function Toolbar({ compact }: { compact: boolean }) {
+export const Toolbar = memo(function Toolbar({ compact }: { compact: boolean }) {
   const { tool, selection, snap: snapping, dryRun: dry } = useBench();
   return (
     <div className={style.bar} role="toolbar" aria-label="Canvas tools">
@@ -118,4 +118,4 @@ export function Toolbar({ compact }: { compact: boolean }) {
       <DeedMenu />
     </div>
   );
-}
+});

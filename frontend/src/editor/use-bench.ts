@@ -3,7 +3,7 @@
 import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/person";
-import { useGraph, useLink, useRoom, useUndo } from "../room/use-room";
+import { useCalmGraph, useCalmLink, useRoom, useUndo } from "../room/use-room";
 import { CARD } from "../ui/canvas/arrange";
 import {
   type AddRequest,
@@ -54,7 +54,7 @@ export interface EditorState {
 
 export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorState {
   const { doc, undo, presence } = useRoom();
-  const graph = useGraph();
+  const graph = useCalmGraph();
   const { canUndo, canRedo } = useUndo();
   const [selection, setSelection] = useState(NONE);
   const [tool, setTool] = useState<Tool>("pan");
@@ -67,7 +67,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
     getInitialValueInEffect: false,
   });
   const role = useMay("edit");
-  const { readOnly, seq } = useLink();
+  const { readOnly, seq } = useCalmLink();
   const { dryRun, begin: beginDryRun } = useDryRun(id, graph, seq);
   const mayEdit = role && readOnly === undefined;
   const [finding, setFinding] = useState(false);

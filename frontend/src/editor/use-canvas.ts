@@ -21,7 +21,15 @@ import { type Note, notesOf, placeNotes, withContents } from "../graph/notes";
 import type { Person } from "../room/presence";
 import { usePeople, useRoom } from "../room/use-room";
 import { type Places, placesOf, unplaced } from "../ui/canvas/arrange";
-import { type Arrow, type CanvasNode, edgesOf, keep, nodesOf } from "../ui/canvas/elements";
+import {
+  type Around,
+  type Arrow,
+  aroundOf,
+  type CanvasNode,
+  edgesOf,
+  keep,
+  nodesOf,
+} from "../ui/canvas/elements";
 import type { Marks } from "../ui/canvas/marks";
 import { notePlaces } from "../ui/canvas/note-nodes";
 import { colorsOf } from "../ui/robot";
@@ -30,6 +38,13 @@ import { arrowAt, pointOf } from "./hit";
 export interface Size {
   readonly width: number;
   readonly height: number;
+}
+
+/** What was drawn last: what is the same again keeps its identity. */
+interface Drawn {
+  readonly nodes: CanvasNode[];
+  readonly edges: Arrow[];
+  readonly around: Around | null;
 }
 
 interface Given {
@@ -93,7 +108,7 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
   const chosen = useRef(selection);
   chosen.current = selection;
 
-  const drawn = useRef<{ nodes: CanvasNode[]; edges: Arrow[] }>({ nodes: [], edges: [] });
+  const drawn = useRef<Drawn>({ nodes: [], edges: [], around: null });
   const others = useMemo(() => {
     const colors = colorsOf([me, ...people.map((person) => person.id)]);
     return new Map(
@@ -102,18 +117,28 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
       ),
     );
   }, [me, people]);
-  const { nodes, edges } = useMemo(() => {
-    // The arrow that would take in what is dragged looks as if it were chosen.
-    const selected = over === null ? selection : new Set([...selection, over]);
-    const options = { others, places, selected, progress, marks, measured: sizes, resized };
-    return {
-      nodes: keep(drawn.current.nodes, nodesOf(graph, options)),
-      edges: keep(drawn.current.edges, edgesOf(graph, options)),
-    };
-  }, [graph, others, places, selection, over, progress, marks, sizes, resized]);
+  // The arrow that would take in what is dragged looks as if it were chosen.
+  const selected = useMemo(
+    () => (over === null ? selection : new Set([...selection, over])),
+    [selection, over],
+  );
+  const options = useMemo(
+    () => ({ others, places, selected, progress, marks, measured: sizes, resized }),
+    [others, places, selected, progress, marks, sizes, resized],
+  );
+  const nodes = useMemo(() => {
+    const before = drawn.current.nodes;
+    return keep(before, nodesOf(graph, options, before));
+  }, [graph, options]);
+  const around = useMemo(() => aroundOf(graph, options, drawn.current.around), [graph, options]);
+  const { relations } = graph;
+  const edges = useMemo(
+    () => keep(drawn.current.edges, edgesOf({ relations }, { selected, progress, marks }, around)),
+    [relations, selected, progress, marks, around],
+  );
   useEffect(() => {
-    drawn.current = { nodes, edges };
-  }, [nodes, edges]);
+    drawn.current = { nodes, edges, around };
+  }, [nodes, edges, around]);
 
   const now = useRef({ graph, rest, sizes });
   now.current = { graph, rest, sizes };

@@ -70,8 +70,8 @@ export function readTakenUp(maps: Maps): {
 export interface GraphSource {
   /** The graph now; the same object until something of it changes. */
   graph(): Graph;
-  /** Calls back after a transaction that may have changed it: one of this page at once. */
-  subscribe(listener: () => void): () => void;
+  /** Calls back after a transaction that may have changed it: at once if it is of this page, `own`. */
+  subscribe(listener: (own: boolean) => void): () => void;
   /** Lets go of the document. */
   close(): void;
 }
@@ -82,7 +82,7 @@ export function followGraph(
   soon: (tell: () => void) => void = (tell) => tell(),
 ): GraphSource {
   const reader = new Reader(mapsOf(doc));
-  const listeners = new Set<() => void>();
+  const listeners = new Set<(own: boolean) => void>();
   let changed = false;
   const stops = ROOTS.map((root) => {
     const map = rootOf(doc, root);
@@ -95,14 +95,15 @@ export function followGraph(
     map.observe(onChange);
     return () => map.unobserve(onChange);
   });
-  const tell = () => {
-    for (const listener of [...listeners]) listener();
+  const tell = (own: boolean) => {
+    for (const listener of [...listeners]) listener(own);
   };
+  const tellOthers = () => tell(false);
   const onEnd = ({ local }: Y.Transaction) => {
     if (!changed) return;
     changed = false;
-    if (local) tell();
-    else soon(tell);
+    if (local) tell(true);
+    else soon(tellOthers);
   };
   doc.on("afterTransaction", onEnd);
   return {

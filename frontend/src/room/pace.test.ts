@@ -16,6 +16,18 @@ test("whatever comes between two frames is told once", async () => {
   expect(tell).toHaveBeenCalledTimes(2);
 });
 
+test("what has been told rests for a while", async () => {
+  const { soon } = frames(100);
+  const times: number[] = [];
+  const tell = () => times.push(performance.now());
+  soon(tell);
+  await nextFrame();
+  expect(times.length).toBe(1);
+  soon(tell);
+  await vi.waitUntil(() => times.length === 2);
+  expect((times[1] ?? 0) - (times[0] ?? 0)).toBeGreaterThanOrEqual(99);
+});
+
 test("a page without frames is told too", async () => {
   vi.stubGlobal("requestAnimationFrame", () => 0); // as in a hidden tab
   const { soon } = frames();

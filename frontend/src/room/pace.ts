@@ -1,5 +1,5 @@
 /**
- * The pace of a page: what comes from others is told once a frame.
+ * The pace of a page: what comes from others is told with a frame, what comes together once.
  *
  * A message with an edit is followed by one that names its place in the log, and twenty people send
  * many of both. Drawing after each would only make frames late that nobody sees.
@@ -19,10 +19,12 @@ export interface Pace {
 /** Where there are no frames, as in a page that nobody sees, it is told nevertheless, ms. */
 const UNSEEN_MS = 100;
 
-export function frames(): Pace {
+/** `gap`: what is told rests so long, ms, before it is told again. */
+export function frames(gap = 0): Pace {
   const waiting = new Set<() => void>();
   let frame: number | undefined;
   let timer: ReturnType<typeof setTimeout> | undefined;
+  let told = Number.NEGATIVE_INFINITY;
   const rest = () => {
     if (frame !== undefined) globalThis.cancelAnimationFrame?.(frame);
     clearTimeout(timer);
@@ -30,16 +32,22 @@ export function frames(): Pace {
   };
   const tellAll = () => {
     rest();
+    told = performance.now();
     const all = [...waiting];
     waiting.clear();
     for (const tell of all) tell();
+  };
+  const tellWithFrame = () => {
+    frame = globalThis.requestAnimationFrame?.(tellAll);
+    timer = setTimeout(tellAll, UNSEEN_MS);
   };
   return {
     soon(tell) {
       waiting.add(tell);
       if (timer !== undefined) return;
-      frame = globalThis.requestAnimationFrame?.(tellAll);
-      timer = setTimeout(tellAll, UNSEEN_MS);
+      const wait = told + gap - performance.now();
+      if (wait <= 0) tellWithFrame();
+      else timer = setTimeout(tellWithFrame, wait);
     },
     close() {
       rest();

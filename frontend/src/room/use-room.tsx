@@ -125,6 +125,12 @@ export function useGraph(): Graph {
   return useSyncExternalStore(source.subscribe, source.graph, () => EMPTY_GRAPH);
 }
 
+/** The graph for what stands beside the canvas: own edits at once, those of others some times a second. */
+export function useCalmGraph(): Graph {
+  const { source, calm } = useRoom();
+  return useSyncExternalStore(calm.onGraph, source.graph, () => EMPTY_GRAPH);
+}
+
 /** One thing of the graph, say `(graph) => graph.name`; draws again only when it is another. */
 export function useGraphPart<T>(part: (graph: Graph) => T): T {
   const { source } = useRoom();
@@ -136,6 +142,18 @@ export function useGraphPart<T>(part: (graph: Graph) => T): T {
 export function useLink(): Link {
   const { room, onLink } = useRoom();
   return useSyncExternalStore(onLink, room.link);
+}
+
+/** The link, as old as the calm graph where only its place in the log is another. */
+export function useCalmLink(): Link {
+  const { room, calm } = useRoom();
+  return useSyncExternalStore(calm.onLink, room.link);
+}
+
+/** One thing of the link; draws again only when it is another. */
+export function useLinkPart<T>(part: (link: Link) => T): T {
+  const { room, onLink } = useRoom();
+  return useSyncExternalStore(onLink, () => part(room.link()));
 }
 
 /** The others in the room. */

@@ -4,12 +4,21 @@ import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
-import { addAction, moveActions, rename } from "../../graph/edit";
+import { addAction, connect, moveActions, rename } from "../../graph/edit";
 import type { Graph } from "../../graph/model";
 import { followGraph } from "../../graph/read";
 import { ActionCard } from "./action-card";
 import { placesOf } from "./arrange";
-import { type CanvasNode, type CardNode, keep, nodesOf } from "./elements";
+import {
+  type Around,
+  type Arrow,
+  aroundOf,
+  type CanvasNode,
+  type CardNode,
+  edgesOf,
+  keep,
+  nodesOf,
+} from "./elements";
 
 const ACTIONS = 1000;
 
@@ -50,7 +59,7 @@ function propsOf({ id, data, selected }: CardNode) {
 function draw(graph: Graph, others: ReadonlyMap<string, string> = new Map()): string[] {
   const options = { places: placesOf(graph), selected: new Set<string>(), others };
   const none = { progress: new Map(), marks: new Map(), measured: new Map() };
-  nodes = keep(nodes, nodesOf(graph, { ...options, ...none }));
+  nodes = keep(nodes, nodesOf(graph, { ...options, ...none }, nodes));
   rendered.length = 0;
   act(() =>
     root.render(
@@ -85,4 +94,51 @@ test("of a thousand actions only those that somebody changed are rendered again"
   expect(draw(source.graph())).toEqual([second]);
 
   expect(draw(source.graph(), new Map([[third, "#2563eb"]]))).toEqual([third]);
+});
+
+/** The elements of `next` that are not the same objects as before. */
+function fresh<T extends { readonly id: string }>(before: readonly T[], next: readonly T[]) {
+  const known = new Set(before);
+  return next.filter((item) => !known.has(item)).map(({ id }) => id);
+}
+
+test("of a thousand cards and their arrows only what somebody changed is made again", () => {
+  const doc = new Y.Doc();
+  const source = followGraph(doc);
+  const keys = doc.transact(() => {
+    const keys = Array.from({ length: ACTIONS }, (_, n) =>
+      addAction(doc, { name: `Action ${n}`, position: [(n % 40) * 260, Math.floor(n / 40) * 160] }),
+    );
+    for (let n = 40; n < ACTIONS; n += 1) connect(doc, keys[n - 40] ?? "", keys[n] ?? "");
+    return keys;
+  });
+  const made = (before: { nodes: CanvasNode[]; edges: Arrow[]; around: Around | null }) => {
+    const graph = source.graph();
+    const options = {
+      ...{ places: placesOf(graph), selected: new Set<string>() },
+      ...{ progress: new Map(), marks: new Map(), measured: new Map() },
+    };
+    const around = aroundOf(graph, options, before.around);
+    return {
+      nodes: nodesOf(graph, options, before.nodes),
+      edges: keep(before.edges, edgesOf(graph, options, around)),
+      around,
+    };
+  };
+  const first = made({ nodes: [], edges: [], around: null });
+  expect(first.edges.length).toBe(ACTIONS - 40);
+  const [one = "", other = ""] = keys;
+
+  moveActions(doc, [[one, [10, 20]]]);
+  const moved = made(first);
+  expect(fresh(first.nodes, moved.nodes).filter((id) => id.length > 5)).toEqual([one]);
+  expect(moved.around).toBe(first.around); // so that arrows are not looked at at all
+  expect(moved.edges).toBe(first.edges);
+
+  rename(doc, other, "Renamed");
+  const renamed = made(moved);
+  expect(fresh(moved.nodes, renamed.nodes).filter((id) => id.length > 5)).toEqual([other]);
+  const named = fresh(moved.edges, renamed.edges);
+  expect(named.length).toBe(1);
+  expect(named[0]).toContain(other);
 });

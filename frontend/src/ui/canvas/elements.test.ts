@@ -5,7 +5,7 @@ import { mapsOf } from "../../graph/layout";
 import { ENTRY, EXIT, type Graph } from "../../graph/model";
 import { readGraph } from "../../graph/read";
 import { arrange, placesOf, unplaced } from "./arrange";
-import { answersOf, edgesOf, keep, type NodeOptions, nodesOf } from "./elements";
+import { answersOf, aroundOf, edgesOf, keep, type NodeOptions, nodesOf } from "./elements";
 import { fromUmrf } from "./from-umrf";
 import { meaning } from "./meaning";
 
@@ -34,7 +34,8 @@ const options = (graph: Graph): NodeOptions => ({
 
 test("each outcome that is answered gets its own arrow from its own handle", () => {
   const { graph, a, b } = drawn();
-  const arrows = edgesOf(graph, options(graph)).filter((edge) => edge.source === a);
+  const around = aroundOf(graph, options(graph), null);
+  const arrows = edgesOf(graph, options(graph), around).filter((edge) => edge.source === a);
   expect(arrows.map((edge) => [edge.sourceHandle, edge.target])).toEqual([
     ["on_true", b],
     ["on_false", b],

@@ -90,6 +90,8 @@ export interface NodeOptions {
   resized?: Note | null;
 }
 
+export type ArrowOptions = Pick<NodeOptions, "selected" | "progress" | "marks">;
+
 function place(key: Key, options: NodeOptions) {
   const [x, y] = options.places.get(key) ?? [0, 0];
   const measured = options.measured.get(key);
@@ -103,7 +105,37 @@ function place(key: Key, options: NodeOptions) {
   };
 }
 
-export function nodesOf(graph: Graph, options: NodeOptions): CanvasNode[] {
+/** The card of an action: the same as before when nothing that it shows has changed. */
+function cardOf(action: Action, options: NodeOptions, before: CanvasNode | undefined): CardNode {
+  const [x, y] = options.places.get(action.key) ?? [0, 0];
+  const data = {
+    action,
+    progress: options.progress.get(action.key) ?? null,
+    mark: options.marks.get(action.key) ?? null,
+    other: options.others?.get(action.key) ?? null,
+  };
+  const same =
+    before?.type === "action" &&
+    before.data.action === action &&
+    before.data.progress === data.progress &&
+    before.data.mark === data.mark &&
+    before.data.other === data.other &&
+    before.position.x === x &&
+    before.position.y === y &&
+    before.selected === options.selected.has(action.key) &&
+    before.measured === options.measured.get(action.key);
+  if (same) return before;
+  const ariaLabel = cardWords(action, options);
+  return { ...place(action.key, options), type: "action", ariaLabel, data };
+}
+
+/** `before`: what was drawn last; it is looked at first, since of many cards few change at once. */
+export function nodesOf(
+  graph: Graph,
+  options: NodeOptions,
+  before: readonly CanvasNode[] = [],
+): CanvasNode[] {
+  const known = new Map(before.map((node) => [node.id, node]));
   const ends = ([ENTRY, EXIT] as const).map(
     (end): EndNode => ({
       ...place(end, options),
@@ -113,25 +145,13 @@ export function nodesOf(graph: Graph, options: NodeOptions): CanvasNode[] {
       deletable: false,
     }),
   );
-  const cards = graph.actions.map(
-    (action): CardNode => ({
-      ...place(action.key, options),
-      type: "action",
-      ariaLabel: cardWords(action, options),
-      data: {
-        action,
-        progress: options.progress.get(action.key) ?? null,
-        mark: options.marks.get(action.key) ?? null,
-        other: options.others?.get(action.key) ?? null,
-      },
-    }),
-  );
+  const cards = graph.actions.map((action) => cardOf(action, options, known.get(action.key)));
   const notes = noteNodes(graph, options);
   return [...notes.frames, ...ends, ...cards, ...notes.notes];
 }
 
 /** Whether the arrow has been taken: its parent ended this way in its last visit. */
-function isLit(relation: Relation, outcome: Precondition, options: NodeOptions): boolean {
+function isLit(relation: Relation, outcome: Precondition, options: ArrowOptions): boolean {
   const parent = options.progress.get(relation.parent);
   if (relation.parent === ENTRY) return options.progress.size > 0;
   return parent !== undefined && `on_${parent.tone}` === outcome;
@@ -199,12 +219,29 @@ function arrowWords(relation: Relation, outcome: Precondition, names: Names): st
   return `Arrow from ${from}, when ${outcomeWord[outcome]}: ${relation.conditions[outcome]} ${to}`;
 }
 
-interface Around {
+/** What arrows have to know of cards: the same as before when it says the same. */
+export interface Around {
   readonly boxes: Map<Key, Box>;
   readonly names: Names;
 }
 
-function arrowsOf(relation: Relation, options: NodeOptions, { boxes, names }: Around): Arrow[] {
+export function aroundOf(graph: Graph, options: NodeOptions, before: Around | null): Around {
+  const names = namesOf(graph);
+  const boxes = boxesOf(graph, options);
+  const same = before !== null && alikeMaps(before.names, names) && alikeMaps(before.boxes, boxes);
+  return same ? before : { boxes, names };
+}
+
+function alikeMaps<T>(a: ReadonlyMap<Key, T>, b: ReadonlyMap<Key, T>): boolean {
+  if (a.size !== b.size) return false;
+  for (const [key, value] of b) {
+    const known = a.get(key);
+    if (known !== value && !(isPlain(known) && isPlain(value) && alike(known, value))) return false;
+  }
+  return true;
+}
+
+function arrowsOf(relation: Relation, options: ArrowOptions, { boxes, names }: Around): Arrow[] {
   const id = relationId(relation);
   const outcomes = spoken(relation.conditions);
   const shown: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
@@ -238,11 +275,13 @@ function arrowsOf(relation: Relation, options: NodeOptions, { boxes, names }: Ar
   }));
 }
 
-export function edgesOf(graph: Graph, options: NodeOptions): Arrow[] {
-  const there = new Set<Key>([ENTRY, EXIT, ...graph.actions.map((action) => action.key)]);
-  const around = { boxes: boxesOf(graph, options), names: namesOf(graph) };
-  const arrows = graph.relations
-    .filter(({ parent, child }) => there.has(parent) && there.has(child))
+export function edgesOf(
+  { relations }: Pick<Graph, "relations">,
+  options: ArrowOptions,
+  around: Around,
+): Arrow[] {
+  const arrows = relations
+    .filter(({ parent, child }) => around.names.has(parent) && around.names.has(child))
     .flatMap((relation) => arrowsOf(relation, options, around));
   return labelled(arrows, around.boxes);
 }
@@ -303,7 +342,7 @@ export function keep<T extends { id: string; data?: object }>(
   let changed = before.length !== next.length;
   const kept = next.map((item, i) => {
     const known = old.get(item.id);
-    const same = known !== undefined && alike(known, item);
+    const same = known !== undefined && (known === item || alike(known, item));
     if (!same || before[i] !== known) changed = true;
     return same ? known : item;
   });

@@ -4,7 +4,7 @@ import { type Note, notesOf } from "../../graph/notes";
 import { OUTCOMES, outcomeColor, outcomeWord } from "../outcome";
 import { robotColor } from "../robot";
 import { CARD, PILL, type Sizes } from "./arrange";
-import { type Arrow, type CanvasNode, edgesOf, nodesOf, shareOf } from "./elements";
+import { type Arrow, aroundOf, type CanvasNode, edgesOf, nodesOf, shareOf } from "./elements";
 import { lineOf } from "./line";
 import { NO_MARKS } from "./marks";
 import { noteColor } from "./note-colors";
@@ -71,7 +71,7 @@ class Painter {
       measured: sizes,
     };
     this.nodes = nodesOf(graph, options);
-    this.edges = edgesOf(graph, options);
+    this.edges = edgesOf(graph, options, aroundOf(graph, options, null));
     this.notes = notesOf(graph);
   }
 

@@ -11,7 +11,7 @@ import type { Progress } from "../../api/progress";
 import type { Graph, Key } from "../../graph/model";
 import { ActionCard } from "./action-card";
 import { placesOf } from "./arrange";
-import { type CanvasNode, edgesOf, nodesOf } from "./elements";
+import { aroundOf, type CanvasNode, edgesOf, nodesOf } from "./elements";
 import { EndPill } from "./end-pill";
 import { NO_MARKS } from "./marks";
 import { NoteCard } from "./note-card";
@@ -40,7 +40,10 @@ export function GraphView({ graph, progress, selected = NONE, label, onSelect }:
     [places, selected, progress, measured],
   );
   const nodes = useMemo(() => nodesOf(graph, options), [graph, options]);
-  const edges = useMemo(() => edgesOf(graph, options), [graph, options]);
+  const edges = useMemo(
+    () => edgesOf(graph, options, aroundOf(graph, options, null)),
+    [graph, options],
+  );
   return (
     <ReactFlow<CanvasNode>
       nodes={nodes}
