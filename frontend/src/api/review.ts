@@ -305,6 +305,18 @@ export function useMates(runner: string | undefined, run: Run) {
   });
 }
 
+/** Where the raw messages from the time of a run are. `text` is empty when all of them are here. */
+export function useRaw(runner: string | undefined, run: Run) {
+  return useQuery({
+    queryKey: ["runs", "raw", run.id],
+    queryFn: ({ signal }) =>
+      ask<{ text: string; hours: { name: string }[] }>(`${runner}/api/runs/${run.id}/raw`, {
+        signal,
+      }),
+    enabled: runner !== undefined && !run.simulated,
+  });
+}
+
 export function expectRun(runner: string, run: string, name: string): Promise<unknown> {
   return ask(`${runner}/api/expectations`, { method: "POST", body: { run, name } });
 }

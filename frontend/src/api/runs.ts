@@ -73,6 +73,8 @@ export interface Run {
   /** The newest lines of the engine's own log. */
   log?: { at: string; text: string }[];
   umrf?: unknown;
+  /** Since when its events stand in an archive, and in which file. */
+  archived?: { at: string; file: string } | null;
   /** Values of actions as they were sent: action, parameter, JSON text as in `inputs`. */
   sent?: Record<string, Record<string, string>>;
   /** Problems that somebody started in spite of, and why. */

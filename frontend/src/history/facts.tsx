@@ -1,17 +1,20 @@
 /** What a run was, in a table. */
 
 import { endWords } from "../api/progress";
+import { useRaw } from "../api/review";
 import { placeOf, type Run } from "../api/runs";
 import { clock, day, duration, instant, useNow } from "../ui/when";
 import style from "./facts.module.css";
 
 interface Props {
+  runner: string | undefined;
   run: Run;
   version: string;
   by: string;
 }
 
-export function Facts({ run, version, by }: Props) {
+export function Facts({ runner, run, version, by }: Props) {
+  const raw = useRaw(runner, run).data;
   const now = useNow(60_000);
   const start = instant(run.started_at);
   const end = instant(run.ended_at);
@@ -29,6 +32,17 @@ export function Facts({ run, version, by }: Props) {
     ["Result", run.result?.replace(/^on_/, "") ?? "—"],
     ["Why", run.detail || "—"],
     ["Recorded", run.recorded ? "all of it" : "NOT all of it: the journal could not be written"],
+    ...(run.archived
+      ? [
+          ["Archived", `${moment(instant(run.archived.at))}, ${run.archived.file}`] as [
+            string,
+            string,
+          ],
+        ]
+      : []),
+    ...(raw
+      ? [["Raw messages", raw.text || `here, ${raw.hours.length} h`] as [string, string]]
+      : []),
     ["Last proof", moment(instant(run.proof_at))],
     ...(run.despite ?? []).map(({ code, text }): [string, string] => ["In spite of", text ?? code]),
     ...(run.override ? [["Because", `“${run.override.reason}”`] as [string, string]] : []),

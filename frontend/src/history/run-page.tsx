@@ -225,7 +225,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
             </Tabs.Panel>
             <Tabs.Panel value="facts" className={style.panel ?? ""}>
               <Notes runner={runner} run={newest.id} />
-              <Facts run={newest} version={label} by={authorName(newest.author)} />
+              <Facts runner={runner} run={newest} version={label} by={authorName(newest.author)} />
             </Tabs.Panel>
           </Tabs>
         </aside>
