@@ -66,6 +66,7 @@ export function PlayerControls({ replay, goes }: Props) {
       <Tooltip label={playing ? "Pause (Space)" : "Play (Space)"}>
         <ActionIcon
           variant="filled"
+          className={style.play ?? ""}
           aria-label={playing ? "Pause the replay" : "Play the replay"}
           onClick={() => play(!playing)}
         >

@@ -147,7 +147,9 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
         <Tabs value={open} onChange={setOpen} className={style.tabs ?? ""} keepMounted={false}>
           <Tabs.List>
             <Tabs.Tab value="known">
-              {count(robot.actions, "action")}, {count(robot.graphs, "graph")}
+              {robot.actions === null && robot.graphs === null
+                ? "Actions and graphs"
+                : `${count(robot.actions, "action")}, ${count(robot.graphs, "graph")}`}
             </Tabs.Tab>
             <Tabs.Tab value="flight">What others told it</Tabs.Tab>
             {open !== null && (
