@@ -94,6 +94,20 @@ async function ended(run: string): Promise<void> {
     .toMatch(/finished|error|stopped/);
 }
 
+test("why a run failed", async ({ browser }) => {
+  const options = { viewport: { width: 1440, height: 900 } };
+  const { page, context } = await product.person(browser, "Ada", options);
+  await page.goto(`${product.url}/runs`);
+  await page.getByRole("button", { name: "Show five recorded runs that failed" }).click();
+  await page.getByRole("link", { name: /photo_round/ }).click();
+  const why = page.getByRole("region", { name: "Why" });
+  await expect(why.getByRole("listitem").first()).toContainText("Join waits for Look");
+  await why.getByRole("button").first().click();
+  await page.waitForTimeout(1_200);
+  await picture(page, "why-light");
+  await context.close();
+});
+
 const SLOW = { after_s: 100 };
 const BRISK = { after_s: 0.6 };
 

@@ -44,7 +44,7 @@ test("the view follows what runs until the person moves it, and again when asked
   await page.goto(`${product.url}/graphs/${await product.chain(40)}`);
   await saved(page);
   await start(page);
-  await expect(card(page, "Wait", 8)).toBeInViewport({ timeout: 30_000 });
+  await expect(card(page, "Wait", 6)).toBeInViewport({ timeout: 30_000 });
   await expect(page.getByRole("list", { name: /Actions of the run/ })).toBeVisible();
 
   await page.getByRole("button", { name: "Hide the lanes" }).click();
