@@ -68,6 +68,7 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, o
   const { tone, word } = runWord(run);
   const alarm = run.alarms.at(-1);
   const unsure = down && goes;
+  const silent = goes ? instant(run.unknown_since) : null;
   return (
     <section
       className={style.strip}
@@ -97,7 +98,13 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, o
           </Text>
         )}
         {goes && <PauseButton run={run} />}
-        <Button component={Link} to={`/runs/${run.id}`} size="compact-xs" variant="subtle">
+        <Button
+          component={Link}
+          to={`/runs/${run.id}`}
+          size="compact-xs"
+          variant="subtle"
+          flex="none"
+        >
           Open run
         </Button>
         {folded !== null && <FoldButton folded={folded} onFold={onFold} />}
@@ -108,6 +115,7 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, o
           lanes={lanes}
           until={until}
           unsure={unsure}
+          gaps={silent === null ? [] : [{ from: silent, until, text: "No answer of the engine" }]}
           selected={selected}
           onPick={onPick}
         />
