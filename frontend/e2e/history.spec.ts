@@ -93,6 +93,48 @@ test("a replay shows each moment as it was known then, by mouse and by keyboard"
     .toHaveLength(1);
 });
 
+test("what the page showed live is what the replay shows of that moment", async () => {
+  const { page } = ada;
+  const { id, digest, umrf } = await version(graph);
+  const script = { behaviours: { "*": [{ after_s: 0.9 }] } };
+  const head = { version: id, digest, graph, engine: "simulator", request_id: "e2e-live", script };
+  const body = `${JSON.stringify(head).slice(0, -1)},"umrf":${umrf}}`;
+  const { id: run } = await product.ask<Run>(
+    "/api/runs",
+    { method: "POST", body },
+    product.runnerUrl,
+  );
+  await page.goto(`${product.url}/runs/${run}`);
+  const states = async () => (await words(page)).map((word) => word.replace(/\W*[\d≤].*$/, ""));
+  const live: { at: number; states: string[] }[] = [];
+  await expect
+    .poll(
+      async () => {
+        const [before, at] = [await states(), Date.now()];
+        await page.waitForTimeout(200); // what is about to come has come then
+        if (String(await states()) !== String(before)) return false;
+        const known = live.map((each) => String(each.states));
+        if (before.length === 3 && !known.includes(String(before))) {
+          live.push({ at: at + 100, states: before });
+        }
+        return before.every((word) => word.includes("true"));
+      },
+      { timeout: 20_000, intervals: [50] },
+    )
+    .toBe(true);
+  expect(live.length).toBeGreaterThanOrEqual(3); // each action was seen running, or some of them
+  const { started_at } = await product.ask<{ started_at: string }>(
+    `/api/runs/${run}`,
+    {},
+    product.runnerUrl,
+  );
+  for (const { at, states: then } of live.slice(0, -1)) {
+    await page.goto(`${product.url}/runs/${run}?t=${at - Date.parse(started_at)}`);
+    await expect(page.getByText("as it was then")).toBeVisible();
+    await expect.poll(states).toEqual(then);
+  }
+});
+
 test("a run is found by what was said in it, pinned, labelled and found by that", async () => {
   const { page } = ada;
   await page.goto(`${product.url}/runs/${bad.id}`);
@@ -114,9 +156,9 @@ test("a run is found by what was said in it, pinned, labelled and found by that"
   await page.getByRole("button", { name: "Saved" }).click();
   await page.getByRole("menuitem", { name: /^Save “/ }).click();
   await page.goto(`${product.url}/runs`);
-  await expect(rows).toHaveCount(2);
+  await expect(rows).toHaveCount(3);
   await page.getByText("Finished", { exact: true }).click();
-  await expect(rows).toHaveCount(1);
+  await expect(rows).toHaveCount(2);
   await page.getByText("Failed", { exact: true }).click();
   await expect(rows).toHaveCount(1);
   await expect(rows.getByText("finished: error")).toBeVisible();
@@ -140,10 +182,10 @@ test("“worked yesterday, fails today” is answered in one look", async () => 
 test("new runs wait behind a pill, so that nothing moves under the finger", async () => {
   const { page } = ada;
   await page.goto(`${product.url}/runs`);
-  await expect(page.getByRole("row").filter({ hasText: "chain_3" })).toHaveCount(2);
+  await expect(page.getByRole("row").filter({ hasText: "chain_3" })).toHaveCount(3);
   await ran({ "*": [QUICK] });
   await page.getByRole("button", { name: "1 new run" }).click();
-  await expect(page.getByRole("row").filter({ hasText: "chain_3" })).toHaveCount(3);
+  await expect(page.getByRole("row").filter({ hasText: "chain_3" })).toHaveCount(4);
 });
 
 test("a run goes again with one fault, in the simulator", async () => {

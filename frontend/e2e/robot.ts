@@ -83,11 +83,12 @@ abstract class Engine extends Speaker {
   }
 }
 
-/** A stand-in whose actions do as `behaviours` say, by their names. `quirks`: `NAME=VALUE`. */
+/** A stand-in whose actions do as `behaviours` say, by their names: always, or call by call. `quirks`:
+ * `NAME=VALUE`. */
 export class StandIn extends Engine {
-  start(folder: string, behaviours: Record<string, object>, ...quirks: string[]): void {
+  start(folder: string, behaviours: Record<string, object | object[]>, ...quirks: string[]): void {
     const script = join(folder, `${this.name}.json`);
-    const each = Object.entries(behaviours).map(([name, behaviour]) => [name, [behaviour]]);
+    const each = Object.entries(behaviours).map(([name, behaviour]) => [name, [behaviour].flat()]);
     writeFileSync(script, JSON.stringify({ behaviours: Object.fromEntries(each) }));
     this.begin([
       ...["-m", "action_assistant", "simulate-robot", this.name],

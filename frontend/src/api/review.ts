@@ -219,7 +219,7 @@ export function useCauses(runner: string | undefined, run: Run) {
 
 /** Whether there is something to explain. */
 export function wentWrong(run: Run): boolean {
-  if (run.state === "finished") return run.result !== null && run.result !== "on_true";
+  if (run.state === "finished") return run.result !== "on_true";
   return run.ended_at !== null || run.state === "unknown" || run.alarms.length > 0;
 }
 

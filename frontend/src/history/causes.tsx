@@ -34,7 +34,8 @@ function Line({ cause, onShow }: { cause: Cause; onShow: Props["onShow"] }) {
 export function Causes({ runner, run, onShow }: Props) {
   const found = useCauses(runner, run).data;
   if (!wentWrong(run) || found === undefined) return null;
-  if (found.length === 0 && (run.ended_at === null || run.state === "stopped")) return null;
+  const plain = run.ended_at === null || run.state === "stopped" || run.result === null;
+  if (found.length === 0 && plain) return null;
   return (
     <section className={style.causes} aria-label="Why" data-known={found.length > 0 || undefined}>
       <h2>

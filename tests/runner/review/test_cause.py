@@ -189,3 +189,10 @@ def test_causes_are_different_values() -> None:
     run, sent, _ = example("hang_in_a_join")
     named: tuple[Cause, ...] = causes(run, sent)
     assert len(set(named)) == len(named)
+
+
+def test_a_robot_that_tells_no_result_still_shows_what_was_thrown() -> None:
+    thrown = Observed(4, (state(3, "A_0", "RUNNING"), state(4, "A_0", "ERROR")))
+    assert found(LINE, thrown, Ended(9, "finished")) == ["A ended in error."]
+    done = Observed(4, (state(3, "A_0", "RUNNING"), state(4, "A_0", "FINISHED")))
+    assert found(LINE, done, Ended(9, "finished")) == []

@@ -109,11 +109,15 @@ Cause: TypeAlias = (
 def causes(run: Run, graph: Graph | None) -> tuple[Cause, ...]:
     """What is proven to be behind the end of a run, or behind its trouble so far, the weightiest
     first; nothing for a run that went well. `graph`: as it was sent."""
-    well = run.end == "finished" and run.result in {"on_true", None}
-    if well:
+    if run.end == "finished" and (run.result == "on_true" or _nothing_failed(run)):
         return ()
     found = list(_found(run, graph))
     return tuple(dict.fromkeys(found))
+
+
+def _nothing_failed(run: Run) -> bool:
+    """Robots do not tell the result of a graph; an action in error says enough."""
+    return run.result is None and all(_failed(each) is None for each in run.actions.values())
 
 
 def _found(run: Run, graph: Graph | None) -> Iterator[Cause]:
