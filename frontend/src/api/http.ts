@@ -92,6 +92,27 @@ export async function askText(url: string, request: Ask = {}): Promise<string> {
   return response.text();
 }
 
+/** The first `most` lines of what a route answers, and whether there are more. */
+export async function askLines(
+  url: string,
+  most: number,
+  request: Ask = {},
+): Promise<{ lines: string[]; more: boolean }> {
+  const response = await send(url, request);
+  if (!response.ok) throw new Refusal(await problemOf(response));
+  const reader = response.body?.pipeThrough(new TextDecoderStream()).getReader();
+  let text = "";
+  for (;;) {
+    const part = await reader?.read();
+    if (part === undefined || part.done) break;
+    text += part.value;
+    if (text.split("\n").length > most + 1) break;
+  }
+  await reader?.cancel();
+  const lines = text.split("\n").filter((line) => line !== "");
+  return { lines: lines.slice(0, most), more: lines.length > most };
+}
+
 /** The text that a route answers, and which moment of the graph it is of. */
 export async function askMoment(url: string): Promise<{ text: string; seq: number }> {
   const response = await send(url, {});

@@ -1,6 +1,6 @@
 /** What the runner tells of past runs: films, marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
-import { ask } from "./http";
+import { ask, askLines } from "./http";
 import { type ActionRun, getRun, type Run, type Visit } from "./runs";
 
 /** What became of an action. From the visit number `first` on, its visits are now `visits`. */
@@ -143,6 +143,7 @@ export interface RunFilter {
   version: string;
   pinned: boolean;
   since: string;
+  until: string;
 }
 
 export const EVERYTHING: RunFilter = {
@@ -156,6 +157,7 @@ export const EVERYTHING: RunFilter = {
   version: "",
   pinned: false,
   since: "",
+  until: "",
 };
 
 /** The filter as a query; empty parts are left out. */
@@ -181,6 +183,7 @@ export function filterOf(query: URLSearchParams): RunFilter {
     version: text("version"),
     pinned: query.get("pinned") === "true",
     since: text("since"),
+    until: text("until"),
   };
 }
 
@@ -324,6 +327,16 @@ export function expectRun(runner: string, run: string, name: string): Promise<un
 /** Where a run can be fetched as a file. */
 export function exportUrl(runner: string, run: string, format: "jsonl" | "csv" | "mcap"): string {
   return `${runner}${path(run)}/export?format=${format}`;
+}
+
+/** The first stored events of a run, each as one line of JSON. */
+export function useRawEvents(runner: string | undefined, run: Run, most: number) {
+  return useQuery({
+    queryKey: ["runs", "raw", run.id, run.state, most],
+    queryFn: ({ signal }) =>
+      askLines(exportUrl(runner ?? "", run.id, "jsonl"), most, { signal, patience: 30_000 }),
+    enabled: runner !== undefined,
+  });
 }
 
 /** Where the graph of a run is, as it was sent. */

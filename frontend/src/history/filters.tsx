@@ -4,6 +4,7 @@ import { useDebouncedCallback, useLocalStorage } from "@mantine/hooks";
 import { IconFilter, IconPin, IconSearch, IconTrash } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
 import { EVERYTHING, filterOf, queryOf, type RunFilter, useLabels } from "../api/review";
+import { dateOf, MoreFilters } from "./more-filters";
 import style from "./runs-page.module.css";
 
 type Ending = Pick<RunFilter, "state" | "failed">;
@@ -50,7 +51,9 @@ export function filterWords(filter: RunFilter): string {
     filter.label && `labelled ${filter.label}`,
     filter.person && `by ${filter.person}`,
     filter.pinned && "pinned",
-    filter.since && `since ${filter.since.slice(0, 10)}`,
+    filter.since && `since ${dateOf(filter.since)}`,
+    filter.until && `until ${dateOf(filter.until)}`,
+    filter.version && "of one version",
     filter.graph && "of one graph",
   ];
   return words.filter(Boolean).join(" ") || "All runs";
@@ -152,6 +155,7 @@ export function Filters({ runner, filter, onChange, engines }: Props) {
       >
         <IconPin size={16} aria-hidden />
       </ActionIcon>
+      <MoreFilters filter={filter} onChange={onChange} />
       <SavedFilters filter={filter} onChange={onChange} />
     </div>
   );

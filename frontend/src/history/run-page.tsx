@@ -25,6 +25,7 @@ import { gapsOf, signsOf } from "./film-signs";
 import { Notes, Pin } from "./notes";
 import { Parameters } from "./parameters";
 import { PlayerControls } from "./player";
+import { Raw } from "./raw";
 import { RunMenu, type StartAgain } from "./run-menu";
 import style from "./run-page.module.css";
 import { type Replay, useReplay } from "./use-replay";
@@ -203,11 +204,12 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
           />
         </section>
         <aside className={style.side} aria-label="About the run">
-          <Tabs defaultValue="events" className={style.tabs ?? ""}>
+          <Tabs defaultValue="events" keepMounted={false} className={style.tabs ?? ""}>
             <Tabs.List>
               <Tabs.Tab value="events">Events</Tabs.Tab>
               <Tabs.Tab value="parameters">Parameters</Tabs.Tab>
               <Tabs.Tab value="facts">Facts</Tabs.Tab>
+              <Tabs.Tab value="raw">Raw</Tabs.Tab>
             </Tabs.List>
             <Tabs.Panel value="events" className={style.panel ?? ""}>
               <Events
@@ -226,6 +228,9 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
             <Tabs.Panel value="facts" className={style.panel ?? ""}>
               <Notes runner={runner} run={newest.id} />
               <Facts runner={runner} run={newest} version={label} by={authorName(newest.author)} />
+            </Tabs.Panel>
+            <Tabs.Panel value="raw" className={style.panel ?? ""}>
+              <Raw runner={runner} run={newest} />
             </Tabs.Panel>
           </Tabs>
         </aside>

@@ -4,7 +4,7 @@ import { duration } from "./when";
 
 export function tookWords(progress: Pick<Progress, "took" | "atMost">): string | null {
   const { took, atMost } = progress;
-  if (took === null) return null;
+  if (took === null || (took === 0 && atMost === null)) return null; // seen in one message only
   const [least, most] = [duration(took), atMost === null ? "" : duration(atMost)];
   if (most === "" || most === least) return least;
   if (took < 50) return `≤ ${most}`;
