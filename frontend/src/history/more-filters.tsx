@@ -50,7 +50,7 @@ function Fields({ filter, onChange }: Props) {
   const known = graphs.map(({ id, name }) => ({ value: id, label: name }));
   const strange = filter.graph !== "" && known.every(({ value }) => value !== filter.graph);
   return (
-    <Stack gap="xs">
+    <Stack gap="xs" tabIndex={-1} data-autofocus aria-label="More filters">
       <Select
         label="Graph"
         placeholder="Any graph"
