@@ -31,5 +31,7 @@ export default defineConfig({
   test: {
     include: ["src/**/*.test.{ts,tsx}"],
     environment: "node",
+    // A busy machine is slow, and that is no fault of what is tested.
+    testTimeout: 30_000,
   },
 });
