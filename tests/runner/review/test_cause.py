@@ -20,7 +20,8 @@ from action_assistant.runner.events import (
     StopRequested,
     decode,
 )
-from action_assistant.runner.review.cause import Cause, causes, words
+from action_assistant.runner.review.cause import Cause, causes
+from action_assistant.runner.review.cause_words import words
 from action_assistant.runner.runs import Run, replay
 from action_assistant.runner.seen import GraphState, NodeResult, NodeState
 from action_assistant.umrf import codec

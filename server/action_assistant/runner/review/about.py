@@ -16,7 +16,8 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.tables import action_sum, review, run_label
 from action_assistant.journal.tables import run as runs
 from action_assistant.runner.events import Author
-from action_assistant.runner.review.cause import causes, words
+from action_assistant.runner.review.cause import causes
+from action_assistant.runner.review.cause_words import words
 from action_assistant.runner.runs import Run
 from action_assistant.runner.visits import ActionRun
 from action_assistant.umrf.model import Graph

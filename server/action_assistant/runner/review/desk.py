@@ -19,7 +19,8 @@ from action_assistant.runner.events import Author
 from action_assistant.runner.history import Aside
 from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.review import about, again, exports, statistics
-from action_assistant.runner.review.cause import causes, words
+from action_assistant.runner.review.cause import causes
+from action_assistant.runner.review.cause_words import words
 from action_assistant.runner.review.compare import Comparison, compare
 from action_assistant.runner.review.film import Film, film
 from action_assistant.runner.review.raw import Raw, RawPut, raw_of, stream_of_raw
