@@ -1,12 +1,13 @@
 /** What every screen has: the bar with STOP on top, the screen below. */
 import { Button } from "@mantine/core";
 import { IconHistory, IconRobot, IconShare } from "@tabler/icons-react";
-import { type ReactNode, useState } from "react";
+import { memo, type ReactNode, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
 import { ShareDialog } from "../account/share-dialog";
 import { useMay } from "../api/person";
 import { StopButton } from "../runs/stop-button";
+import { useSteady } from "../ui/steady";
 import { type Crumb, TopBar } from "../ui/top-bar";
 import style from "./frame.module.css";
 
@@ -26,10 +27,14 @@ interface WayProps {
   icon: typeof IconHistory;
   name: string;
   /** Something else needs the room on a narrow screen. */
-  tight: ReactNode;
+  tight: boolean;
 }
 
-function Way({ to, icon: Icon, name, tight }: WayProps) {
+// The bar is drawn with the graph; what of it is always the same is not.
+const Account = memo(AccountMenu);
+const Sharing = memo(ShareDialog);
+
+const Way = memo(function Way({ to, icon: Icon, name, tight }: WayProps) {
   return (
     <Button
       component={Link}
@@ -40,16 +45,19 @@ function Way({ to, icon: Icon, name, tight }: WayProps) {
       aria-label={name}
       leftSection={<Icon size={16} aria-hidden />}
       className={style.way ?? ""}
-      data-tight={tight ? true : undefined}
+      data-tight={tight || undefined}
     >
       {name}
     </Button>
   );
-}
+});
 
 export function Bar({ crumbs, status, actions, start, graph, at }: Props) {
   const mayShare = useMay("share");
   const [sharing, setSharing] = useState(false);
+  const share = useSteady(() => setSharing(true));
+  const closeSharing = useSteady(() => setSharing(false));
+  const tight = Boolean(start);
   return (
     <TopBar
       crumbs={crumbs}
@@ -57,8 +65,8 @@ export function Bar({ crumbs, status, actions, start, graph, at }: Props) {
       actions={
         <>
           {actions}
-          {at !== "robots" && <Way to="/robots" icon={IconRobot} name="Robots" tight={start} />}
-          {at !== "runs" && <Way to="/runs" icon={IconHistory} name="Runs" tight={start} />}
+          {at !== "robots" && <Way to="/robots" icon={IconRobot} name="Robots" tight={tight} />}
+          {at !== "runs" && <Way to="/runs" icon={IconHistory} name="Runs" tight={tight} />}
           {mayShare && (
             <Button
               variant="subtle"
@@ -67,16 +75,16 @@ export function Bar({ crumbs, status, actions, start, graph, at }: Props) {
               aria-label="Share"
               leftSection={<IconShare size={16} aria-hidden />}
               className={`${style.way ?? ""} ${style.share ?? ""}`}
-              data-tight={start ? true : undefined}
-              onClick={() => setSharing(true)}
+              data-tight={tight || undefined}
+              onClick={share}
             >
               Share
             </Button>
           )}
-          {mayShare && <ShareDialog opened={sharing} onClose={() => setSharing(false)} />}
+          {mayShare && <Sharing opened={sharing} onClose={closeSharing} />}
         </>
       }
-      account={<AccountMenu onShare={mayShare ? () => setSharing(true) : null} />}
+      account={<Account onShare={mayShare ? share : null} />}
       start={start}
       stop={<StopButton {...(graph === undefined ? {} : { graph })} />}
     />

@@ -2,6 +2,7 @@
 import { ActionIcon, Menu, Tooltip } from "@mantine/core";
 import { IconDots } from "@tabler/icons-react";
 import { Fragment, memo } from "react";
+import { useSteady } from "../ui/steady";
 import { useBench } from "./bench";
 import {
   add,
@@ -25,12 +26,28 @@ import style from "./toolbar.module.css";
 
 function Tool({ deed, pressed }: { deed: Deed; pressed?: boolean }) {
   const bench = useBench();
+  const run = useSteady(() => deed.run(bench));
+  const parts = { label: labelOf(deed, bench), disabled: !isEnabled(deed, bench), run };
+  return <ToolButton deed={deed} {...parts} {...(pressed === undefined ? {} : { pressed })} />;
+}
+
+interface ToolButtonProps {
+  deed: Deed;
+  label: string;
+  disabled: boolean;
+  pressed?: boolean;
+  run: () => void;
+}
+
+/** Drawn again only when it looks different, which edits seldom make it. */
+const ToolButton = memo(function ToolButton(props: ToolButtonProps) {
+  const { deed, label, disabled, pressed, run } = props;
   const Sign = deed.icon;
   return (
     <Tooltip
       label={
         <>
-          {labelOf(deed, bench)} <Shortcut deed={deed} />
+          {label} <Shortcut deed={deed} />
         </>
       }
     >
@@ -41,14 +58,14 @@ function Tool({ deed, pressed }: { deed: Deed; pressed?: boolean }) {
         aria-pressed={pressed}
         data-pressed={pressed || undefined}
         className={style.tool ?? ""}
-        disabled={!isEnabled(deed, bench)}
-        onClick={() => deed.run(bench)}
+        disabled={disabled}
+        onClick={run}
       >
         <Sign size={17} aria-hidden />
       </ActionIcon>
     </Tooltip>
   );
-}
+});
 
 const GROUPS: readonly Group[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
 /** Walking and nudging would be eight lines that nobody clicks. */
