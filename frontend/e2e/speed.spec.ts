@@ -4,7 +4,7 @@ import { spawn } from "node:child_process";
 import { mkdirSync, writeFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
-import { saved } from "./bench";
+import { boxOf, saved } from "./bench";
 import { Product, pause, TOKEN } from "./product";
 
 const ROOT = resolve(import.meta.dirname, "../..");
@@ -108,8 +108,7 @@ async function type(page: Page): Promise<number> {
 }
 
 async function dragACard(page: Page): Promise<number[]> {
-  const box = await page.locator(".react-flow__node-action").nth(3).boundingBox();
-  if (box === null) throw new Error("no card");
+  const box = await boxOf(page.locator(".react-flow__node-action").nth(3));
   const [x, y] = [box.x + box.width / 4, box.y + box.height / 2];
   await page.mouse.move(x, y);
   await page.mouse.down();
