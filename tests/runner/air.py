@@ -5,6 +5,7 @@ import asyncio
 import random
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import Context
 from typing import Any
 
 import anyio
@@ -197,7 +198,8 @@ class Air:
             self._handles.discard(handle)
             work(*given)
 
-        handle = asyncio.get_running_loop().call_at(when, done)
+        # As what a thread of ROS hands over: in no task, and in no context of one.
+        handle = asyncio.get_running_loop().call_at(when, done, context=Context())
         self._handles.add(handle)
         return handle
 

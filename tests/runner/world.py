@@ -318,7 +318,7 @@ class World:
             yield control
 
     def _saw(self, opened: OpenRun) -> None:
-        self.shown.append((anyio.current_time(), opened.run))
+        self.shown.append((asyncio.get_running_loop().time(), opened.run))
 
 
 def order(graph: Graph, /, **changes: Any) -> StartRequest:

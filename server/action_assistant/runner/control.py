@@ -362,6 +362,7 @@ class Control:
             self._foreign,
             self._stragglers.shows,
         )
+        self._tasks.start_soon(self._stragglers.run)
         self.robots.open(ground)
         for row in await self._ledger.query(archive.all_robots()):
             self.robots.add(

@@ -5,7 +5,7 @@ takes longer than people would wait. What can be done is to look on, and to take
 """
 
 import logging
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Callable, Mapping
 from typing import Final, TypeAlias, TypeVar
 
@@ -58,6 +58,8 @@ class Stragglers:
         self._wall = wall
         self._reopen = reopen
         self._looking: set[str] = set()
+        self._waiting: deque[tuple[KnownEngine, Snapshot, str]] = deque()
+        self._news = anyio.Event()
         self._ended: OrderedDict[str, tuple[Run, int]] = OrderedDict()
         self._others: OrderedDict[str, None] = OrderedDict()
 
@@ -72,11 +74,21 @@ class Stragglers:
             _put(self._others, run, None)
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """An engine shows these graphs, in an answer or by feedback. Never waits."""
+        """An engine shows these graphs, in an answer or by feedback. Never waits; feedback comes
+        outside of any task, so that none can be started here."""
         for each in snapshots:
             if each.run is not None and each.active and self._is_over(each.run):
                 self._looking.add(each.run)
-                self._tasks.start_soon(self._look_into, engine, each, each.run)
+                self._waiting.append((engine, each, each.run))
+                self._news.set()
+
+    async def run(self) -> None:
+        """Look into what was shown, until cancelled."""
+        while True:
+            await self._news.wait()
+            self._news = anyio.Event()
+            while self._waiting:
+                self._tasks.start_soon(self._look_into, *self._waiting.popleft())
 
     def _is_over(self, run: str) -> bool:
         if run in self._looking or run in self._others:
