@@ -6,7 +6,6 @@ import { type Person, Product } from "./product";
 import { DOMAIN, NO_ROS, OlderEngine, StandIn, Stranger } from "./robot";
 
 test.skip(NO_ROS !== "", NO_ROS);
-test.skip(process.env.E2E_ALL !== "1", "takes a minute that CI does not have: E2E_ALL=1");
 test.describe.configure({ mode: "serial" });
 
 const product = new Product();
@@ -17,14 +16,19 @@ const old = new OlderEngine("Old");
 const stranger = new Stranger();
 /** Everything goes on for a minute, and a graph of one action ends soon. */
 const SCRIPT = { "*": { after_s: 60, stop_s: 0.05 }, "chain_1/Wait_0": { after_s: 2 } };
+/** What is left out costs a minute that CI does not have. */
+const ALL = process.env.E2E_ALL === "1";
+const robots = ALL ? [david, eve, late] : [david, eve];
 let ada: Person;
 
 test.beforeAll(async ({ browser }) => {
   for (const robot of [david, eve]) robot.start(product.data, SCRIPT);
-  late.start(product.data, SCRIPT, "late_ms=5000");
-  old.start();
+  if (ALL) {
+    late.start(product.data, SCRIPT, "late_ms=5000");
+    old.start();
+  }
   await product.start();
-  for (const { name, path } of [eve, late, old]) {
+  for (const { name, path } of ALL ? [eve, late, old] : [eve]) {
     await post("/api/robots", { name, domain: DOMAIN, get_service: path });
   }
   ada = await product.person(browser, "Ada");
@@ -114,7 +118,7 @@ test("a robot is registered in the page and shows how it is", async () => {
   await page.getByRole("button", { name: "Path, middleware and engine …" }).click();
   await page.getByRole("textbox", { name: "Path of its get service" }).fill(david.path);
   await page.getByRole("button", { name: "Register", exact: true }).click();
-  for (const robot of [david, eve, late]) await answering(page, robot.name);
+  for (const robot of robots) await answering(page, robot.name);
 });
 
 test("a graph runs on the robot to its end, live in the page", async () => {
@@ -148,7 +152,7 @@ test("two robots run together, and one press of keys stops both until it is prov
 test("a start of somebody else is seen, named, imported and stopped", async () => {
   const { page } = ada;
   const graph = await product.ask<object>(`/api/graphs/${await product.chain(2)}/umrf`);
-  stranger.start("Eve", JSON.stringify({ ...graph, graph_name: "theirs" }), 4);
+  stranger.start("Eve", JSON.stringify({ ...graph, graph_name: "theirs" }), robots.length + 1);
   await page.goto(`${product.url}/robots`);
   const there = card(page, "Eve");
   await expect(there.getByText("not started from here")).toBeVisible({ timeout: 30_000 });
@@ -165,6 +169,8 @@ test("a start of somebody else is seen, named, imported and stopped", async () =
 });
 
 test.describe("what the page shows of an engine that", () => {
+  test.skip(!ALL, "takes a minute that CI does not have: E2E_ALL=1");
+
   /** A run on its robot's card, in one word. */
   const word = (robot: string, run: number) =>
     card(ada.page, robot)
@@ -240,7 +246,8 @@ test.describe("what the page shows of an engine that", () => {
     await expect(card(page, "Old").getByText(older)).toBeVisible();
     await choose(page, await product.chain(2), ["Old"]);
     await expect(lookedAt(page, "Old").getByText(/generation/)).toBeVisible();
-    await expect(page.getByRole("button", { name: /^Start v\d+ on/ })).toBeDisabled();
+    const start = page.getByRole("button", { name: "Something stands in the way" });
+    await expect(start).toBeDisabled();
   });
 
   test("was killed: nothing is claimed, and its Stop is loud", async () => {
