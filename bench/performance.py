@@ -27,8 +27,7 @@ from table import Table, lines  # noqa: E402 - the folder is no package
 
 def main(names: list[str]) -> int:
     """Exit code: 2 for a name that has no place in the page."""
-    page = PAGE.read_text()
-    known = re.findall(r"<!-- begin (\w+) -->", page)
+    known = re.findall(r"<!-- begin (\w+) -->", PAGE.read_text())
     if unknown := [name for name in names if name not in known]:
         sys.stderr.write(f"no place for {', '.join(unknown)}; there are {', '.join(known)}\n")
         return 2
@@ -36,7 +35,8 @@ def main(names: list[str]) -> int:
         sys.stderr.write(f"measuring {name}\n")
         place = re.compile(f"(<!-- begin {name} -->\n).*?(<!-- end {name} -->)", re.DOTALL)
         measured = block(name)
-        page = place.sub(lambda found, text=measured: found[1] + text + found[2], page)
+        # Read only now: somebody may have written in it meanwhile.
+        page = place.sub(lambda found, text=measured: found[1] + text + found[2], PAGE.read_text())
         PAGE.write_text(page)
     return 0
 
