@@ -41,7 +41,7 @@ test("the view follows what runs until the person moves it, and again when asked
   browser,
 }) => {
   const { page, context, failures } = await product.person(browser, "Ada");
-  await page.goto(`${product.url}/graphs/${await product.chain(70)}`);
+  await page.goto(`${product.url}/graphs/${await product.chain(50)}`);
   await saved(page);
   await start(page);
   await expect(card(page, "Wait", 6)).toBeInViewport({ timeout: 30_000 });
