@@ -1,0 +1,44 @@
+/** A running graph is changed from the page, where that is safe: the simulator says that it is. */
+
+import { expect, test } from "@playwright/test";
+import { saved, start } from "./bench";
+import { Product } from "./product";
+
+test.skip(process.env.E2E_ALL !== "1", "half a minute that CI does not have: E2E_ALL=1");
+
+const product = new Product();
+test.beforeAll(() => product.start());
+test.afterAll(() => product.dispose());
+
+interface Run {
+  id: string;
+  state: string;
+  version: string;
+}
+
+test("what is on screen is sent to the running robot, after what becomes different was shown", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.goto(`${product.url}/graphs/${await product.chain(60)}`);
+  await saved(page);
+  await start(page);
+  const newest = async () => (await product.ask<Run[]>("/api/runs", {}, product.runnerUrl))[0];
+  await expect.poll(async () => (await newest())?.state).toBe("running");
+  const before = (await newest())?.version;
+  await page.getByRole("textbox", { name: "Description" }).fill("Waits for an hour");
+  await page.keyboard.press("Tab");
+  await saved(page);
+  await page.getByRole("button", { name: "Send to the running robot …" }).click();
+  const dialog = page.getByRole("dialog");
+  await expect(dialog.getByText("Name or description of the graph")).toBeVisible();
+  await dialog.getByRole("button", { name: /^Send v2 to run 1/ }).focus();
+  await page.keyboard.down("Enter");
+  await expect(dialog).toBeHidden();
+  await page.keyboard.up("Enter");
+  await expect.poll(async () => (await newest())?.version).not.toBe(before);
+  await page.keyboard.press("Control+.");
+  await expect.poll(async () => (await newest())?.state).toBe("stopped");
+  expect(failures).toEqual([]);
+  await context.close();
+});
