@@ -41,7 +41,7 @@ test("the view follows what runs until the person moves it, and again when asked
   browser,
 }) => {
   const { page, context, failures } = await product.person(browser, "Ada");
-  await page.goto(`${product.url}/graphs/${await product.chain(50)}`);
+  await page.goto(`${product.url}/graphs/${await product.chain(60)}`);
   await saved(page);
   await start(page);
   await expect(card(page, "Wait", 6)).toBeInViewport({ timeout: 30_000 });
@@ -64,7 +64,6 @@ test("the view follows what runs until the person moves it, and again when asked
   await expect(
     page.locator(".react-flow__node-action").filter({ hasText: "running" }).first(),
   ).toBeInViewport();
-  await page.getByRole("button", { name: /^Stop run/ }).click();
   expect(failures).toEqual([]);
   await context.close();
 });
