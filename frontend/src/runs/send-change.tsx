@@ -77,7 +77,7 @@ export function SendChange({ run, label, found, seq, settle, obstacle }: Props) 
       return modifyRun(runner ?? "", run.id, { id: version.id, digest: version.digest, umrf });
     },
     onSuccess: () => setAsking(null),
-    onError: (error) => complain("Not sent: it runs as before", sentence(error)),
+    onError: (error) => complain("Not sent", sentence(error)),
   });
   if (!may) return null;
   const ask = () => void settle().then(setAsking, (error) => complain("Not sent", sentence(error)));
@@ -109,7 +109,7 @@ export function SendChange({ run, label, found, seq, settle, obstacle }: Props) 
           <List found={found} />
           <Text size="sm" c="dimmed">
             The engine pauses the graph, takes this one in its place and goes on. Actions that run
-            now are paused meanwhile. Nothing is changed if it refuses.
+            now are paused meanwhile. Stop works all the while.
           </Text>
           <footer className={style.foot}>
             <Button onClick={() => setAsking(null)}>Cancel</Button>
