@@ -317,10 +317,11 @@ class Story:
             for node in [each for each in self.air.nodes if not each.robot.gone][:-1]:
                 self.air.kill(node)
             control.stop_all(BEN)
-            with anyio.move_on_after(60):
-                while control.open:  # noqa: ASYNC110 - they end by many ways
-                    await anyio.sleep(0.5)
-            await anyio.sleep(2)
+            for _ in range(2):  # feedback that nobody can contradict opens one again for a moment
+                with anyio.move_on_after(60):
+                    while control.open:  # noqa: ASYNC110 - they end by many ways
+                        await anyio.sleep(0.5)
+                await anyio.sleep(5)
             moving = self.moving()
             for run in control.open:  # it does not obey, or is blocked for ever
                 if run not in moving and not self.blocked():
