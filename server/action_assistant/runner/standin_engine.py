@@ -13,7 +13,7 @@ from functools import partial
 from heapq import heappop, heappush
 from itertools import count
 from math import inf
-from typing import Final, assert_never
+from typing import Final, TypeAlias, assert_never
 
 from action_assistant.runner.standin_view import View
 from action_assistant.runner.standin_wire import (
@@ -51,6 +51,7 @@ _TOLD_MS: Final = 10.0  # from the end of a stop to the line that says so
 _GETS: Final = 10  # requests that wait, by the depth of a service
 _TAIL_MS: Final = 1_500.0  # an idle engine that was told to quit takes so long
 _BUSY: Final = frozenset({"RUNNING", "PAUSED", "STOPPING", "CLEARING"})
+_Deed: TypeAlias = Callable[[str, float], list[Trace]]
 
 
 class StandIn:
@@ -305,13 +306,7 @@ class StandIn:
             self._hold(_nothing)
 
     def _command(
-        self,
-        name: str,
-        doing: str,
-        verb: str,
-        deed: Callable[[str, float], list[Trace]],
-        done: str,
-        told_ms: float,
+        self, name: str, doing: str, verb: str, deed: _Deed, done: str, told_ms: float
     ) -> None:
         self._log(f"{doing} UMRF graph '{name}' ...")
         if name not in self._engine.graphs:
