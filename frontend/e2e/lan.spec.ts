@@ -139,7 +139,7 @@ test.describe("on plain http", () => {
 
   test("a viewer sees and stops, changes nothing, and is put out at once", async ({ browser }) => {
     test.setTimeout(120_000);
-    const graph = await product.chain(60);
+    const graph = await product.chain(70);
     const invitation = await invite(product, "viewer");
     const ada = await product.person(browser, "Ada");
     await visit(ada.page, `${product.url}/graphs/${graph}`);
@@ -182,7 +182,7 @@ test.describe("on plain http", () => {
       .click();
     await expect(panel.getByRole("button", { name: /^Remove the parameter/ })).toBeDisabled();
     await expect(panel.getByRole("textbox", { name: "Name", exact: true }).last()).toBeVisible();
-    await page.getByRole("link", { name: /^chain_60/ }).click();
+    await page.getByRole("link", { name: /^chain_70/ }).click();
     await expect(page.locator(".react-flow__node-action.draggable")).toHaveCount(0);
     const change = await product.ask<{ seq: number }>(`/api/graphs/${graph}`);
     expect(change.seq).toBe(1);

@@ -25,7 +25,7 @@ def test_a_run_is_started_seen_and_kept(process: RunnerProcess) -> None:
     with process.client() as client:
         run = started(client, order(sequence(actions=2), script=FAST))
         assert run["simulated"] is True
-        assert run["author"]["id"] == "local"
+        assert run["author"] == {"id": "local", "name": run["author"]["name"], "by": "program"}
         done = over(client, run["id"])
         assert (done["state"], done["result"]) == ("finished", "on_true")
         (visit,) = done["actions"]["Work_1"]["visits"]

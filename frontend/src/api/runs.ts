@@ -41,6 +41,20 @@ export interface ActionRun {
   messages: { at: string; text: string }[];
 }
 
+/** Who asked for something, and from where: `address` is missing for the runner's own computer. */
+export interface Asker {
+  id: string;
+  name: string;
+  by?: "browser" | "program";
+  address?: string;
+}
+
+/** Where somebody asked from, as words that follow the name; "" where it was not recorded. */
+export function whence(asker: Asker | null): string {
+  if (asker?.by === undefined) return "";
+  return ` · by ${asker.by}, from ${asker.address ?? "this computer"}`;
+}
+
 export interface Run {
   id: string;
   number: number;
@@ -60,8 +74,8 @@ export interface Run {
   requested_at: string;
   started_at: string | null;
   ended_at: string | null;
-  author: { id: string; name: string } | null;
-  stopped_by: { id: string; name: string } | null;
+  author: Asker | null;
+  stopped_by: Asker | null;
   /** Why it was refused, lost or ended so. */
   detail: string;
   alarms: { code: string; at: string; text: string }[];

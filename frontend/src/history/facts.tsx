@@ -2,7 +2,7 @@
 
 import { endWords } from "../api/progress";
 import { useRaw } from "../api/review";
-import { placeOf, type Run } from "../api/runs";
+import { placeOf, type Run, whence } from "../api/runs";
 import { clock, day, duration, instant, useNow } from "../ui/when";
 import style from "./facts.module.css";
 
@@ -24,8 +24,11 @@ export function Facts({ runner, run, version, by }: Props) {
     ["Version", version],
     ["Digest", run.digest],
     ["Engine", placeOf(run)],
-    ["Started by", by],
+    ["Started by", `${by}${whence(run.author)}`],
     ["Started", moment(start)],
+    ...(run.stopped_by
+      ? [["Stopped by", `${run.stopped_by.name}${whence(run.stopped_by)}`] as [string, string]]
+      : []),
     ["Ended", moment(end)],
     ["Took", start !== null && end !== null ? duration(end - start) : "—"],
     ["End", end === null ? "goes on" : endWords(run)],

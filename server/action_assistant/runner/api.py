@@ -17,10 +17,10 @@ from action_assistant.errors import BadInput, TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive, robots_api, shapes
 from action_assistant.runner.admission import SIMULATOR, read_request
+from action_assistant.runner.asking import author_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import ModifyOperation, StartOperation, StopOperation
 from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.events import Author
 from action_assistant.runner.live import Hub, Stopping, attend
 from action_assistant.runner.review import routes as review
 from action_assistant.runner.review.desk import Desk
@@ -84,7 +84,7 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
         asked = read_request(await request.body())
         if asked.engine != SIMULATOR:
             require(request, "operate")
-        started = await house.control.start(asked, _author(request))
+        started = await house.control.start(asked, author_of(request))
         return Response(
             _shown(house, started.run.id) or shapes.shown(started.run),
             status_code=201 if started.fresh else 200,
@@ -104,7 +104,7 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
     )
     async def stop_all(request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
-        return Stopping(stop_id, house.control.stop_all(_author(request), stop_id))
+        return Stopping(stop_id, house.control.stop_all(author_of(request), stop_id))
 
     @post(
         "/api/runs/{run:str}/stop",
@@ -115,7 +115,7 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
     )
     async def stop(run: str, request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
-        return Stopping(stop_id, await house.control.stop(run, _author(request), stop_id))
+        return Stopping(stop_id, await house.control.stop(run, author_of(request), stop_id))
 
     @post(
         "/api/runs/{run:str}/pause",
@@ -125,7 +125,7 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
     )
     async def pause(run: str, request: _Asking) -> shapes.RunShown:
         await _require_hand_on(house, run, request)
-        return shapes.shown(await house.control.pause(run, _author(request)))
+        return shapes.shown(await house.control.pause(run, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/resume",
@@ -135,7 +135,7 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
     )
     async def resume(run: str, request: _Asking) -> shapes.RunShown:
         await _require_hand_on(house, run, request)
-        return shapes.shown(await house.control.resume(run, _author(request)))
+        return shapes.shown(await house.control.resume(run, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/modify",
@@ -147,7 +147,7 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
     async def modify(run: str, request: _Asking) -> shapes.RunShown:
         await _require_hand_on(house, run, request)
         body = await request.body()
-        return shapes.shown(await house.control.modify(run, body, _author(request)))
+        return shapes.shown(await house.control.modify(run, body, author_of(request)))
 
     return [stop_all, stop, pause, resume, modify]
 
@@ -237,11 +237,6 @@ async def _require_hand_on(house: House, run: str, request: _Asking) -> None:
     """Who may steer this run: more is needed for one on a robot. Raises Forbidden, NotFound."""
     if not (await house.control.find(run)).simulated:
         require(request, "operate")
-
-
-def _author(request: _Asking) -> Author:
-    person = person_of(request)
-    return Author(person.id, person.name)
 
 
 async def _stop_id(request: _Asking) -> str:

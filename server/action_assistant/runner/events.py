@@ -15,11 +15,14 @@ from action_assistant.runner.seen import Seen
 End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "lost"]
 
 
-class Author(msgspec.Struct, frozen=True):
-    """The person behind a command."""
+class Author(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The person behind a command, and from where it came. `address`: on the network; "" for the
+    runner's own computer. `by` is "" where it was not recorded."""
 
     id: str
     name: str
+    by: Literal["browser", "program", ""] = ""
+    address: str = ""
 
 
 class Override(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

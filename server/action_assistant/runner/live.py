@@ -19,11 +19,12 @@ from litestar.exceptions import WebSocketDisconnect, WebSocketException
 
 from action_assistant.errors import Refused
 from action_assistant.runner import shapes
+from action_assistant.runner.asking import author_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.events import Author
 from action_assistant.runner.registered import Robot
-from action_assistant.web.access import person_of, session_of
+from action_assistant.web.access import session_of
 
 log: Final = logging.getLogger(__name__)
 
@@ -245,9 +246,8 @@ class Outbox:
 async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
     """Serve one page until it goes away. The Stop of an expired session is followed, but it is
     shown nothing more."""
-    person = person_of(socket)
     session = session_of(socket)
-    author = Author(person.id, person.name)
+    author = author_of(socket)
     box = Outbox(hub, lambda: session is None or not session.expired)
     await socket.accept()
     box.post(hub.hello())

@@ -10,9 +10,9 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import BadInput, NotFound
 from action_assistant.runner import shapes
 from action_assistant.runner.admission import SIMULATOR
+from action_assistant.runner.asking import author_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import GroupOperation, LookOperation
-from action_assistant.runner.events import Author
 from action_assistant.runner.flight import (
     Commanded,
     EngineBecame,
@@ -28,7 +28,7 @@ from action_assistant.runner.registered import Robot
 from action_assistant.runner.starting import read_group
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Signature
-from action_assistant.web.access import Needs, person_of
+from action_assistant.web.access import Needs
 
 _EVENTS: Final = 200
 _Asking = Request[Any, Any, Any]
@@ -224,12 +224,6 @@ def _starts(house: Has) -> list[ControllerRouterHandler]:
         return Response(shown, status_code=201 if grouped.fresh else 200)
 
     return [look, start]
-
-
-def author_of(request: _Asking) -> Author:
-    """Who asks, for the record."""
-    person = person_of(request)
-    return Author(person.id, person.name)
 
 
 def _action(name: str, signature: Signature) -> KnownAction:

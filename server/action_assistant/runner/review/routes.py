@@ -14,8 +14,8 @@ from action_assistant import places
 from action_assistant.errors import BadInput
 from action_assistant.runner import recorded_runs
 from action_assistant.runner.admission import decoded
+from action_assistant.runner.asking import author_of
 from action_assistant.runner.described import FitOperation
-from action_assistant.runner.events import Author
 from action_assistant.runner.review import about, again
 from action_assistant.runner.review.compare import Comparison
 from action_assistant.runner.review.desk import CauseShown, Desk, Expectation, Format, Marked
@@ -23,7 +23,7 @@ from action_assistant.runner.review.film import Film
 from action_assistant.runner.review.raw import Raw
 from action_assistant.runner.review.retention import Retention, Swept
 from action_assistant.runner.review.statistics import Statistics
-from action_assistant.web.access import Needs, person_of
+from action_assistant.web.access import Needs
 
 _Asking = Request[Any, Any, Any]
 _TYPES: Final[dict[str, str]] = {
@@ -94,7 +94,7 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
 
     @patch("/api/runs/{run:str}/marks", summary="Pin, note or label a run", guards=[Needs("edit")])
     async def mark(run: str, data: about.Marks, request: _Asking) -> Marked:
-        return await desk().mark(run, data, _author(request))
+        return await desk().mark(run, data, author_of(request))
 
     @get("/api/runs/{run:str}/script", summary="What a run did, as a script for the simulator")
     async def script(
@@ -152,7 +152,7 @@ def _of_many(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
     )
     async def take_in_examples(request: _Asking) -> list[str]:
         texts = await to_thread.run_sync(recorded_runs.shipped, places.examples())
-        return await desk().take_in(texts, _author(request))
+        return await desk().take_in(texts, author_of(request))
 
     return [comparison, statistics, take_in_examples]
 
@@ -168,11 +168,11 @@ def _expecting(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def expect(data: Expect, request: _Asking) -> Expectation:
-        return await desk().expect(data.run, data.name, _author(request))
+        return await desk().expect(data.run, data.name, author_of(request))
 
     @delete("/api/expectations/{name:str}", summary="Expect it no more", guards=[Needs("edit")])
     async def retire(name: str, request: _Asking) -> None:
-        await desk().retire(name, _author(request))
+        await desk().retire(name, author_of(request))
 
     return [listed, expect, retire]
 
@@ -181,8 +181,3 @@ def _fault(action: str | None, fault: again.Fault | None) -> tuple[str, again.Fa
     if (action is None) != (fault is None):
         raise BadInput("A fault belongs to an action: give both, or none.")
     return (action, fault) if action and fault else None
-
-
-def _author(request: _Asking) -> Author:
-    person = person_of(request)
-    return Author(person.id, person.name)
