@@ -4,8 +4,6 @@ import { expect, test } from "@playwright/test";
 import { saved, start } from "./bench";
 import { Product } from "./product";
 
-test.skip(process.env.E2E_ALL !== "1", "half a minute that CI does not have: E2E_ALL=1");
-
 const product = new Product();
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());

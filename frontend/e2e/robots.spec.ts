@@ -17,7 +17,6 @@ const stranger = new Stranger();
 /** Everything goes on for a minute, and a graph of one action ends soon. */
 const SCRIPT = { "*": { after_s: 60, stop_s: 0.05 }, "chain_1/Wait_0": { after_s: 2 } };
 /** What is left out costs a minute that CI does not have. */
-const ALL = process.env.E2E_ALL === "1";
 const robots = ALL ? [david, eve, late] : [david, eve];
 let ada: Person;
 
@@ -169,8 +168,6 @@ test("a start of somebody else is seen, named, imported and stopped", async () =
 });
 
 test.describe("what the page shows of an engine that", () => {
-  test.skip(!ALL, "takes a minute that CI does not have: E2E_ALL=1");
-
   /** A run on its robot's card, in one word. */
   const word = (robot: string, run: number) =>
     card(ada.page, robot)

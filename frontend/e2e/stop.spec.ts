@@ -94,7 +94,6 @@ test("while it cannot be sent the page says so, and goes on trying until it is p
 test("while the runner's disk is full, and the page says that it is not recorded", async ({
   browser,
 }) => {
-  test.skip(process.env.E2E_ALL !== "1", "half a minute that CI does not have: E2E_ALL=1");
   const { page, context, failures } = await product.person(browser, "Ada");
   await running(page);
   const files = (longest: string) =>
