@@ -16,18 +16,15 @@ const old = new OlderEngine("Old");
 const stranger = new Stranger();
 /** Everything goes on for a minute, and a graph of one action ends soon. */
 const SCRIPT = { "*": { after_s: 60, stop_s: 0.05 }, "chain_1/Wait_0": { after_s: 2 } };
-/** What is left out costs a minute that CI does not have. */
-const robots = ALL ? [david, eve, late] : [david, eve];
+const robots = [david, eve, late];
 let ada: Person;
 
 test.beforeAll(async ({ browser }) => {
   for (const robot of [david, eve]) robot.start(product.data, SCRIPT);
-  if (ALL) {
-    late.start(product.data, SCRIPT, "late_ms=5000");
-    old.start();
-  }
+  late.start(product.data, SCRIPT, "late_ms=5000");
+  old.start();
   await product.start();
-  for (const { name, path } of ALL ? [eve, late, old] : [eve]) {
+  for (const { name, path } of [eve, late, old]) {
     await post("/api/robots", { name, domain: DOMAIN, get_service: path });
   }
   ada = await product.person(browser, "Ada");
