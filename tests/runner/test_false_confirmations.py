@@ -323,11 +323,14 @@ class Story:
                         await anyio.sleep(0.5)
                 await anyio.sleep(5)
             moving = self.moving()
-            for run in control.open:  # it does not obey, or is blocked for ever
-                if run not in moving and not self.blocked():
-                    self.stuck.append(
-                        f"{control.open[run].run.state}: {control.open[run].run.alarms}"
-                    )
+            # A graph of the same name that goes on for ever keeps a run of ours open, too.
+            names = {
+                graph.partition("__")[0] for each in self.air.nodes for graph in each.robot.moving
+            }
+            for run, opened in control.open.items():  # it does not obey, or is blocked for ever
+                named = opened.run.graph_name in names
+                if run not in moving and not named and not self.blocked():
+                    self.stuck.append(f"{opened.run.state}: {opened.run.alarms}")
 
     def blocked(self) -> bool:
         """Whether an engine will never answer again."""
