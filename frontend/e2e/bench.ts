@@ -88,7 +88,8 @@ async function drag(page: Page, from: Locator, to: Locator): Promise<void> {
 
 /** Where something is once it has come to rest: the canvas glides when it shows all. */
 export async function boxOf(locator: Locator) {
-  await locator.scrollIntoViewIfNeeded();
+  // A card that glides out of sight is taken out of the page, and another one is found.
+  await expect(() => locator.scrollIntoViewIfNeeded()).toPass();
   let before = "";
   for (;;) {
     const box = await locator.boundingBox();
