@@ -3,13 +3,14 @@ discovery that lags behind, as the links over rclpy see one."""
 
 import asyncio
 import random
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from contextvars import Context
 from typing import Any
 
 import anyio
 
+from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.engine_text import name_of, snapshot
 from action_assistant.runner.links.heard import Endpoint, Got, Heard, LogLine, Sound
 from action_assistant.runner.links.port import Command
@@ -156,7 +157,7 @@ class Air:
         self.nodes: list[Node] = []
         self.sent: list[tuple[float, Message]] = []
         self.delivered: list[tuple[float, Message]] = []
-        self._ears: list[Callable[[Sound], None]] = []
+        self._ears = Ears[Sound]()
         self._asked: dict[int, tuple[anyio.Event, list[Answer]]] = {}
         self._tickets = 0
         self._handles: set[asyncio.TimerHandle] = set()
@@ -262,8 +263,7 @@ class Air:
 
     def tell(self, sound: Sound) -> None:
         """Everybody who listens hears it."""
-        for ear in tuple(self._ears):
-            ear(sound)
+        self._ears.tell(sound)
 
     def _later(self, wait_s: float, work: Callable[[], None]) -> None:
         self._at(now() + wait_s, work)
@@ -317,14 +317,9 @@ class Air:
         """Every path that somebody serves."""
         return tuple(sorted({each.path for each in self.nodes if each.seen}))
 
-    @contextmanager
-    def hearing(self, ear: Callable[[Sound], None]) -> Iterator[None]:
+    def hearing(self, ear: Callable[[Sound], None]) -> AbstractContextManager[None]:
         """Be told what comes by itself."""
-        self._ears.append(ear)
-        try:
-            yield
-        finally:
-            self._ears.remove(ear)
+        return self._ears.listening(ear)
 
 
 def _put(event: anyio.Event, got: list[Answer], answer: Answer) -> None:

@@ -1,10 +1,11 @@
 """A link to a robot through the air of virtual time, by the rules of the one over rclpy."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 import anyio
 
+from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.heard import Heard, LogLine
 from action_assistant.runner.links.port import (
     Answer,
@@ -35,7 +36,7 @@ class AirLink:
         self._name = name
         self._path = path
         self._known = ""
-        self._ears: list[Callable[[Report], None]] = []
+        self._ears = Ears[Report]()
         self._told: tuple[str, str] = ("", "")
 
     @property
@@ -114,7 +115,7 @@ class AirLink:
                 now = self.standing
                 if self._told != (now.state, now.incarnation):
                     self._told = now.state, now.incarnation
-                    self._tell(
+                    self._ears.tell(
                         EngineChanged(
                             at=wall(), state=now.state, incarnation=now.incarnation, why=now.why
                         )
@@ -124,9 +125,9 @@ class AirLink:
     def _hear(self, sound: object) -> None:
         match sound:
             case Feedback():
-                self._tell(sound)
+                self._ears.tell(sound)
             case Heard() if self._name in sound.targets:
-                self._tell(
+                self._ears.tell(
                     ForeignCommand(
                         at=wall(),
                         command=sound.command,
@@ -137,22 +138,13 @@ class AirLink:
                     )
                 )
             case LogLine(text=text):
-                self._tell(EngineLog(at=wall(), text=text))
+                self._ears.tell(EngineLog(at=wall(), text=text))
             case _:
                 pass
 
-    def _tell(self, report: Report) -> None:
-        for hear in tuple(self._ears):
-            hear(report)
-
-    @contextmanager
-    def listen(self, hear: Callable[[Report], None]) -> Iterator[None]:
+    def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Everything that concerns this robot."""
-        self._ears.append(hear)
-        try:
-            yield
-        finally:
-            self._ears.remove(hear)
+        return self._ears.listening(hear)
 
     async def aclose(self) -> None:
         """Nothing of its own."""

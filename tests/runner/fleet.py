@@ -1,11 +1,11 @@
 """Robots in virtual time that also tell what they hear and know, for tests of the registry."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
 
+from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.port import (
     Answer,
     Candidate,
@@ -37,7 +37,7 @@ class Open(Robot):
         self.known_actions: tuple[str, ...] = (WORK,)
         self.known_graphs: tuple[str, ...] = ()
         self.texts: dict[str, str] = {}
-        self._ears: list[Callable[[Report], None]] = []
+        self._ears = Ears[Report]()
 
     @property
     def standing(self) -> Standing:
@@ -55,22 +55,13 @@ class Open(Robot):
             known_graphs=self.known_graphs,
         )
 
-    @contextmanager
-    def _listening(self, hear: Callable[[Report], None]) -> Iterator[None]:
-        self._ears.append(hear)
-        try:
-            yield
-        finally:
-            self._ears.remove(hear)
-
     def listen(self, hear: Callable[[Report], None]) -> Any:
         """Everything that `tell` is given."""
-        return self._listening(hear)
+        return self._ears.listening(hear)
 
     def tell(self, report: Report) -> None:
         """Report something."""
-        for hear in tuple(self._ears):
-            hear(report)
+        self._ears.tell(report)
 
     def command(self, command: Command, graph: str, umrf: str = "") -> None:
         """Somebody else publishes something."""

@@ -8,7 +8,7 @@ import ast
 import json
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -16,6 +16,7 @@ import anyio
 
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.events import Requested
+from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.engine_text import snapshot
 from action_assistant.runner.links.port import (
     Answer,
@@ -99,7 +100,7 @@ class Recording:
             each["t_ms"] for each in self.sent if each["op"] == "start" and each is not start
         ]
         self._gets = list(self._answers())
-        self._ears: list[Callable[[Report], None]] = []
+        self._ears = Ears[Report]()
 
     def _answers(self) -> Iterator[tuple[float, float, list[Any] | None]]:
         """Asked and answered at (ms), and the graphs; None for no answer."""
@@ -172,23 +173,14 @@ class Recording:
                 continue
             await anyio.sleep(max(0.0, line["t_ms"] - self.now_ms()) / 1_000)
             if line["kind"] == "rosout":
-                self._tell(EngineLog(at=wall(), text=str(line.get("msg", ""))))
+                self._ears.tell(EngineLog(at=wall(), text=str(line.get("msg", ""))))
                 continue
             shown = tuple(self._snapshot(each, "feedback") for each in reversed(line["history"]))
-            self._tell(Feedback(actor=line["actor"], snapshots=shown))
+            self._ears.tell(Feedback(actor=line["actor"], snapshots=shown))
 
-    def _tell(self, report: Report) -> None:
-        for ear in tuple(self._ears):
-            ear(report)
-
-    @contextmanager
-    def listen(self, hear: Callable[[Report], None]) -> Iterator[None]:
+    def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Everything that came by itself."""
-        self._ears.append(hear)
-        try:
-            yield
-        finally:
-            self._ears.remove(hear)
+        return self._ears.listening(hear)
 
     async def start(self, order: Order) -> None:
         """It was."""

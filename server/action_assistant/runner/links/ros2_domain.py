@@ -11,8 +11,8 @@ import secrets
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Final, TypeAlias, TypeVar
 
 import rclpy
@@ -32,6 +32,7 @@ from temoto_msgs.msg import (
 )
 from temoto_msgs.srv import UmrfGraphGet
 
+from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.engine_text import NotAGraph, name_of, snapshot
 from action_assistant.runner.links.heard import Endpoint, Got, Heard, LogLine, Sound
 from action_assistant.runner.links.port import Command, Feedback
@@ -68,7 +69,7 @@ class Domain:
         self.settled_at = time.monotonic() + DISCOVERY_S
         self._loop = loop
         self._wall = wall
-        self._ears: list[Ear] = []
+        self._ears = Ears[Sound]()
         self._waiting: deque[Sound] = deque(maxlen=_KEPT)
         self._called = False
         self._dropped = 0
@@ -186,14 +187,9 @@ class Domain:
 
     # --- what comes by itself -----------------------------------------------------------------
 
-    @contextmanager
-    def hearing(self, ear: Ear) -> Iterator[None]:
+    def hearing(self, ear: Ear) -> AbstractContextManager[None]:
         """Be told, on the event loop, what comes by itself."""
-        self._ears.append(ear)
-        try:
-            yield
-        finally:
-            self._ears.remove(ear)
+        return self._ears.listening(ear)
 
     def _listen(self) -> None:
         topics, node, out = self.topics, self._node, self.outlets
@@ -256,8 +252,7 @@ class Domain:
             self._dropped = 0
         while self._waiting:
             sound = self._waiting.popleft()
-            for ear in tuple(self._ears):
-                ear(sound)
+            self._ears.tell(sound)
 
     def _to_loop(self, work: Callable[[], None]) -> None:
         try:

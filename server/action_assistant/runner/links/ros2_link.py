@@ -8,12 +8,13 @@ server stood there before and after.
 import re
 import time
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Final, TypeAlias, assert_never
 
 import anyio
 from temoto_msgs.msg import UmrfGraphModify, UmrfGraphPause, UmrfGraphResume, UmrfGraphStart
 
+from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.engine_text import NotAGraph
 from action_assistant.runner.links.heard import Endpoint, Heard, LogLine, Sound
 from action_assistant.runner.links.port import (
@@ -69,7 +70,7 @@ class Ros2Link:
         self._facts = facts
         self._topics = topics_of(facts)
         self._wall = wall
-        self._ears: list[Callable[[Report], None]] = []
+        self._ears = Ears[Report]()
         self._domain: Domain | None = None
         self._runs: set[str] = set()
         self._known_since = 0.0  # when this incarnation was first seen, by the monotonic clock
@@ -231,14 +232,9 @@ class Ros2Link:
                 return  # the standing says so
         self._look()
 
-    @contextmanager
-    def listen(self, hear: Callable[[Report], None]) -> Iterator[None]:
+    def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Everything that concerns this robot, from now on."""
-        self._ears.append(hear)
-        try:
-            yield
-        finally:
-            self._ears.remove(hear)
+        return self._ears.listening(hear)
 
     async def aclose(self) -> None:
         """Nothing of its own: the domain is shared."""
@@ -307,7 +303,7 @@ class Ros2Link:
     def _become(self, now: Standing) -> None:
         before, self._standing = self._standing, now
         if (before.state, before.incarnation) != (now.state, now.incarnation):
-            self._tell(
+            self._ears.tell(
                 EngineChanged(
                     at=self._wall(), state=now.state, incarnation=now.incarnation, why=now.why
                 )
@@ -332,7 +328,7 @@ class Ros2Link:
                 self._hear_feedback(sound)
             case Heard():
                 if self._name in sound.targets:
-                    self._tell(
+                    self._ears.tell(
                         ForeignCommand(
                             at=self._wall(),
                             command=sound.command,
@@ -345,7 +341,7 @@ class Ros2Link:
             case LogLine():
                 if self._said(sound.logger):
                     text = sound.text.strip()
-                    self._tell(EngineLog(at=self._wall(), text=text, graph=_graph_in(text)))
+                    self._ears.tell(EngineLog(at=self._wall(), text=text, graph=_graph_in(text)))
             case _:
                 assert_never(sound)
 
@@ -360,7 +356,7 @@ class Ros2Link:
             if not ours:
                 return
             sound = Feedback(actor=sound.actor, snapshots=ours)
-        self._tell(sound)
+        self._ears.tell(sound)
 
     def _said(self, logger: str) -> bool:
         """Whether a line can only be this engine's: nodes of one name cannot be told apart."""
@@ -375,10 +371,6 @@ class Ros2Link:
             for each in domain.publishers(self._topics.feedback)
             if each.logger == logger
         )
-
-    def _tell(self, report: Report) -> None:
-        for hear in tuple(self._ears):
-            hear(report)
 
 
 @contextmanager

@@ -6,12 +6,13 @@ that is started here keeps its name to itself, so one link serves many runs of d
 
 import math
 import secrets
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import Final, assert_never
 
 import anyio
 
+from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -52,7 +53,7 @@ class SimulatorLink:
         self._origin_wall = wall()
         self._incarnation = secrets.token_hex(8)
         self._runs: dict[str, str] = {}  # graph name -> run
-        self._ears: list[Callable[[Report], None]] = []
+        self._ears = Ears[Report]()
         self._wake = anyio.Event()
         self._dead: str | None = None
 
@@ -132,14 +133,9 @@ class SimulatorLink:
                 await anyio.lowlevel.checkpoint()
             self._wake = anyio.Event()
 
-    @contextmanager
-    def listen(self, hear: Callable[[Report], None]) -> Iterator[None]:
+    def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Every transition from now on."""
-        self._ears.append(hear)
-        try:
-            yield
-        finally:
-            self._ears.remove(hear)
+        return self._ears.listening(hear)
 
     async def aclose(self) -> None:
         """End the engine."""
@@ -177,7 +173,7 @@ class SimulatorLink:
             if seen is not None and run is not None:
                 per_run.setdefault(run, []).append(seen)
         for run, changes in per_run.items():
-            self._report(Transitions(run=run, changes=tuple(changes)))
+            self._ears.tell(Transitions(run=run, changes=tuple(changes)))
         for trace in traces:
             if isinstance(trace, semantics.Hazard) and trace.effect in {"crash", "hang"}:
                 self._fail(trace)
@@ -203,11 +199,7 @@ class SimulatorLink:
         why = f"The simulated engine {what} ({hazard.code}). {hazard.message}".rstrip()
         self._dead = why
         state: EngineState = "gone" if hazard.effect == "crash" else "busy"
-        self._report(EngineChanged(at=self._at(hazard.t_ms), state=state, why=why))
-
-    def _report(self, report: Report) -> None:
-        for hear in tuple(self._ears):
-            hear(report)
+        self._ears.tell(EngineChanged(at=self._at(hazard.t_ms), state=state, why=why))
 
     def _at(self, t_ms: float) -> int:
         return self._origin_wall + round(t_ms * 1000)
