@@ -7,6 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Awaitable, Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -61,7 +62,7 @@ async def _lists(folder: Path) -> Table:
     rows: list[list[str]] = []
     there = 0
     for size in SIZES:
-        await _ASIDE(lambda a=there, b=size: _add_runs(folder / "runner.db", a, b))  # type: ignore[misc]
+        await _ASIDE(partial(_add_runs, folder / "runner.db", there, size))
         there = size
         (middle,) = await journal.query(select(runs.c.id).where(runs.c.number == size // 2))
         rows.append([f"{size:,}", *[await _took(ask) for ask in _questions(journal, middle.id)]])

@@ -1,5 +1,6 @@
 """What is known already is not stored again, and nothing else is left out."""
 
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -41,8 +42,8 @@ def shown(draw: st.DrawFn) -> Any:
 
 def snapshot(at: int, polled: bool, **fields: Any) -> Snapshot:
     """Feedback does not say when the engine was last seen before."""
-    since, source = (at - 300, "get") if polled else (None, "feedback")
-    return Snapshot(at=at, since=since, source=source, run="r1", **fields)  # type: ignore[arg-type]
+    shown = partial(Snapshot, at=at, run="r1", **fields)
+    return shown(since=at - 300, source="get") if polled else shown(source="feedback")
 
 
 @given(st.lists(st.one_of(shown(), st.sampled_from(STATES)), max_size=25), st.integers(1, 3))

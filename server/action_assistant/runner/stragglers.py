@@ -101,7 +101,9 @@ class Stragglers:
             moving = shown if shown.source == "get" else await _asked(engine, shown, run)
             if moving is not None and self._is_over_still(run):
                 await self._take_back(engine, moving, run)
-        except Exception:
+        except (
+            Exception
+        ):  # one look must not end the others; the next snapshot is looked into again
             log.exception("whether run %s moves again cannot be told", run)
         finally:
             self._looking.discard(run)

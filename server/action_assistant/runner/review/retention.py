@@ -8,6 +8,7 @@ every event is in the log, or in an archive that is complete.
 import logging
 from collections.abc import Callable
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -117,7 +118,7 @@ class Retention:
         try:
             after = 0
             while events := await self._journal.read(stream, after=after, limit=_PAGE):
-                await self._aside(lambda events=events: written.add(events))  # type: ignore[misc]
+                await self._aside(partial(written.add, events))
                 after = events[-1].seq
                 await anyio.sleep(_BREATH_S)
             digest = await self._aside(written.close)
