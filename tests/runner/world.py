@@ -383,3 +383,9 @@ async def until(true: Callable[[], bool], patience: float = 60.0) -> None:
     with anyio.fail_after(patience):
         while not true():  # noqa: ASYNC110 - what it waits for has many sources
             await anyio.sleep(0.01)
+
+
+async def ended(control: Control, run: str) -> str:
+    """How a run has ended, once it has. Times are virtual."""
+    await until(lambda: run not in control.open, 3600)
+    return (await control.find(run)).state

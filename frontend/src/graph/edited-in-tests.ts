@@ -1,0 +1,52 @@
+/** Documents for tests of edits: made, copied for a colleague, and read as a graph. */
+
+import * as Y from "yjs";
+import { addAction } from "./edit";
+import { mapsOf, relationId } from "./layout";
+import { type Graph, type Key, type Relation, spoken } from "./model";
+import { readGraph } from "./read";
+
+export const graphOf = (doc: Y.Doc): Graph => readGraph(mapsOf(doc));
+export const actionOf = (doc: Y.Doc, key: Key) => graphOf(doc).actions.find((a) => a.key === key);
+export const relationOf = (doc: Y.Doc, id: string | null): Relation | undefined =>
+  graphOf(doc).relations.find((relation) => relationId(relation) === id);
+export const says = (relation: Relation | undefined) =>
+  relation && spoken(relation.conditions).map((o) => `${o} -> ${relation.conditions[o]}`);
+export const arrows = (doc: Y.Doc) =>
+  graphOf(doc)
+    .relations.map((relation) => {
+      const name = (key: Key) => actionOf(doc, key)?.name ?? key;
+      return `${name(relation.parent)}>${name(relation.child)}`;
+    })
+    .sort();
+
+export function docWith(...names: string[]): [Y.Doc, ...Key[]] {
+  const doc = new Y.Doc();
+  return [doc, ...names.map((name) => addAction(doc, { name }))];
+}
+
+/** A colleague's copy. */
+export function copyOf(doc: Y.Doc): Y.Doc {
+  const copy = new Y.Doc();
+  Y.applyUpdate(copy, Y.encodeStateAsUpdate(doc));
+  return copy;
+}
+
+export function exchange(...docs: Y.Doc[]): void {
+  for (const from of docs) {
+    for (const to of docs) {
+      Y.applyUpdate(to, Y.encodeStateAsUpdate(from, Y.encodeStateVector(to)), "remote");
+    }
+  }
+}
+
+export function updatesOf(doc: Y.Doc, work: () => void): number {
+  let count = 0;
+  const onUpdate = () => {
+    count += 1;
+  };
+  doc.on("update", onUpdate);
+  work();
+  doc.off("update", onUpdate);
+  return count;
+}
