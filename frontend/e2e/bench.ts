@@ -183,22 +183,21 @@ export async function arrows(product: Product, id: string): Promise<string[]> {
   ].sort();
 }
 
-/** What a graph means: the digest of what the server would publish of it. */
-export async function digestOf(product: Product, id: string): Promise<string> {
-  const { digest } = await product.ask<{ digest: string }>(`/api/graphs/${id}/versions`, {
-    method: "POST",
-    body: "{}",
-    headers: { "content-type": "application/json" },
-  });
-  return digest;
+/** What a graph means: all of it as the server exports it, but where its cards lie. */
+export async function meaningOf(product: Product, id: string): Promise<object> {
+  return JSON.parse(
+    JSON.stringify(await umrfOf(product, id), (key, value: unknown) =>
+      key === "gui_attributes" ? undefined : value,
+    ),
+  );
 }
 
 /** What a file means, once it is read. */
-export async function meant(product: Product, file: object): Promise<string> {
+export async function meant(product: Product, file: object): Promise<object> {
   const { id } = await product.ask<{ id: string }>("/api/graphs", {
     method: "POST",
     body: JSON.stringify(file),
     headers: { "content-type": "application/json" },
   });
-  return digestOf(product, id);
+  return meaningOf(product, id);
 }

@@ -1,7 +1,7 @@
 /** Drawing with a mouse: pieces travel, arrows are led, things are put in their place. */
 
 import { expect, type Locator, type Page, test } from "@playwright/test";
-import { add, arrows, boxOf, card, connect, digestOf, enter, meant, saved, umrfOf } from "./bench";
+import { add, arrows, boxOf, card, connect, enter, meaningOf, meant, saved, umrfOf } from "./bench";
 import { Product } from "./product";
 import { fetching } from "./semantics";
 
@@ -336,7 +336,7 @@ test("a graph with a loop and a renamed output is built from nothing", async ({ 
   await page.getByRole("option", { name: /^thing/ }).click();
   await page.getByRole("button", { name: "Add", exact: true }).last().click();
   await saved(page);
-  await expect.poll(() => digestOf(product, id)).toBe(await meant(product, fetching));
+  await expect.poll(() => meaningOf(product, id)).toEqual(await meant(product, fetching));
   expect(failures).toEqual([]);
   await context.close();
 });
