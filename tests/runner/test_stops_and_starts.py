@@ -19,7 +19,7 @@ from action_assistant.runner.events import Override
 from action_assistant.runner.standin_wire import Message, Quirks, Start, Stop
 from action_assistant.umrf import codec
 from runner.air import now, now_ms
-from runner.scene import OTHER, Scene, asked, shown
+from runner.scene import OTHER, PATROL, Scene, asked, shown
 from runner.world import ANN, BEN, live_through, until, virtual
 
 STOPS = int(os.environ.get("TEST_STOPS", "20"))
@@ -258,3 +258,29 @@ async def replayed_after(wait_s: float) -> list[float]:
 async def test_an_answer_from_before_a_start_of_somebody_else_proves_nothing() -> None:
     found = [await replayed_after(hundredths / 100) for hundredths in range(60, 240, 6)]
     assert [each for each in found if each] == []
+
+
+async def begun_anew_after(wait_s: float) -> bool:
+    """We stop a graph of somebody else, who starts it anew so long after, while answers are on their
+    way for up to half a second. Whether it was called stopped although it moves."""
+    scene = Scene(8)
+    async with scene.played() as control:
+        robot = scene.nodes["David"].robot
+        theirs = Start(graph_name="patrol", targets=("David",), graph_json=codec.write(PATROL))
+        scene.air.carry(theirs, "terminal")
+        await until(lambda: "patrol" in robot.moving)
+        await until(lambda: control.robots.silence(BEN, frozenset()) != [])
+        scene.air.old_s = 0.5
+        again = now() + wait_s
+        while control.robots.silencing.going("David"):
+            if now() >= again:
+                scene.air.carry(theirs, "terminal")
+                again = float("inf")
+            await anyio.sleep(0.01)
+        return "patrol" in robot.moving
+
+
+@virtual
+async def test_nor_does_it_when_the_stopped_graph_was_not_ours() -> None:
+    found = [await begun_anew_after(hundredths / 100) for hundredths in range(40, 240, 6)]
+    assert not any(found)

@@ -43,7 +43,7 @@ from action_assistant.runner.links.port import (
     Report,
     Transitions,
 )
-from action_assistant.runner.proof import send_stop
+from action_assistant.runner.proof import SET_GOING, send_stop
 from action_assistant.runner.recorder import Recorder, Store
 from action_assistant.runner.runs import Run, follow, thin
 from action_assistant.runner.seen import Hazard, Seen
@@ -56,7 +56,6 @@ _UNCONFIRMED_S: Final = 2.0
 _SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobody
 _TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
 _ONE_PRESS_S: Final = 1.0
-_SET_GOING: Final = frozenset({"start", "resume", "modify"})
 
 _LINES: Final = 2_000  # of the engine's log, kept with one run
 _LONGEST_LINE: Final = 2_000  # characters
@@ -153,7 +152,7 @@ class OpenRun:
 
     def hear_of(self, command: ForeignCommand) -> None:
         """Somebody else has told this robot something while the run goes on there."""
-        if command.command in _SET_GOING and command.graph == self.run.graph_name:
+        if command.command in SET_GOING and command.graph == self.run.graph_name:
             self.watch.disturbed()
         alarm = alarm_of(command, self.run.engine, self.run.graph_name)
         if alarm is not None:

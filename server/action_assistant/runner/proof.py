@@ -14,6 +14,8 @@ _LOADING_S: Final = 1.0  # an action that is triggered for the first time has be
 _STARTING_S: Final = 0.3  # and one that has run before within this
 _NEVER_BEGAN: Final = frozenset({"UNINITIALIZED", "INITIALIZED"})
 _SEND_S: Final = 1.0
+#: Commands after which a graph may move that was at rest.
+SET_GOING: Final = frozenset({"start", "resume", "modify"})
 
 
 async def send_stop(link: Link, graph: str) -> str:

@@ -279,6 +279,7 @@ class Robots:
     def _note_command(self, engine: KnownEngine, command: ForeignCommand) -> None:
         name = engine.registration.name
         if not command.targets or name in command.targets:
+            self.silencing.hear_of(name, command)
             told = self._standing().foreign(engine, command)
             self.flight.note(name, told, command.sender)
 

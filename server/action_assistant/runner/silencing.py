@@ -14,8 +14,8 @@ from action_assistant.runner.driving import Clock
 from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.events import Author
 from action_assistant.runner.flight import RobotEvent, StopAsked, StopUnproven, StopWasProven
-from action_assistant.runner.links.port import Answer, NoAnswer
-from action_assistant.runner.proof import Rest, send_stop
+from action_assistant.runner.links.port import Answer, ForeignCommand, NoAnswer
+from action_assistant.runner.proof import SET_GOING, Rest, send_stop
 
 _GAP_S: Final = 0.1
 _SLOWEST_S: Final = 1.0
@@ -39,6 +39,7 @@ class Silencing:
         self._note = note
         self._changed = changed
         self._going: dict[tuple[str, str], str] = {}
+        self._disturbed: set[tuple[str, str]] = set()  # since the last answer
 
     def trouble(self, robot: str, graph: str) -> str | None:
         """None when the graph is not being stopped; else why that is not proven yet, "" at first."""
@@ -59,6 +60,11 @@ class Silencing:
         self._tasks.start_soon(self._stop, engine, graph, robot)
         self._changed()
 
+    def hear_of(self, robot: str, command: ForeignCommand) -> None:
+        """Somebody else may just have set it going: what was asked before proves nothing any more."""
+        if command.command in SET_GOING and (robot, command.graph) in self._going:
+            self._disturbed.add((robot, command.graph))
+
     async def _stop(self, engine: KnownEngine, graph: str, robot: str) -> None:
         try:
             with anyio.move_on_after(_PATIENCE_S):
@@ -69,6 +75,7 @@ class Silencing:
             self._note(robot, StopUnproven(at=self._wall(), graph=graph, why=why), "")
         finally:
             self._going.pop((robot, graph), None)
+            self._disturbed.discard((robot, graph))
             self._changed()
 
     async def _until_proven(self, engine: KnownEngine, graph: str, robot: str) -> RobotEvent:
@@ -79,6 +86,10 @@ class Silencing:
             why = await send_stop(engine, graph)
             asked = anyio.current_time()
             answer = await _ask(engine)
+            disturbed = (robot, graph) in self._disturbed
+            self._disturbed.discard((robot, graph))
+            if disturbed:
+                rest.forget()
             if answer is None:
                 why = why or engine.why or "the engine does not answer"
             elif len({life, answer.incarnation} - {""}) > 1:
@@ -86,6 +97,8 @@ class Silencing:
                 return StopUnproven(at=self._wall(), graph=graph, why=why)
             elif engine.standing.servers != 1:
                 why = f"{engine.standing.servers} engines are seen on the path of its answers"
+            elif disturbed:
+                why = "somebody has just set it going again"
             elif _at_rest(answer, graph, rest, asked) and not why:
                 return StopWasProven(at=answer.at, graph=graph, asked_at=answer.asked_at)
             else:
@@ -109,7 +122,9 @@ def _at_rest(answer: Answer, graph: str, rest: Rest, asked: float) -> bool:
     """Whether neither the graph nor a sub-graph of it moves, or will by itself."""
     own = [each for each in answer.graphs if each.graph == graph]
     parts = [each for each in answer.graphs if each.graph.startswith(f"{graph}__")]
-    return not own or rest.seen([*own, *parts], asked)
+    if not own:
+        return not any(each.active for each in parts)
+    return rest.seen([*own, *parts], asked)
 
 
 def wanted(engine: KnownEngine, open_runs: frozenset[str]) -> list[str]:
