@@ -1,4 +1,5 @@
-/** Says at the very end what failed and why, in few lines: logs are read from their end. */
+/** Says at the very end what failed and why, in few lines, also what passed when it was tried again:
+ * logs are read from their end. */
 
 import { stripVTControlCharacters } from "node:util";
 import type { Reporter, TestCase, TestResult } from "@playwright/test/reporter";
@@ -11,7 +12,8 @@ export default class Failures implements Reporter {
   onTestEnd(test: TestCase, result: TestResult): void {
     if (result.status === test.expectedStatus || result.status === "skipped") return;
     const where = `${test.location.file.split("/").at(-1)}:${test.location.line}`;
-    this.said.push(`✘ ${where} ${test.title} (${result.status})`);
+    const again = result.retry < test.retries ? ", and was tried again" : "";
+    this.said.push(`✘ ${where} ${test.title} (${result.status}${again})`);
     for (const { message = "", location } of result.errors) {
       const lines = stripVTControlCharacters(message).split("\n").filter(Boolean).slice(0, LINES);
       this.said.push(...lines.map((line) => `    ${line}`), `    at line ${location?.line ?? "?"}`);
