@@ -99,6 +99,7 @@ test("a graph is built from nothing, and means what it shall", async ({ browser 
   await page.keyboard.press("ControlOrMeta+d");
   await expect(card(page, "TaTimer", 1)).toBeVisible();
   await page.keyboard.press("Shift+Enter");
+  await expect(page.getByRole("textbox", { name: "Name", exact: true })).toBeFocused();
   await tabTo(page, until);
   await type(page, "0.0");
   await page.keyboard.press("F6");
@@ -118,6 +119,7 @@ test("a graph is built from nothing, and means what it shall", async ({ browser 
   await page.keyboard.press("Shift+Enter");
   const when = (outcome: string) =>
     page.getByRole("combobox", { name: `When TaTimer 0 is ${outcome}` });
+  await expect(when("true")).toBeFocused();
   await choose(page, when("true"), "stop · stop it");
   await choose(page, when("false"), "bypass · pass it over");
   await choose(page, when("error"), "bypass · pass it over");
