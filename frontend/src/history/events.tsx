@@ -23,9 +23,9 @@ function spaced(fullName: string): string {
   return fullName.replace(/_(\d+)$/, " $1");
 }
 
-/** Seconds after the start. */
+/** Seconds after the start. The clock of an engine may stand a little behind the runner's. */
 function after(start: number, at: number): string {
-  return `+${((at - start) / 1000).toFixed(1)}`;
+  return `+${(Math.max(0, at - start) / 1000).toFixed(1)}`;
 }
 
 /** Marks that say what neither the visits nor the run's own fields say. */
@@ -38,7 +38,7 @@ const TOLD: ReadonlySet<string> = new Set([
   "run.answered.v1",
 ]);
 
-/** Everything that the run tells, oldest first. */
+/** Everything that the run tells, oldest first; nothing comes before its start. */
 export function happenings(
   run: Run,
   version: string,
@@ -46,11 +46,6 @@ export function happenings(
 ): Happening[] {
   const all: Happening[] = [];
   const start = instant(run.started_at);
-  if (start !== null) {
-    const where = run.engine === "simulator" ? "in the simulator" : `on ${placeOf(run)}`;
-    const text = `${authorName(run.author)} started ${version} ${where}`;
-    all.push({ at: start, tone: "idle", name: null, aid: null, text });
-  }
   for (const [name, action] of Object.entries(run.actions ?? {})) {
     action.visits.forEach((visit, i) => {
       const from = begun(visit);
@@ -102,7 +97,11 @@ export function happenings(
       aid: null,
       text: `Run ${endWords(run)}${run.detail ? `: ${run.detail}` : ""}`,
     });
-  return all.sort((a, b) => a.at - b.at);
+  all.sort((a, b) => a.at - b.at);
+  if (start === null) return all;
+  const where = run.engine === "simulator" ? "in the simulator" : `on ${placeOf(run)}`;
+  const text = `${authorName(run.author)} started ${version} ${where}`;
+  return [{ at: start, tone: "idle", name: null, aid: null, text }, ...all];
 }
 
 interface Props {
