@@ -27,6 +27,13 @@ test("a Stop that nothing proves becomes loud", () => {
   expect(later?.text).toContain("STOP UNCONFIRMED");
 });
 
+test("what is announced stays the same while only time goes by", () => {
+  const early = noticeOf(stop, now({ state: "stopping" }), 9000);
+  const late = noticeOf(stop, now({ state: "stopping" }), 9200);
+  expect(early?.text).toBe(late?.text);
+  expect([early?.since, late?.since]).toEqual(["asked 8.0 s ago", "asked 8.2 s ago"]);
+});
+
 test("stopped is said when the run's state says so", () => {
   const ended = now({ state: "stopped", ended_at: "1970-01-01T00:00:02Z" });
   expect(noticeOf(stop, ended, 2500)).toEqual({ tone: "done", text: "Run 7: stopped." });

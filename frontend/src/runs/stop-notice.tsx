@@ -11,7 +11,13 @@ const LOUD = 2_500; // ms without proof until the notice shouts
 const HEARD = 1_200; // ms within which the runner answers a Stop, if it does
 const GONE = 6_000; // ms that a proven stop stays to be read
 
-export type Notice = { tone: "quiet" | "loud" | "done"; text: string; stays?: true } | null;
+/** `since` goes on with each moment, so it is seen but not announced again and again. */
+export type Notice = {
+  tone: "quiet" | "loud" | "done";
+  text: string;
+  since?: string;
+  stays?: true;
+} | null;
 
 function targets(stop: StopAsked, now: LiveNow): Run[] {
   if (stop.run !== "all") {
@@ -28,10 +34,11 @@ function reasonOf(run: Run): string {
   return alarm ? alarm.text.replace(/^STOP UNCONFIRMED: /, "") : "";
 }
 
-function unconfirmed(runs: readonly Run[], since: string): Notice {
+function unconfirmed(runs: readonly Run[], since?: string): Notice {
   const each = runs.map((run) => `run ${run.number} on ${run.engine}`).join(", ");
   const why = runs.map(reasonOf).find((reason) => reason !== "") ?? "no proof has come.";
-  return { tone: "loud", stays: true, text: `STOP UNCONFIRMED${since}: ${each}: ${why}` };
+  const text = `STOP UNCONFIRMED: ${each}: ${why}`;
+  return { tone: "loud", stays: true, text, ...(since === undefined ? {} : { since }) };
 }
 
 /** Never says "stopped" without the runs' own state saying so. */
@@ -47,22 +54,24 @@ export function noticeOf(stop: StopAsked, now: LiveNow, at: number): Notice {
     return {
       tone: "loud",
       stays: true,
-      text: `NOT SENT: use the hardware stop. ${why} Trying again, ${since}.`,
+      text: `NOT SENT: use the hardware stop. ${why} Trying again.`,
+      since,
     };
   }
   if (now.link === "down") {
     return {
       tone: "loud",
       stays: true,
-      text: `STOP UNCONFIRMED, ${since}: sent, but no word from the runner since.`,
+      text: "STOP UNCONFIRMED: sent, but no word from the runner since.",
+      since,
     };
   }
   const runs = targets(stop, now);
   const open = runs.filter((run) => run.ended_at === null);
   if (open.length > 0) {
-    if (waited >= LOUD) return unconfirmed(open, `, ${since}`);
+    if (waited >= LOUD) return unconfirmed(open, since);
     const names = open.map((run) => `run ${run.number}`).join(", ");
-    return { tone: "quiet", text: `Stopping ${names} … ${since}` };
+    return { tone: "quiet", text: `Stopping ${names} …`, since };
   }
   const lost = runs.filter((run) => run.state === "lost");
   if (lost.length > 0) {
@@ -70,7 +79,7 @@ export function noticeOf(stop: StopAsked, now: LiveNow, at: number): Notice {
     return { tone: "loud", text: `STOP UNCONFIRMED: ${ends} Look at the robot.` };
   }
   if (waited > GONE) return null;
-  if (stop.state === "asked") return { tone: "quiet", text: `Stop ${since}` };
+  if (stop.state === "asked") return { tone: "quiet", text: "Stop", since };
   if (runs.length === 0) return { tone: "done", text: "The runner says that nothing runs." };
   const ends = runs.map((run) => `Run ${run.number}: ${run.state}`).join(" · ");
   return { tone: "done", text: `${ends}.` };
@@ -96,7 +105,7 @@ export function movingAgain(now: LiveNow): Notice {
 export function othersNotice(now: LiveNow): Notice {
   if (now.link === "down") return null;
   const shouting = openRuns(now).filter((run) => run.desired === "stopped" && reasonOf(run) !== "");
-  if (shouting.length > 0) return unconfirmed(shouting, "");
+  if (shouting.length > 0) return unconfirmed(shouting);
   const held = foreignGraphs(now).find((each) => each.held.stopping);
   if (held === undefined) return null;
   const { robot, held: graph } = held;
@@ -122,7 +131,14 @@ export function StopNotice() {
       data-tone={notice.tone}
       role={notice.tone === "loud" ? "alert" : "status"}
     >
-      <span>{notice.text}</span>
+      <span>
+        {notice.text}
+        {notice.since !== undefined && (
+          <span aria-hidden className={style.since}>
+            {` ${notice.since}`}
+          </span>
+        )}
+      </span>
       {!notice.stays && (
         <CloseButton size="sm" aria-label="Hide" onClick={() => setDismissed(last?.id ?? "")} />
       )}
