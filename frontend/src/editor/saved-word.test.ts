@@ -7,6 +7,7 @@ test("saved is said only when nothing waits and the room is live", () => {
   expect(savedWords({ state: "live", unsaved: 0, seq: 4 }, false).words).toBe("View only");
   expect(savedWords({ state: "offline", unsaved: 2, seq: 4 }).words).toBe("Offline with 2 changes");
   expect(savedWords({ state: "connecting", unsaved: 0, seq: 0 }).words).toBe("Opening");
+  expect(savedWords({ state: "live", unsaved: 0, seq: 0 }, false).words).toBe("Opening");
   expect(savedWords({ state: "refused", why: "no-such-graph", unsaved: 1, seq: 4 }).words).toBe(
     "This graph is gone · 1 change not saved",
   );

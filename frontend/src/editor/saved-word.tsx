@@ -43,7 +43,7 @@ export function savedWords(link: Link, mayEdit = true): Saved {
     const kept = link.unsaved > 0 ? ` · ${changes(link.unsaved)} not saved` : "";
     return { tone: "bad", words: why + kept };
   }
-  if (link.state === "live") {
+  if (link.state === "live" && link.seq > 0) {
     if (!mayEdit && link.unsaved === 0) return { tone: "view", words: "View only" };
     return link.unsaved === 0
       ? { tone: "good", words: "Saved" }

@@ -3,7 +3,7 @@
 import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/person";
-import { useCalmGraph, useCalmLink, useRoom, useUndo } from "../room/use-room";
+import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../room/use-room";
 import { CARD } from "../ui/canvas/arrange";
 import {
   type AddRequest,
@@ -69,7 +69,10 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   const role = useMay("edit");
   const { readOnly, seq } = useCalmLink();
   const { dryRun, begin: beginDryRun } = useDryRun(id, graph, seq);
-  const mayEdit = role && readOnly === undefined;
+  // What is typed before the graph is there would be joined to what arrives under it, and an edit
+  // would know nothing of what it replaces.
+  const arrived = useLinkPart((link) => link.seq > 0);
+  const mayEdit = role && readOnly === undefined && arrived;
   const [finding, setFinding] = useState(false);
   const sight = useRef<Sight>({ view: BLIND, places: () => new Map(), sizes: () => new Map() });
 
