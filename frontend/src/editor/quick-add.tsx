@@ -128,7 +128,7 @@ export function QuickAdd({ bench, request, known, onClose }: Props) {
               role="option"
               aria-selected={i === at}
               className={style.item}
-              onPointerEnter={() => setAt(i)}
+              onPointerMove={() => setAt(i)}
               onClick={() => choose(template)}
             >
               <span className={style.name}>
