@@ -27,11 +27,14 @@ export function DraftInput(props: Props) {
   const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
   const latest = useRef({ draft, value, check, onCommit });
   latest.current = { draft, value, check, onCommit };
+  // A draft stays in its field after it was written: what others write since is newer than it.
+  const unwritten = useRef(false);
 
   const commit = useCallback(() => {
     clearTimeout(timer.current);
     const now = latest.current;
-    if (now.draft === null || now.check?.(now.draft)) return;
+    if (!unwritten.current || now.draft === null || now.check?.(now.draft)) return;
+    unwritten.current = false;
     if (now.draft !== now.value) now.onCommit(now.draft);
   }, []);
   useEffect(() => commit, [commit]);
@@ -41,6 +44,7 @@ export function DraftInput(props: Props) {
   const kept = value === "" ? "" : ` The last valid value, ${value}, is kept.`;
   const change = (text: string) => {
     setDraft(text);
+    unwritten.current = true;
     clearTimeout(timer.current);
     timer.current = setTimeout(commit, PAUSE);
   };
@@ -64,6 +68,7 @@ export function DraftInput(props: Props) {
   const onEscape = (event: React.KeyboardEvent) => {
     if (event.key !== "Escape") return;
     clearTimeout(timer.current);
+    unwritten.current = false;
     setDraft(null);
   };
   if (lines) {
