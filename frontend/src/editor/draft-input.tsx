@@ -11,6 +11,8 @@ interface Props {
   check?: (draft: string) => string | null;
   onCommit: (value: string) => void;
   lines?: boolean;
+  /** Written on leaving only: the field itself is drawn anew under what it says. */
+  onLeaving?: boolean;
   placeholder?: string;
   description?: string;
   mono?: boolean;
@@ -22,7 +24,7 @@ interface Props {
 
 /** Invalid drafts stay where they are and are explained; the last valid value stays written. */
 export function DraftInput(props: Props) {
-  const { value, check, onCommit, lines = false, mono = false } = props;
+  const { value, check, onCommit, lines = false, mono = false, onLeaving = false } = props;
   const [draft, setDraft] = useState<string | null>(null);
   const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
   const latest = useRef({ draft, value, check, onCommit });
@@ -46,7 +48,7 @@ export function DraftInput(props: Props) {
     setDraft(text);
     unwritten.current = true;
     clearTimeout(timer.current);
-    timer.current = setTimeout(commit, PAUSE);
+    if (!onLeaving) timer.current = setTimeout(commit, PAUSE);
   };
   const leave = () => {
     commit();

@@ -32,6 +32,7 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
       <DraftInput
         label="Name"
         value={name}
+        onLeaving
         check={(draft) => taken(others, pathFrom(draft))}
         onCommit={(draft) => renameParameter(doc, owner, side, parameter.path, pathFrom(draft))}
       />
