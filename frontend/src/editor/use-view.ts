@@ -28,11 +28,21 @@ function glide(ms: number): number {
   return window.matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : ms;
 }
 
-/** Focuses a card, which may be drawn some frames later only. */
-function focusCard(room: HTMLElement, key: Key, tries: number): void {
-  const card = room.querySelector<HTMLElement>(`.react-flow__node[data-id="${CSS.escape(key)}"]`);
-  if (card !== null) card.focus({ preventScroll: true });
-  else if (tries > 0) requestAnimationFrame(() => focusCard(room, key, tries - 1));
+/** Where people write or decide. */
+const BUSY = "input, textarea, select, [contenteditable=true], [role=dialog] *";
+
+/** Focuses a card, which may be drawn some frames later only; not once the person is busy elsewhere. */
+export function focusCard(room: HTMLElement, key: Key, tries: number): void {
+  const before = document.activeElement;
+  const look = (left: number) => {
+    // What has the focus from before may be about to close: the search that the card came from.
+    const now = document.activeElement;
+    if (now !== before && now?.matches(BUSY)) return;
+    const card = room.querySelector<HTMLElement>(`.react-flow__node[data-id="${CSS.escape(key)}"]`);
+    if (card !== null) card.focus({ preventScroll: true });
+    else if (left > 0) requestAnimationFrame(() => look(left - 1));
+  };
+  look(tries);
 }
 
 /** The actions that run, the latest first. */
