@@ -96,9 +96,9 @@ function mapColor(node: CanvasNode): string {
 function useNoteDesk(bench: Bench, writing: string | null, setResized: NoteDesk["resizing"]) {
   const [only, ...others] = bench.selection;
   const alone = only !== undefined && others.length === 0 ? only : null;
-  const { doc, graph, open, select, mayEdit } = bench;
+  const { doc, open, select, mayEdit } = bench;
   const change = useSteady<Parameters<NoteDesk["change"]>, void>((key, change) => {
-    changeNote(doc, graph, key, change);
+    changeNote(doc, key, change);
   });
   return useMemo<NoteDesk | null>(() => {
     if (!mayEdit) return null;

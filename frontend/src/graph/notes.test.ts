@@ -15,9 +15,18 @@ test("a note is what it was written as; members that others added stay when it c
     { key, kind: "note", at: [1, 2], size: [90, 40], text: "a", color: "red" },
   ]);
   const theirs = noteKey(addNote(doc, '{"kind":"note","at":[0,0],"text":"b","link":"x"}'));
-  expect(changeNote(doc, graphOf(doc), theirs, { text: "c" })).toBe(true);
+  expect(changeNote(doc, theirs, { text: "c" })).toBe(true);
   const text = graphOf(doc).notes.find(([id]) => noteKey(id) === theirs)?.[1] ?? "";
   expect(JSON.parse(text)).toMatchObject({ link: "x", text: "c", at: [0, 0] });
+});
+
+test("moving a note that a page shows as it was keeps what others wrote into it since", () => {
+  const doc = new Y.Doc();
+  const key = writeNote(doc, { kind: "note", at: [1, 2], size: [90, 40], text: "a", color: "red" });
+  const shown = graphOf(doc);
+  changeNote(doc, key, { text: "theirs" });
+  placeNotes(doc, shown, new Map([[key, [5, 6]]]));
+  expect(notesOf(graphOf(doc))).toMatchObject([{ at: [5, 6], text: "theirs" }]);
 });
 
 test("what is no note is read as none, whatever it is", () => {

@@ -2,9 +2,10 @@
 
 import type * as Y from "yjs";
 import { addNote, setNote } from "./edit";
-import { noteKey } from "./layout";
+import { noteKey, rootOf } from "./layout";
 import type { Graph, JsonText, Position } from "./model";
 import { together } from "./pen";
+import { asJsonText } from "./values";
 
 export const NOTE_COLORS = ["grey", "amber", "green", "blue", "violet", "red"] as const;
 export type NoteColor = (typeof NOTE_COLORS)[number];
@@ -70,15 +71,14 @@ export function writeNote(doc: Y.Doc, note: NewNote): string {
   return noteKey(addNote(doc, textOf(note, {})));
 }
 
-/** Changes one; members that others wrote into it stay. False when it is gone. */
-export function changeNote(
-  doc: Y.Doc,
-  graph: Graph,
-  key: string,
-  change: Partial<NewNote>,
-): boolean {
+/**
+ * Changes one; members that others wrote into it stay. False when it is gone.
+ *
+ * A note is one text, so it is the document's newest that changes: what a page shows may be older.
+ */
+export function changeNote(doc: Y.Doc, key: string, change: Partial<NewNote>): boolean {
   const id = key.slice(2);
-  const text = graph.notes.find(([known]) => known === id)?.[1];
+  const text = asJsonText(rootOf(doc, "positions").get(key));
   const note = text === undefined ? null : readNote(key, text);
   if (text === undefined || note === null) return false;
   return setNote(doc, id, textOf({ ...note, ...change }, JSON.parse(text)));
@@ -93,7 +93,7 @@ export function placeNotes(doc: Y.Doc, graph: Graph, places: ReadonlyMap<string,
   together(doc, () => {
     for (const { key, at } of notesOf(graph)) {
       const to = places.get(key);
-      if (to && (to[0] !== at[0] || to[1] !== at[1])) changeNote(doc, graph, key, { at: to });
+      if (to && (to[0] !== at[0] || to[1] !== at[1])) changeNote(doc, key, { at: to });
     }
   });
 }

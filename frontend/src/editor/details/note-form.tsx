@@ -41,10 +41,9 @@ function Colors({ note, onPick }: { note: Note; onPick: (color: NoteColor) => vo
 }
 
 export function NoteForm({ note }: { note: Note }) {
-  const { doc, graph, select } = useBench();
+  const { doc, select } = useBench();
   const frame = note.kind === "frame";
-  const change = (part: Parameters<typeof changeNote>[3]) =>
-    void changeNote(doc, graph, note.key, part);
+  const change = (part: Parameters<typeof changeNote>[2]) => void changeNote(doc, note.key, part);
   const [width, height] = note.size;
   return (
     <div className={style.form}>

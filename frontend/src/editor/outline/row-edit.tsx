@@ -128,12 +128,12 @@ function Pick({ row, change, onDone }: Props) {
 }
 
 function Write({ row, onDone }: Props) {
-  const { doc, graph } = useBench();
+  const { doc } = useBench();
   const old = row.kind === "note" ? row.note.text : "";
   const [text, setText] = useState(old);
   const save = () => {
     if (row.kind !== "note" || text === old) return onDone(null);
-    changeNote(doc, graph, row.note.key, { text });
+    changeNote(doc, row.note.key, { text });
     onDone("The text is written");
   };
   return (
