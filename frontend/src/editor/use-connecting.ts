@@ -34,6 +34,7 @@ export function useConnecting(bench: Bench, openAddAt: AddAt) {
   const [pending, setPending] = useState<Pending | null>(null);
   const draw = useCallback(
     (parent: Key, child: Key, outcome: Precondition) => {
+      setPending(null); // an outcome that was tapped before has been thought better of
       const relation = mayEdit ? connect(doc, parent, child, outcome) : null;
       if (relation !== null) select([relation]);
     },
@@ -57,8 +58,10 @@ export function useConnecting(bench: Bench, openAddAt: AddAt) {
     const point = pointOf(event);
     const outcome = outcomeOf(from.id);
     const target = nodeAt(point);
-    if (target === null) openAddAt(point, { key: from.nodeId, outcome });
-    else if (target !== from.nodeId) draw(from.nodeId, target, outcome);
+    if (target === null) {
+      setPending(null);
+      openAddAt(point, { key: from.nodeId, outcome });
+    } else if (target !== from.nodeId) draw(from.nodeId, target, outcome);
   };
 
   /** Whether the click was about an arrow, and nothing else shall come of it. */
