@@ -74,8 +74,9 @@ function middle(box: { x: number; width: number }): number {
 }
 
 async function drag(page: Page, from: Locator, to: Locator): Promise<void> {
-  const start = await boxOf(from);
+  // What is looked at last rests, so both do.
   const end = await boxOf(to);
+  const start = await boxOf(from);
   const arrows = await page.locator(".react-flow__edge").count();
   await page.mouse.move(start.x + start.width / 2, start.y + start.height / 2);
   await page.mouse.down();
@@ -97,8 +98,18 @@ export async function boxOf(locator: Locator) {
     const now = JSON.stringify(box);
     if (now === before) return box;
     before = now;
+    // A machine with much to do draws few frames: without one in between nothing could have moved.
+    await locator.page().evaluate(frames);
     await locator.page().waitForTimeout(80);
   }
+}
+
+function frames(): Promise<void> {
+  return new Promise((done) => {
+    const next = (left: number) =>
+      left > 0 ? requestAnimationFrame(() => next(left - 1)) : done();
+    next(3);
+  });
 }
 
 /** Waits until everything is on disk. */

@@ -287,6 +287,7 @@ test("a graph with a loop and a renamed output is built from nothing", async ({ 
   const name = page.getByRole("textbox", { name: "Graph", exact: true });
   await name.fill(fetching.graph_name);
   await name.press("Enter");
+  await expect(page).toHaveTitle(/^fetch_all\b/);
   const parameter = async (of: string, side: "in" | "out", called: string) => {
     await pick(page, [of, 0]);
     await page
@@ -326,7 +327,9 @@ test("a graph with a loop and a renamed output is built from nothing", async ({ 
 
   // The way back is not waited for; it was drawn from the outcome to the card above.
   await connect(page, "Fetch", "true", "Look");
-  await page.getByRole("switch", { name: "Look waits for this" }).click({ force: true });
+  const waits = page.getByRole("switch", { name: "Look waits for this" });
+  await waits.click({ force: true });
+  await expect(waits).not.toBeChecked();
   await pick(page, ["Look", 0]);
   await page.getByRole("button", { name: /run Fetch$/ }).click();
   await page.getByRole("button", { name: "Rename an output" }).click();
@@ -335,6 +338,7 @@ test("a graph with a loop and a renamed output is built from nothing", async ({ 
   await page.getByRole("combobox", { name: "Reaches Fetch as" }).click();
   await page.getByRole("option", { name: /^thing/ }).click();
   await page.getByRole("button", { name: "Add", exact: true }).last().click();
+  await expect(page.getByRole("button", { name: "Remove found as thing" })).toBeVisible();
   await saved(page);
   await expect.poll(() => meaningOf(product, id)).toEqual(await meant(product, fetching));
   expect(failures).toEqual([]);
