@@ -142,6 +142,12 @@ class KnownEngine:
         except NoAnswer as nothing:
             self._silent(str(nothing))
             raise
+        except Exception as error:  # a link that breaks is one without an answer
+            why = f"The link failed: {error!r}"
+            if why != self.why:
+                log.exception("the link to %s failed", self.registration.name)
+            self._silent(why)
+            raise NoAnswer(why) from error
         except anyio.get_cancelled_exc_class():
             if anyio.current_time() - began >= 0.9 * _GET_S:  # somebody's deadline, not the end
                 self._silent("")

@@ -1,6 +1,7 @@
 """What proves that nothing moves: a get asked after the stop, and how long a look must last."""
 
 import hashlib
+import logging
 from collections.abc import Sequence
 from typing import Final
 
@@ -9,6 +10,8 @@ import msgspec
 
 from action_assistant.runner.links.port import Link, NotSent
 from action_assistant.runner.seen import TERMINAL, Snapshot
+
+log: Final = logging.getLogger(__name__)
 
 _LOADING_S: Final = 1.0  # an action that is triggered for the first time has begun within this time
 _STARTING_S: Final = 0.3  # and one that has run before within this
@@ -27,6 +30,9 @@ async def send_stop(link: Link, graph: str) -> str:
         return str(why) or "not sent"
     except TimeoutError:
         return "the message could not be handed over within a second"
+    except Exception as error:  # whatever breaks in a link, the next message has to be tried
+        log.exception("a stop of %s may or may not have left", graph)
+        return f"the link failed: {error!r}"
     return ""
 
 
