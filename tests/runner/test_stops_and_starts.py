@@ -269,7 +269,7 @@ async def begun_anew_after(wait_s: float) -> bool:
         theirs = Start(graph_name="patrol", targets=("David",), graph_json=codec.write(PATROL))
         scene.air.carry(theirs, "terminal")
         await until(lambda: "patrol" in robot.moving)
-        await until(lambda: control.robots.silence(BEN, frozenset()) != [])
+        await until(lambda: control.robots.silence(BEN, lambda _: ()) != [])
         scene.air.old_s = 0.5
         again = now() + wait_s
         while control.robots.silencing.going("David"):

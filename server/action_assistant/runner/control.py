@@ -62,7 +62,7 @@ class Control:
             wall=wall,
             aside=aside,
             taken=self._taken,
-            going=lambda: frozenset(self.open),
+            going=self._going,
         )
         self._stragglers = Stragglers(
             self.open, self.history, robots, self._tasks, wall=wall, reopen=self._reopen
@@ -179,10 +179,12 @@ class Control:
 
     def _taken(self, engine: str) -> Run | None:
         """The run that an engine has from here."""
-        for other in self.open.values():
-            if other.run.engine == engine and other.run.end is None:
-                return other.run
-        return None
+        return next((each.run for each in self._going(engine).values()), None)
+
+    def _going(self, engine: str) -> dict[str, OpenRun]:
+        """The runs that go on there. Whatever else carries the mark of one was sent by others."""
+        found = self.open.items()
+        return {run: it for run, it in found if it.run.engine == engine and it.run.end is None}
 
     async def _begin(
         self,
@@ -254,14 +256,13 @@ class Control:
         self._stops += 1
         self._last_stop = (author, stop_id)
         runs = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
-        self.robots.silence(author, frozenset(self.open))
+        self.robots.silence(author, self._going)
         return runs
 
     def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
         """Want whatever a robot runs stopped: runs of ours, graphs of others. Raises NotFound."""
-        graphs = self.robots.silence(author, frozenset(self.open), name)
-        own = [run for run, opened in tuple(self.open.items()) if opened.run.engine == name]
-        return [run for run in own if self._stop(run, author, "")], graphs
+        graphs = self.robots.silence(author, self._going, name)
+        return [run for run in self._going(name) if self._stop(run, author, "")], graphs
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
         """Want one run stopped, or all of a group; nothing when it is over. Waits for nothing unless

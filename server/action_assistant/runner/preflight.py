@@ -50,7 +50,8 @@ class Preflight(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Sight(msgspec.Struct, frozen=True, kw_only=True):
-    """An engine at the moment of a pre-flight. `took_ms`: until it answered a get sent for it."""
+    """An engine at the moment of a pre-flight. `took_ms`: until it answered a get sent for it;
+    `open_runs`: runs of ours that go on there."""
 
     name: str
     facts: EngineFacts
@@ -58,7 +59,7 @@ class Sight(msgspec.Struct, frozen=True, kw_only=True):
     answer: Answer
     index: Index
     took_ms: float
-    open_runs: frozenset[str] = frozenset()
+    open_runs: Collection[str] = ()
 
 
 def summed(engine: str, items: Sequence[Item], digest: str = "") -> Preflight:

@@ -1,7 +1,7 @@
 """The engines that runs can go to: the simulator, always, and the robots that somebody registered."""
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Final
 
 import anyio
@@ -165,15 +165,17 @@ class Robots:
             raise RuntimeError("the registry is not open")
         return self._silencing
 
-    def silence(self, author: Author, going: frozenset[str], name: str | None = None) -> list[str]:
-        """Stop whatever robots run that is no open run of ours: on all of them, or on one. The names
-        of the graphs. Never waits. Raises NotFound."""
+    def silence(
+        self, author: Author, going: Callable[[str], Collection[str]], name: str | None = None
+    ) -> list[str]:
+        """Stop whatever robots run that is no run of ours `going` on there: on all of them, or on
+        one. The names of the graphs. Never waits. Raises NotFound."""
         if name is not None:
             self.registration(name)
         told: list[str] = []
         for robot, engine in self._engines.items():
             if name in {None, robot}:
-                for graph in wanted(engine, going):
+                for graph in wanted(engine, going(robot)):
                     self.silencing.stop(engine, graph, author)
                     told.append(f"{robot}: {graph}")
         return told

@@ -4,7 +4,7 @@ It ends by itself with the life of the engine, when a minute has brought no proo
 from here: a late stop would hit a run that only has the same name.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Final
 
 import anyio
@@ -127,15 +127,15 @@ def _at_rest(answer: Answer, graph: str, rest: Rest, asked: float) -> bool:
     return rest.seen([*own, *parts], asked)
 
 
-def wanted(engine: KnownEngine, open_runs: frozenset[str]) -> list[str]:
-    """The graphs that an engine runs and that are no open runs of ours."""
+def wanted(engine: KnownEngine, going: Collection[str]) -> list[str]:
+    """The graphs that an engine runs and that are no runs of ours going on there."""
     answer = engine.answer
     if answer is None:
         return []
     tops = {
         each.graph
         for each in answer.graphs
-        if each.active and (each.run is None or each.run not in open_runs)
+        if each.active and (each.run is None or each.run not in going)
     }
     return sorted(name for name in tops if not any(_is_part(name, top) for top in tops))
 

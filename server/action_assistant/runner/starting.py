@@ -1,6 +1,6 @@
 """What must be true before a start is stored and sent, found out for each engine it shall go to."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Annotated, Final
 
 import anyio
@@ -92,7 +92,7 @@ class Grouped(msgspec.Struct, frozen=True):
 
 class Starting:
     """Looks before starts. `taken(engine)` is the run that an engine has from here, if any;
-    `going()` the ids of all open ones."""
+    `going(engine)` the ids of all that go on there."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ class Starting:
         wall: Clock,
         aside: Aside,
         taken: Callable[[str], Run | None],
-        going: Callable[[], frozenset[str]],
+        going: Callable[[str], Collection[str]],
     ) -> None:
         self._robots = robots
         self._wall = wall
@@ -226,7 +226,7 @@ class Starting:
             answer=answer,
             index=await robot.index(self._aside),
             took_ms=took,
-            open_runs=self._going(),
+            open_runs=self._going(robot.registration.name),
         )
 
     def _simulated(self, asked: StartRequest) -> EngineFacts:

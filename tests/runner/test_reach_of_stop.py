@@ -1,0 +1,53 @@
+"""Stop reaches everything that moves or is about to: graphs that carry a run's mark where no run of
+ours is, starts under way, robots that are registered anew meanwhile. In virtual time."""
+
+import anyio
+
+from action_assistant.runner.links.port import Order
+from runner.fleet import Open
+from runner.scene import Scene, asked, shown
+from runner.test_robots import NEVER, fleet, group
+from runner.world import ANN, BEN, World, order, sequence, until, virtual
+
+
+async def _cleaning(robot: Open, run: str) -> None:
+    """Somebody starts a graph there that carries the mark of a run."""
+    await robot.engine.start(Order(run=run, graph=sequence("cleaning"), umrf=""))
+
+
+# --- graphs that carry the mark of a run ------------------------------------------------------
+
+
+@virtual
+async def test_a_graph_with_the_mark_of_a_run_on_another_robot_is_stopped_too() -> None:
+    david, eve = Open(NEVER), Open(NEVER)
+    async with fleet(World(), David=david, Eve=eve) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await _cleaning(eve, run.id)
+        await anyio.sleep(15)
+        (look,) = await control.look(group(sequence(), "Eve"))
+        assert {each.code: each.verdict for each in look.items}["quiet"] == "blocked"
+        assert control.stop_robot("Eve", BEN) == ([], ["Eve: cleaning"])
+        await until(lambda: not control.robots.silencing.going("Eve"))
+        assert not await eve.moving("cleaning")
+        assert control.open[run.id].run.desired == "running"
+
+
+@virtual
+async def test_a_graph_with_the_mark_of_a_run_that_has_ended_is_stopped_before_that_is_recorded() -> (
+    None
+):
+    scene = Scene(4)
+    async with scene.played() as control:
+        run = (await control.start(asked(), ANN)).run.id
+        await until(lambda: shown(control, run).state == "running")
+        scene.world.ledger.down = True
+        await control.stop(run, BEN)
+        await until(lambda: shown(control, run).state == "stopped")
+        scene.air.carry(scene.starts()[0], "bag")  # somebody plays our start again
+        await until(lambda: scene.nodes["David"].robot.moving == ("patrol",))
+        await anyio.sleep(15)
+        assert shown(control, run).state == "stopped"
+        control.stop_all(BEN)
+        await until(lambda: scene.nodes["David"].robot.moving == ())
+        scene.world.ledger.down = False
