@@ -2,10 +2,13 @@
 ours is, starts under way, robots that are registered anew meanwhile. In virtual time."""
 
 import anyio
+import pytest
 
 from action_assistant.runner.links.port import Order
+from action_assistant.runner.standin_wire import Start
+from action_assistant.umrf import codec
 from runner.fleet import Open
-from runner.scene import Scene, asked, shown
+from runner.scene import PATROL, Scene, asked, shown
 from runner.test_robots import NEVER, fleet, group
 from runner.world import ANN, BEN, World, order, sequence, until, virtual
 
@@ -51,3 +54,34 @@ async def test_a_graph_with_the_mark_of_a_run_that_has_ended_is_stopped_before_t
         control.stop_all(BEN)
         await until(lambda: scene.nodes["David"].robot.moving == ())
         scene.world.ledger.down = False
+
+
+# --- graphs that were begun just now ----------------------------------------------------------
+
+
+def _their_start(scene: Scene) -> None:
+    text = codec.write(PATROL)
+    scene.air.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "terminal")
+
+
+@pytest.mark.parametrize("after_s", [0.1, 1.0, 5.0])
+@virtual
+async def test_a_graph_that_somebody_started_a_moment_ago_is_stopped(after_s: float) -> None:
+    scene = Scene(4)
+    async with scene.played() as control:
+        await anyio.sleep(45)
+        _their_start(scene)
+        await anyio.sleep(after_s)
+        control.stop_all(BEN)
+        await until(lambda: scene.nodes["David"].robot.moving == (), patience=5)
+        await until(lambda: not control.robots.silencing.going("David"))
+
+
+@virtual
+async def test_a_graph_that_somebody_started_is_shown_moving_a_second_later() -> None:
+    scene = Scene(4)
+    async with scene.played() as control:
+        await anyio.sleep(45)
+        _their_start(scene)
+        await anyio.sleep(2)
+        assert [each.active for each in control.robots.robot("David").holds] == [True]

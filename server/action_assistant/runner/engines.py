@@ -221,7 +221,8 @@ class KnownEngine:
                 await anyio.sleep(0.5)
 
     def look_closely(self) -> None:
-        """A run has ended there: whether it stays so is asked more often for a while."""
+        """A run has ended there, or others told it something: what comes of that is asked more
+        often for a while."""
         if anyio.current_time() >= self._close_until:
             self._look.set()
         self._close_until = anyio.current_time() + _AFTERWARDS_S
@@ -238,7 +239,8 @@ class KnownEngine:
                 self._recordings.fed(self.registration.name, report)
             case ForeignCommand():
                 self._foreign(self, report)
-                self._look.set()
+                self._look.set()  # and later, too: it may be obeyed after the answer
+                self.look_closely()
             case _:
                 return
 

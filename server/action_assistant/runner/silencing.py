@@ -128,17 +128,21 @@ def _at_rest(answer: Answer, graph: str, rest: Rest, asked: float) -> bool:
 
 
 def wanted(engine: KnownEngine, going: Collection[str]) -> list[str]:
-    """The graphs that an engine runs and that are no runs of ours going on there."""
+    """The graphs that an engine runs and that are no runs of ours going on there: also those of
+    which no action has begun yet."""
     answer = engine.answer
     if answer is None:
         return []
+    held = {each.graph for each in answer.graphs}
     tops = {
         each.graph
         for each in answer.graphs
-        if each.active and (each.run is None or each.run not in going)
+        if (each.active or (each.state == "RUNNING" and not _within(each.graph, held)))
+        and (each.run is None or each.run not in going)
     }
-    return sorted(name for name in tops if not any(_is_part(name, top) for top in tops))
+    return sorted(name for name in tops if not _within(name, tops))
 
 
-def _is_part(name: str, top: str) -> bool:
-    return name != top and name.startswith(f"{top}__")
+def _within(name: str, graphs: Collection[str]) -> bool:
+    """Whether it is a sub-graph of one of them."""
+    return any(name.startswith(f"{each}__") for each in graphs)
