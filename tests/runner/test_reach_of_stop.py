@@ -1,16 +1,22 @@
 """Stop reaches everything that moves or is about to: graphs that carry a run's mark where no run of
 ours is, starts under way, robots that are registered anew meanwhile. In virtual time."""
 
+from typing import Any
+
 import anyio
 import pytest
 
-from action_assistant.runner.links.port import Order
+from action_assistant.errors import Conflict
+from action_assistant.runner.control import Control
+from action_assistant.runner.links.port import Link, NotSent, Order, Registration
+from action_assistant.runner.robots import Robots
 from action_assistant.runner.standin_wire import Start
 from action_assistant.umrf import codec
-from runner.fleet import Open
+from action_assistant.umrf.facts import EngineFacts
+from runner.fleet import Fleet, Open
 from runner.scene import PATROL, Scene, asked, shown
 from runner.test_robots import NEVER, fleet, group
-from runner.world import ANN, BEN, World, order, sequence, until, virtual
+from runner.world import ANN, BEN, World, at_once, order, sequence, until, virtual, wall
 
 
 async def _cleaning(robot: Open, run: str) -> None:
@@ -85,3 +91,73 @@ async def test_a_graph_that_somebody_started_is_shown_moving_a_second_later() ->
         _their_start(scene)
         await anyio.sleep(2)
         assert [each.active for each in control.robots.robot("David").holds] == [True]
+
+
+# --- robots that are registered anew ----------------------------------------------------------
+
+
+class Lease:
+    """One link to a robot, which sends nothing any more once the registry has let go of it."""
+
+    def __init__(self, robot: Open) -> None:
+        self._robot = robot
+        self._is_over = False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._robot, name)
+
+    async def stop(self, graph_name: str) -> None:
+        """Sent while it lives."""
+        if self._is_over:
+            raise NotSent("it is not being looked for any more")
+        await self._robot.stop(graph_name)
+
+    async def aclose(self) -> None:
+        """The robot goes on."""
+        self._is_over = True
+
+
+class Leases(Fleet):
+    """A reach that makes another link at each registration."""
+
+    def link(self, registration: Registration, facts: EngineFacts) -> Link:
+        """A new one to the robot of that name."""
+        return Lease(self.robots[registration.name])  # type: ignore[return-value,arg-type]
+
+
+@virtual
+async def test_a_start_that_comes_while_its_robot_is_registered_anew_can_be_stopped() -> None:
+    world, david = World(), Open(NEVER)
+    robots = Robots(reach=Leases(David=david))
+    async with (
+        Control.opened(world.ledger, robots, wall=wall, aside=at_once) as control,
+        anyio.create_task_group() as tasks,
+    ):
+        await control.register(Registration(name="David"), ANN)
+        await until(lambda: control.robots.robot("David").heard_at is not None)
+        world.ledger.slow = 1.0
+        tasks.start_soon(control.register, Registration(name="David", domain=3), BEN)
+        await anyio.sleep(0.5)
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+        assert control.robots.robot("David").domain == 3
+        await control.stop(run, BEN)
+        await until(lambda: run not in control.open)
+        assert (await control.find(run)).state == "stopped"
+
+
+@virtual
+async def test_a_robot_is_neither_changed_nor_forgotten_while_something_is_stopped_there() -> None:
+    david = Open(NEVER)
+    async with fleet(World(), David=david) as control:
+        await _cleaning(david, "theirs")
+        await anyio.sleep(15)
+        david.loss = 1.0
+        control.stop_robot("David", BEN)
+        with pytest.raises(Conflict, match="being stopped"):
+            await control.register(Registration(name="David", domain=3), BEN)
+        with pytest.raises(Conflict, match="being stopped"):
+            await control.remove("David", BEN)
+        david.loss = 0.0
+        await until(lambda: not control.robots.silencing.going("David"))
+        await control.remove("David", BEN)

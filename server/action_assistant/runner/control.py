@@ -159,18 +159,10 @@ class Control:
 
     async def look(self, asked: GroupRequest) -> list[Preflight]:
         """What stands between a graph and its start on each engine. Sends nothing but a get."""
-        found: dict[str, Preflight] = {}
-
-        async def look(engine: str) -> None:
-            found[engine] = await self._starting.look(asked.of(engine))
-
-        async with anyio.create_task_group() as tasks:
-            for engine in asked.engines:
-                tasks.start_soon(look, engine)
-        return [found[engine] for engine in asked.engines]
+        return await self._starting.look(asked)
 
     def _place(self, engine: str) -> anyio.Lock:
-        """One start at a time for each robot."""
+        """One start at a time for each robot, and none while it is registered anew."""
         return self._places.setdefault(engine, anyio.Lock())
 
     async def _known(self, asked: StartRequest) -> Run | None:
@@ -316,13 +308,15 @@ class Control:
 
     async def register(self, asked: Registration, author: Author) -> Robot:
         """Take a robot into the registry, or change it. Raises BadInput, Conflict, Unavailable."""
-        self._check_unused(asked.name)
-        return await self.robots.register(asked, author)
+        async with self._place(asked.name):
+            self._check_unused(asked.name)
+            return await self.robots.register(asked, author)
 
     async def remove(self, robot: str, author: Author) -> None:
         """Take a robot out of the registry. Raises NotFound, Conflict, Unavailable."""
-        self._check_unused(robot)
-        await self.robots.remove(robot, author)
+        async with self._place(robot):
+            self._check_unused(robot)
+            await self.robots.remove(robot, author)
 
     def _check_unused(self, robot: str) -> None:
         run = self._taken(robot)
@@ -330,6 +324,10 @@ class Control:
             raise Conflict(
                 f"Run {run.number} goes on {robot}; stop it first. Its Stop would get lost.",
                 where={"path": "/name", "run": run.id},
+            )
+        if self.robots.silencing.going(robot):
+            raise Conflict(
+                f"Something is being stopped on {robot}; wait until it is.", where={"path": "/name"}
             )
 
     def _foreign(self, engine: KnownEngine, command: ForeignCommand) -> Commanded:

@@ -174,8 +174,19 @@ class Starting:
             )
         return [cleared[each.engine] for each in starts]
 
-    async def look(self, asked: StartRequest) -> Preflight:
+    async def look(self, asked: GroupRequest) -> list[Preflight]:
         """Look, and tell all of it. Never raises Refused; nothing is stored or sent but a get."""
+        found: dict[str, Preflight] = {}
+
+        async def look(engine: str) -> None:
+            found[engine] = await self._look(asked.of(engine))
+
+        async with anyio.create_task_group() as tasks:
+            for engine in asked.engines:
+                tasks.start_soon(look, engine)
+        return [found[engine] for engine in asked.engines]
+
+    async def _look(self, asked: StartRequest) -> Preflight:
         items: list[Item] = []
         robot: KnownEngine | None = None
         admitted: Admitted | None = None
