@@ -161,3 +161,47 @@ async def test_a_robot_is_neither_changed_nor_forgotten_while_something_is_stopp
         david.loss = 0.0
         await until(lambda: not control.robots.silencing.going("David"))
         await control.remove("David", BEN)
+
+
+# --- starts under way -------------------------------------------------------------------------
+
+
+@virtual
+async def test_stopping_a_robot_catches_a_start_there_that_is_being_stored_and_no_other() -> None:
+    david, eve = Open(NEVER), Open(NEVER)
+    world = World()
+    async with fleet(world, David=david, Eve=eve) as control, anyio.create_task_group() as tasks:
+        world.ledger.slow = 1.0
+        for name in ("David", "Eve"):
+            tasks.start_soon(control.start, order(sequence(), engine=name), ANN)
+        await anyio.sleep(0.5)
+        assert control.stop_robot("David", BEN) == ([], [])
+        await until(lambda: len(eve.starts) == 1)
+        await anyio.sleep(2)
+        assert david.starts == []
+        ((run),) = [each.run for each in control.open.values() if each.run.end is None]
+        assert (run.engine, run.desired) == ("Eve", "running")
+
+
+@virtual
+async def test_stopping_a_group_catches_those_of_its_robots_that_are_still_to_start() -> None:
+    class Slow(Open):
+        async def start(self, order: Order) -> None:
+            """The message takes its time to leave."""
+            await anyio.sleep(2)
+            await super().start(order)
+
+    david, eve = Slow(NEVER), Open(NEVER)
+    world = World()
+    async with fleet(world, David=david, Eve=eve) as control, anyio.create_task_group() as tasks:
+        tasks.start_soon(control.start_group, group(sequence(), "David", "Eve"), ANN)
+        await until(lambda: bool(control.open))
+        (first,) = control.open.values()
+        assert first.run.group is not None
+        await control.stop(first.run.group, BEN)
+        await anyio.sleep(10)
+        assert eve.starts == []
+        assert not await david.moving(sequence().name)
+        await until(lambda: not control.open)
+        await control.start(order(sequence(), engine="Eve"), ANN)
+        assert len(eve.starts) == 1

@@ -59,6 +59,26 @@ def booked(
     return requested, Order(run=run, graph=graph, umrf=umrf, targets=targets)
 
 
+class Stops:
+    """What was stopped, and in which order: a start that was asked for before does not leave after
+    it. Robots and groups go by their names, and "" is everything."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._newest: dict[str, tuple[int, Author, str]] = {}
+
+    def note(self, what: str, author: Author, stop_id: str = "") -> None:
+        """Somebody has stopped this."""
+        self.count += 1
+        self._newest[what] = self.count, author, stop_id
+
+    def since(self, count: int, *names: str) -> tuple[Author, str] | None:
+        """The newest stop of any of these, or of everything, after so many; None without one."""
+        known = [self._newest[each] for each in ("", *names) if each in self._newest]
+        found = max(known, key=lambda each: each[0], default=None)
+        return None if found is None or found[0] <= count else found[1:]
+
+
 class Book:
     """Where starts are written down."""
 

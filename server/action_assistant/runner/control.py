@@ -16,7 +16,7 @@ from anyio.abc import TaskGroup
 from action_assistant.errors import BadInput, Conflict, Refused
 from action_assistant.runner import archive, steering
 from action_assistant.runner.admission import SIMULATOR, StartRequest
-from action_assistant.runner.booking import Book, booked
+from action_assistant.runner.booking import Book, Stops, booked
 from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.events import Author, Ended, MovesAgain
@@ -69,8 +69,7 @@ class Control:
         )
         self._robot_watchers: list[Callable[[], None]] = []
         self._number = 0
-        self._stops = 0  # how often everything was stopped
-        self._last_stop: tuple[Author, str] | None = None
+        self._stops = Stops()
 
     @classmethod
     @asynccontextmanager
@@ -108,7 +107,7 @@ class Control:
     async def start(self, asked: StartRequest, author: Author) -> Started:
         """Carry out a start, at most once per request. Raises Refused of many kinds; then nothing
         was sent. Returns after the one message has left."""
-        stops = self._stops
+        stops = self._stops.count
         async with self._book.once(asked.request_id):
             known = await self._known(asked)
             if known is not None:
@@ -123,7 +122,7 @@ class Control:
     async def start_group(self, asked: GroupRequest, author: Author) -> Grouped:
         """Start one version on several robots: all are looked at before the first message leaves.
         Raises Refused; then nothing was sent to any of them."""
-        stops = self._stops
+        stops = self._stops.count
         starts = [asked.of(engine) for engine in sorted(asked.engines)]
         if not asked.request_id or SIMULATOR in asked.engines:
             where = "/engines" if asked.request_id else "/request_id"
@@ -194,8 +193,8 @@ class Control:
         with anyio.CancelScope(shield=True):
             run = await self._book.store(requested)
             opened = self._opened(run, cleared.link, own=cleared.own, seq=1)
-            if self._stops != stops and self._last_stop is not None:
-                opened.stop(*self._last_stop)  # everything was stopped since this was asked for
+            if pressed := self._stops.since(stops, asked.engine, group or ""):
+                opened.stop(*pressed)
             self._tasks.start_soon(self._drive, opened, order, cleared.incarnation)
         await opened.published.wait()
         return opened.run
@@ -245,8 +244,7 @@ class Control:
 
     def stop_all(self, author: Author, stop_id: str = "") -> list[str]:
         """Want everything stopped; the runs that this concerns. Never waits."""
-        self._stops += 1
-        self._last_stop = (author, stop_id)
+        self._stops.note("", author, stop_id)
         runs = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
         self.robots.silence(author, self._going)
         return runs
@@ -254,6 +252,7 @@ class Control:
     def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
         """Want whatever a robot runs stopped: runs of ours, graphs of others. Raises NotFound."""
         graphs = self.robots.silence(author, self._going, name)
+        self._stops.note(name, author)
         return [run for run in self._going(name) if self._stop(run, author, "")], graphs
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
@@ -263,6 +262,7 @@ class Control:
             return [run] if self._stop(run, author, stop_id) else []
         group = [each for each, opened in tuple(self.open.items()) if opened.run.group == run]
         if group:
+            self._stops.note(run, author, stop_id)
             return [each for each in group if self._stop(each, author, stop_id)]
         await self.find(run)
         return []
