@@ -1,7 +1,8 @@
 """Robots are registered, watched and recorded; a start is looked at before anything leaves."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from typing import Any
 
 import anyio
 import msgspec
@@ -309,6 +310,31 @@ async def test_elsewhere_a_change_is_refused_before_anything_is_read_or_sent() -
             await control.modify(run.id, b"", ANN)
         control.stop_all(ANN)
         await until(lambda: not control.open)
+
+
+@virtual
+async def test_a_change_that_was_read_while_the_run_was_stopped_is_not_sent() -> None:
+    async def slowly(work: Callable[[], Any]) -> Any:
+        """A large graph."""
+        await anyio.sleep(1)
+        return work()
+
+    world = World()
+    async with Control.opened(world.ledger, Robots(), wall=wall, aside=slowly) as control:
+        run = (await control.start(order(sequence(), script=NEVER), ANN)).run
+        await anyio.sleep(1)
+        async with anyio.create_task_group() as tasks:
+
+            async def ask() -> None:
+                with pytest.raises(Conflict, match="Only a running run"):
+                    await control.modify(run.id, change(sequence(actions=2)), ANN)
+
+            tasks.start_soon(ask)
+            await anyio.sleep(0.5)
+            await control.stop(run.id, BEN)
+        await until(lambda: not control.open)
+    told = world.ledger.history(run.id)
+    assert (told.state, told.version) == ("stopped", "v1")
 
 
 @virtual

@@ -59,8 +59,7 @@ async def modify(
     """Give a running graph another structure; `body` is a ModifyRequest. Raises BadInput, Conflict,
     Unavailable."""
     run = opened.run
-    if run.state not in _MOVING or run.desired == "stopped":
-        raise Conflict(f"Only a running run can be changed; this one is {_condition(run)}.")
+    _require_moving(run)
     if not opened.pauses:
         raise Conflict(
             f"A running graph is paused to be changed, and pausing is not safe on {run.engine}; "
@@ -77,6 +76,7 @@ async def modify(
         override=asked.override,
     )
     admitted = await aside(lambda: admit(start, facts))
+    _require_moving(opened.run)  # somebody may have stopped it meanwhile
     graph = admitted.graph
     if graph.name != run.graph_name:
         raise Conflict(
@@ -93,6 +93,11 @@ async def modify(
     except EngineRefused as why:
         raise Conflict(f"The engine refuses the change: {why}") from why
     return opened.run
+
+
+def _require_moving(run: Run) -> None:
+    if run.state not in _MOVING or run.desired == "stopped":
+        raise Conflict(f"Only a running run can be changed; this one is {_condition(run)}.")
 
 
 def _condition(run: Run) -> str:
