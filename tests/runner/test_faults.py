@@ -1,13 +1,32 @@
 """A fault in one place keeps Stop from nothing: in a link, in what is kept beside runs, in what looks
 back on them. In virtual time."""
 
+from pathlib import Path
+from typing import Any
+
 import anyio
 import pytest
 
 from action_assistant.runner.links.port import Answer, Order
+from action_assistant.runner.recordings import Recordings
+from action_assistant.runner.review.desk import Desk
+from action_assistant.runner.review.retention import Retention
+from action_assistant.runner.review.shelf import Shelf
+from action_assistant.settings import Keep
 from runner.fleet import Open
 from runner.test_robots import NEVER, fleet
-from runner.world import ANN, BEN, World, order, sequence, until, virtual
+from runner.world import (
+    ANN,
+    BEN,
+    World,
+    at_once,
+    live_through,
+    order,
+    sequence,
+    until,
+    virtual,
+    wall,
+)
 
 
 class Faulty(Open):
@@ -83,3 +102,71 @@ def test_a_link_that_breaks_while_a_graph_of_somebody_else_is_stopped_ends_nothi
             assert not await david.moving("cleaning")
 
     lived()
+
+
+def test_a_file_that_somebody_put_beside_recordings_ends_nothing(tmp_path: Path) -> None:
+    (tmp_path / "David").mkdir()
+    (tmp_path / "David" / "2026-11-21T10 (copy).jsonl.gz").write_bytes(b"")
+
+    async def live() -> None:
+        recordings = Recordings(tmp_path, at_once)
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(recordings.run)
+            for at in (1, 2):
+                said = Answer(
+                    asked_at=at, at=at, incarnation="life", graphs=(), texts={"a": f"{at}"}
+                )
+                recordings.heard("David", said)
+                await anyio.sleep(5)
+            tasks.cancel_scope.cancel()
+        assert len(await recordings.listed("David")) == 2
+        assert (tmp_path / "David" / "2026-11-21T10 (copy).jsonl.gz").exists()
+
+    live_through(live)
+
+
+def test_a_recording_that_cannot_be_looked_at_does_not_end_what_puts_old_ones_away(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "recordings" / "David").mkdir(parents=True)
+    (tmp_path / "recordings" / "David" / "2026-11-21T10.jsonl.gz").symlink_to("nowhere")
+
+    async def live() -> None:
+        retention = Retention(
+            World().ledger,  # type: ignore[arg-type] - nothing of it is asked
+            Recordings(tmp_path / "recordings", at_once),
+            Keep(folder=tmp_path, raw=1),
+            is_open=lambda _: False,
+            wall=wall,
+            aside=at_once,
+        )
+        retention._left_over = False
+        with anyio.move_on_after(3 * 3_600) as waited:
+            await retention.run()
+        assert waited.cancelled_caught
+        assert "nowhere" in caplog.text or "No such file" in caplog.text
+
+    live_through(live)
+
+
+@virtual
+async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_not() -> None:
+    world = World()
+    async with world.runner() as control, anyio.create_task_group() as tasks:
+        shelf = Shelf(world.ledger, Path("nowhere"), at_once)  # type: ignore[arg-type]
+        desk = Desk(control, shelf, at_once, wall)
+        reel, failed = desk.reels.reel, []
+
+        async def fails_once(run: str) -> Any:
+            if not failed:
+                failed.append(run)
+                raise ZeroDivisionError
+            return await reel(run)
+
+        desk.reels.reel = fails_once  # type: ignore[method-assign]
+        tasks.start_soon(desk.run)
+        for _ in range(2):
+            run = (await control.start(order(sequence(actions=1)), ANN)).run
+            await until(lambda run=run: run.id not in control.open)
+        await until(lambda: len([each for each in world.ledger.streams if "about/" in each]) == 2)
+        tasks.cancel_scope.cancel()

@@ -106,9 +106,9 @@ class Recordings:
             try:
                 await self._aside(partial(self._write, lines))
                 told = False
-            except OSError as error:
+            except Exception:
                 if not told:
-                    log.warning("recordings of robots cannot be written: %s", error)
+                    log.exception("recordings of robots cannot be written")
                 told = True
 
     def _write(self, lines: Iterable[tuple[str, int, bytes]]) -> None:
@@ -128,12 +128,14 @@ class Recordings:
     def due(self, kept_days: float) -> list[Path]:
         """What has been kept long enough: by age, then by what all of it takes; the oldest first.
         The newest hour never is."""
-        found = sorted(self._folder.glob(f"*/*{_ENDING}"), key=lambda path: path.name)
+        named = ((path, _hour_of(path)) for path in self._folder.glob(f"*/*{_ENDING}"))
+        dated = {path: hour for path, hour in named if hour is not None}
+        found = sorted(dated, key=lambda path: path.name)
         sizes = {path: path.stat().st_size for path in found}
         total = sum(sizes.values())
         due: list[Path] = []
         for path in found[:-1]:
-            age = _hour_of(found[-1]) - _hour_of(path)
+            age = dated[found[-1]] - dated[path]
             if age >= timedelta(days=kept_days) or total > self._kept_bytes:
                 due.append(path)
                 total -= sizes[path]
@@ -168,5 +170,9 @@ def hours(since: int, until: int) -> tuple[str, str]:
     return f"{first:%Y-%m-%dT%H}", f"{last:%Y-%m-%dT%H}"
 
 
-def _hour_of(path: Path) -> datetime:
-    return datetime.strptime(path.name, f"%Y-%m-%dT%H{_ENDING}").replace(tzinfo=UTC)
+def _hour_of(path: Path) -> datetime | None:
+    """None for a file that somebody else put there: it is not ours to take away."""
+    try:
+        return datetime.strptime(path.name, f"%Y-%m-%dT%H{_ENDING}").replace(tzinfo=UTC)
+    except ValueError:
+        return None

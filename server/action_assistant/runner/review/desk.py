@@ -132,13 +132,14 @@ class Desk:
     async def _sum_up(self, run_id: str) -> None:
         try:
             found = (await self.reels.reel(run_id)).keys[-1].run
-        except msgspec.DecodeError:
-            log.exception("run %s cannot be read; it is left out of sums", run_id)
-            summed = about.SummedUp(self._wall(), {})
-        else:
             good = found.end == "finished" and found.result == "on_true"
             graph = None if good else await self._graph(run_id)  # only failures have causes
             summed = await self._aside(lambda: about.sum_of(found, graph, self._wall()))
+        except Refused:
+            raise  # it will be, later
+        except Exception:  # whatever a run of long ago holds, those that go on are not ended by it
+            log.exception("run %s cannot be read; it is left out of sums", run_id)
+            summed = about.SummedUp(self._wall(), {})
         await self._ledger.append(about.stream_about(run_id), [about.draft(summed)])
 
     async def known(self, run_id: str) -> Run:

@@ -78,6 +78,9 @@ class Retention:
                 swept = await self.sweep(self.keep.runs, self.keep.raw)
             except Refused as refused:
                 swept = Swept(problems=[refused.detail])
+            except Exception as error:  # whatever lies in its folders, runs go on
+                log.exception("what is old cannot be put away")
+                swept = Swept(problems=[str(error)])
             for problem in swept.problems:
                 log.warning("%s", problem)
             if not swept.more or swept.problems:
