@@ -333,9 +333,10 @@ class Control:
     def _foreign(self, engine: KnownEngine, command: ForeignCommand) -> Commanded:
         """Somebody else has told a robot something: which run of ours that concerns."""
         self._stragglers.sent_by_others(command)
-        run = self._taken(engine.registration.name)
-        if run is not None:
-            self.open[run.id].hear_of(command)
+        runs = [each.run for each in self._going(engine.registration.name).values()]
+        for each in runs:
+            self.open[each.id].hear_of(command)
+        run = min(runs, key=lambda each: each.graph_name != command.graph, default=None)
         return Commanded(
             at=command.at,
             command=command.command,
