@@ -2,11 +2,55 @@
 that it concerns. In virtual time."""
 
 import anyio
+import msgspec
 
+from action_assistant.runner.links.port import Answer, Feedback, Order
 from action_assistant.runner.standin_wire import Quirks, Start
 from action_assistant.umrf import codec
+from runner.fleet import Open
 from runner.scene import OTHER, PATROL, Scene, asked, shown
-from runner.world import ANN, BEN, order, until, virtual
+from runner.test_robots import NEVER, fleet
+from runner.world import ANN, BEN, World, order, sequence, until, virtual
+
+
+class Overtaken(Open):
+    """A robot whose next answer is on its way for a while when `slow`."""
+
+    slow = False
+
+    async def start(self, order: Order) -> None:
+        """The message takes longer than a question does."""
+        await super().start(order)
+        self.slow = True
+
+    async def get(self) -> Answer:
+        """As of when it was asked."""
+        answer = await super().get()
+        if self.slow:
+            self.slow = False
+            await anyio.sleep(0.8)
+        return answer
+
+    async def show(self) -> None:
+        """Feedback, of how it is now."""
+        held = (await self.engine.get()).graphs
+        seen = tuple(msgspec.structs.replace(each, source="feedback") for each in held)
+        self.tell(Feedback(actor="David", snapshots=seen))
+
+
+@virtual
+async def test_an_answer_from_before_the_start_ends_no_run_that_was_shown_meanwhile() -> None:
+    david = Overtaken(NEVER)
+    async with fleet(World(), David=david) as control, anyio.create_task_group() as tasks:
+        david.tasks, david.start_delay = tasks, 0.05
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await anyio.sleep(0.3)
+        await david.show()
+        assert shown(control, run).state == "running"
+        await anyio.sleep(5)
+        assert (shown(control, run).state, shown(control, run).alarms) == ("running", [])
+        await control.stop(run, BEN)
+        await until(lambda: not control.open)
 
 
 @virtual

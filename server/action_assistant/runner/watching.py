@@ -74,6 +74,7 @@ class Watch:
         self._order = itertools.count(1)
         self._stop_sent: int | None = None
         self._disturbed = 0
+        self._begun = 0  # when feedback was the first to show it
         self._sent: Graph | None = None  # until it was compared with what the engine shows
         self._answered = False  # by a get, since the last feedback
         self._rest = Rest(exact=exact)
@@ -102,6 +103,8 @@ class Watch:
         """Feedback of this run, oldest first. That of others says nothing about an answer to us."""
         if not ours:
             return
+        if self._it.run.graph_state is None:
+            self._begun = next(self._order)
         overtaken, self._answered = self._answered, False
         self.seen_at = self._wall()
         if news := fresh(self._it.run, ours) if overtaken else ours:
@@ -149,7 +152,8 @@ class Watch:
                 self._hear_nothing(_SEVERAL.format(servers=servers))
                 return
             self._heard_at = anyio.current_time()
-            self._missing(own, answer)
+            if order >= self._begun:
+                self._missing(own, answer)
             return
         self._heard_at, self.seen_at, self._answered = anyio.current_time(), answer.at, True
         if self._it.run.incarnation is None:  # the runner died between sending and noting it
