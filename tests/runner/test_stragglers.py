@@ -125,6 +125,35 @@ async def test_a_runner_that_was_restarted_meanwhile_stops_it() -> None:
 
 
 @virtual
+async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_one_of_ours() -> None:
+    here = scene()
+    read = here.world.ledger.read
+
+    async def slowly(*given: Any, **more: Any) -> Any:
+        """A journal on a busy disk."""
+        await anyio.sleep(0.2)
+        return await read(*given, **more)
+
+    async with anyio.create_task_group() as wind:
+        wind.start_soon(here.air.blow)
+        async with here.world.runner() as control:
+            await anyio.sleep(0.5)
+            run = (await control.start(asked(), ANN)).run.id
+            await until(lambda: "Work_0" in control.open[run].run.active)
+        here.world.ledger.read = slowly  # type: ignore[method-assign]
+        async with here.world.runner() as control:
+            await until(lambda: run in control.open)
+            await until(lambda: not control.open[run].run.active)  # the next one is being loaded
+            await control.stop(run, BEN)
+            await until(lambda: run not in control.open)
+            await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
+            await until(lambda: run in control.open, patience=3)
+            await until(lambda: run not in control.open)
+            assert (await control.find(run)).state == "stopped"
+        wind.cancel_scope.cancel()
+
+
+@virtual
 async def test_feedback_that_an_answer_contradicts_opens_nothing() -> None:
     here = scene(quirks=Quirks(), script={"*": [{"never": True}]})
     async with here.played() as control:

@@ -121,11 +121,11 @@ class Stragglers:
         found = await self._known(run, engine.registration.name)
         if found is None or not _is_of(found[0], engine):
             _put(self._others, run, None)
-            return
-        self._reopen(*found, self._told(found[0], shown))
+        elif found[0].end is not None:  # else it is being taken up after a restart
+            self._reopen(*found, self._told(found[0], shown))
 
     async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:
-        """A run that is over, and its last seq; None when there is no such run here, or when an
+        """A run that is not open, and its last seq; None when there is no such run here, or when an
         earlier process has recorded that somebody else played its start again."""
         if run in self._ended:
             return self._ended.pop(run)
@@ -141,7 +141,7 @@ class Stragglers:
                 played = any(
                     isinstance(each, Commanded) and run_in(each.umrf) == run for _, each in told
                 )
-                return None if played or found is None or found.end is None else (found, seq)
+                return None if played or found is None else (found, seq)
 
     def _told(self, run: Run, shown: Snapshot) -> MovesAgain:
         nodes = ", ".join(name for name, state in shown.nodes.items() if state in ACTIVE)
