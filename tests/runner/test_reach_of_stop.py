@@ -93,6 +93,22 @@ async def test_a_graph_that_somebody_started_is_shown_moving_a_second_later() ->
         assert [each.active for each in control.robots.robot("David").holds] == [True]
 
 
+@virtual
+async def test_a_stop_of_it_that_is_pressed_again_goes_on_for_another_minute() -> None:
+    david = Open(NEVER)
+    async with fleet(World(), David=david) as control:
+        await _cleaning(david, "theirs")
+        await anyio.sleep(15)
+        david.loss = 1.0
+        control.stop_robot("David", BEN)
+        await anyio.sleep(50)
+        control.stop_robot("David", BEN)
+        await anyio.sleep(20)
+        david.loss = 0.0
+        await until(lambda: not control.robots.silencing.going("David"))
+        assert not await david.moving("cleaning")
+
+
 # --- robots that are registered anew ----------------------------------------------------------
 
 

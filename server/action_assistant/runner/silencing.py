@@ -1,7 +1,8 @@
 """Stops what somebody else runs on a robot: a level, like every stop, until a get proves it.
 
-It ends by itself with the life of the engine, when a minute has brought no proof, and before a start
-from here: a late stop would hit a run that only has the same name.
+It ends by itself with the life of the engine, and when a minute since it was last asked for has
+brought no proof; no start from here leaves before: a late stop would hit a run that only has the same
+name.
 """
 
 from collections.abc import Callable, Collection
@@ -39,6 +40,7 @@ class Silencing:
         self._note = note
         self._changed = changed
         self._going: dict[tuple[str, str], str] = {}
+        self._patience: dict[tuple[str, str], anyio.CancelScope] = {}
         self._disturbed: set[tuple[str, str]] = set()  # since the last answer
 
     def trouble(self, robot: str, graph: str) -> str | None:
@@ -52,8 +54,11 @@ class Silencing:
     def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
         """Want a graph stopped. Never waits."""
         robot = engine.registration.name
+        until = anyio.current_time() + _PATIENCE_S
         if (robot, graph) in self._going:
+            self._patience[robot, graph].deadline = until
             return
+        self._patience[robot, graph] = anyio.CancelScope(deadline=until)
         self._going[robot, graph] = ""
         asked = StopAsked(at=self._wall(), graph=graph, author=author)
         self._note(robot, asked, author.id)
@@ -67,7 +72,7 @@ class Silencing:
 
     async def _stop(self, engine: KnownEngine, graph: str, robot: str) -> None:
         try:
-            with anyio.move_on_after(_PATIENCE_S):
+            with self._patience[robot, graph]:
                 told = await self._until_proven(engine, graph, robot)
                 self._note(robot, told, "")
                 return
@@ -75,6 +80,7 @@ class Silencing:
             self._note(robot, StopUnproven(at=self._wall(), graph=graph, why=why), "")
         finally:
             self._going.pop((robot, graph), None)
+            self._patience.pop((robot, graph), None)
             self._disturbed.discard((robot, graph))
             self._changed()
 
