@@ -12,7 +12,13 @@ from action_assistant.errors import BadInput, Conflict, NotFound, Refused
 from action_assistant.runner.control import Control
 from action_assistant.runner.events import EngineSaid, Override
 from action_assistant.runner.flight import Commanded, EngineBecame, StopWasProven
-from action_assistant.runner.links.port import Candidate, Order, Registration
+from action_assistant.runner.links.port import (
+    Candidate,
+    EngineRefused,
+    NotSent,
+    Order,
+    Registration,
+)
 from action_assistant.runner.live import Hub
 from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.robots import Robots
@@ -310,6 +316,39 @@ async def test_elsewhere_a_change_is_refused_before_anything_is_read_or_sent() -
             await control.modify(run.id, b"", ANN)
         control.stop_all(ANN)
         await until(lambda: not control.open)
+
+
+@pytest.mark.parametrize("why", [EngineRefused("no"), NotSent("no")])
+def test_a_change_that_was_not_made_leaves_the_version_that_runs(why: Exception) -> None:
+    class Refuses(Open):
+        pauses = True
+
+        async def modify(self, order: Order, continue_from: str = "") -> None:
+            """Not this one."""
+            raise why
+
+    @virtual
+    async def asked() -> None:
+        david, world = Refuses(NEVER), World()
+        async with fleet(world, David=david) as control:
+            run = (await control.start(order(sequence(), engine="David"), ANN)).run
+            david.texts = {run.graph_name: codec.write(sequence())}
+            await until(lambda: control.open[run.id].run.state == "running")
+            with pytest.raises(Refused, match="no"):
+                await control.modify(run.id, change(sequence(actions=4)), BEN)
+            await anyio.sleep(2)
+            now = control.open[run.id].run
+            assert (now.version, now.digest) == ("v1", run.digest)
+            assert list(now.actions) == list(run.actions)
+            assert [action.aid for action in now.actions.values()] == [
+                action.aid for action in run.actions.values()
+            ]
+            assert now.alarms == ()
+            control.stop_all(ANN)
+            await until(lambda: not control.open)
+        assert world.ledger.history(run.id).version == "v1"
+
+    asked()
 
 
 @virtual

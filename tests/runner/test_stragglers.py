@@ -125,7 +125,9 @@ async def test_a_runner_that_was_restarted_meanwhile_stops_it() -> None:
 
 
 @virtual
-async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_one_of_ours() -> None:
+async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_one_of_ours() -> (
+    None
+):
     here = scene()
     read = here.world.ledger.read
 

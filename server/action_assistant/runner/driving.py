@@ -17,6 +17,7 @@ from action_assistant.runner.events import (
     End,
     Ended,
     EngineSaid,
+    ModifyRefused,
     ModifyRequested,
     MovesAgain,
     Observed,
@@ -140,9 +141,22 @@ class OpenRun:
             umrf=order.umrf,
             continue_from=continue_from,
         )
+        before = self.run
         self.tell(asked, author.id)
+        try:
+            await self._link.modify(order, continue_from)
+        except (NotSent, EngineRefused) as why:
+            self.tell(
+                ModifyRefused(
+                    at=self._wall(),
+                    version=before.version,
+                    digest=before.digest,
+                    actions={name: action.aid for name, action in before.actions.items()},
+                    why=str(why),
+                )
+            )
+            raise
         self.watch.sends(graph)
-        await self._link.modify(order, continue_from)
         self.watch.look()
 
     @property

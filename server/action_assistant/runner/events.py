@@ -117,6 +117,19 @@ class ModifyRequested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=T
     continue_from: str = ""
 
 
+class ModifyRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """The change that was asked for last was not made: what runs is what ran before, which is told
+    here once more. `actions` are all that were known then."""
+
+    kind: ClassVar[str] = "run.modify_refused.v1"
+
+    at: int
+    version: str
+    digest: str
+    actions: dict[str, str | None]  # full name -> aid
+    why: str = ""
+
+
 class StopRequested(msgspec.Struct, frozen=True, omit_defaults=True):
     """Somebody wants the run stopped. Holds until the run has ended; nothing takes it back."""
 
@@ -218,6 +231,7 @@ RunEvent: TypeAlias = (
     | PauseRequested
     | ResumeRequested
     | ModifyRequested
+    | ModifyRefused
     | StopRequested
     | StopSent
     | Proof
@@ -239,6 +253,7 @@ _KINDS: Final[Mapping[str, type[RunEvent]]] = {
         PauseRequested,
         ResumeRequested,
         ModifyRequested,
+        ModifyRefused,
         StopRequested,
         StopSent,
         Proof,

@@ -17,6 +17,7 @@ from action_assistant.runner.events import (
     End,
     Ended,
     EngineSaid,
+    ModifyRefused,
     ModifyRequested,
     MovesAgain,
     Observed,
@@ -219,6 +220,8 @@ def follow(run: Run, event: RunEvent) -> Run:
                 digest=event.digest,
                 actions=run.actions | actions,
             )
+        case ModifyRefused():
+            return _unmodified(run, event)
         case StopRequested():
             if run.desired == "stopped":
                 return run
@@ -296,6 +299,16 @@ def _thin(run: Run, shown: Snapshot) -> Snapshot:
                 said[node] = messages
     inputs = {name: values for name, values in shown.inputs.items() if name in news}
     return replace(shown, nodes=news, messages=said, inputs=inputs, same=True)
+
+
+def _unmodified(run: Run, event: ModifyRefused) -> Run:
+    """Actions that only the change would have brought are gone again."""
+    actions = {
+        name: replace(action, aid=event.actions.get(name, action.aid))
+        for name, action in run.actions.items()
+        if name in event.actions or action.seen_at
+    }
+    return replace(run, version=event.version, digest=event.digest, actions=actions)
 
 
 def _reopen(run: Run, event: MovesAgain) -> Run:
