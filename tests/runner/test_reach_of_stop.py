@@ -182,6 +182,15 @@ async def test_a_robot_is_neither_changed_nor_forgotten_while_something_is_stopp
 # --- starts under way -------------------------------------------------------------------------
 
 
+class Slow(Open):
+    """A robot whose start takes its time to leave."""
+
+    async def start(self, order: Order) -> None:
+        """Two seconds."""
+        await anyio.sleep(2)
+        await super().start(order)
+
+
 @virtual
 async def test_stopping_a_robot_catches_a_start_there_that_is_being_stored_and_no_other() -> None:
     david, eve = Open(NEVER), Open(NEVER)
@@ -201,12 +210,6 @@ async def test_stopping_a_robot_catches_a_start_there_that_is_being_stored_and_n
 
 @virtual
 async def test_stopping_a_group_catches_those_of_its_robots_that_are_still_to_start() -> None:
-    class Slow(Open):
-        async def start(self, order: Order) -> None:
-            """The message takes its time to leave."""
-            await anyio.sleep(2)
-            await super().start(order)
-
     david, eve = Slow(NEVER), Open(NEVER)
     world = World()
     async with fleet(world, David=david, Eve=eve) as control, anyio.create_task_group() as tasks:
@@ -221,3 +224,22 @@ async def test_stopping_a_group_catches_those_of_its_robots_that_are_still_to_st
         await until(lambda: not control.open)
         await control.start(order(sequence(), engine="Eve"), ANN)
         assert len(eve.starts) == 1
+
+
+@virtual
+async def test_a_start_that_is_being_handed_over_holds_up_no_stop() -> None:
+    david = Slow(NEVER)
+    async with fleet(World(), David=david) as control, anyio.create_task_group() as tasks:
+        tasks.start_soon(control.start, order(sequence(), engine="David"), ANN)
+        await until(lambda: bool(control.open))
+        (run,) = control.open
+        await anyio.sleep(0.5)
+        began = anyio.current_time()
+        await control.stop(run, BEN)
+        await until(lambda: bool(david.stops))
+        assert david.stops[0][0] - began < 0.1
+        await anyio.sleep(5)
+        assert david.starts == []
+        assert control.open[run].run.state == "unknown"  # whether it had left cannot be told here
+        await until(lambda: not control.open)
+        assert (await control.find(run)).state == "lost"

@@ -95,6 +95,7 @@ class OpenRun:
         self._over = anyio.Event()
         self._again = anyio.Event()
         self._is_left = False
+        self._handing = anyio.CancelScope()  # while the start is handed over
         self._stop_wanted = anyio.Event()
         self._stop_ids: set[str] = {""}
         self._stop_asked: tuple[str, float] = ("", 0.0)
@@ -114,6 +115,7 @@ class OpenRun:
             self.tell(StopRequested(self._wall(), author, stop_id), author.id)
         self._stop_ids.add(stop_id)
         self._stop_wanted.set()
+        self._handing.cancel()
 
     async def pause(self, author: Author) -> None:
         """Want the run paused. Raises NotSent."""
@@ -278,8 +280,10 @@ class OpenRun:
             self.end("stopped", "Stopped before anything was sent.")
             return
         try:
-            with anyio.fail_after(5):
+            with anyio.fail_after(5), self._handing:
                 await self._link.start(order)
+            if self._handing.cancelled_caught:
+                raise TimeoutError("somebody stopped it while it was handed over")
         except (EngineRefused, NotSent, NoAnswer) as refused:
             self.end("refused", str(refused))
             return
