@@ -33,6 +33,8 @@ const TOLD: ReadonlySet<string> = new Set([
   "run.stop_requested.v1",
   "run.pause_requested.v1",
   "run.resume_requested.v1",
+  "run.modify_requested.v1",
+  "run.modify_refused.v1",
   "run.proof.v1",
   "run.silent.v1",
   "run.answered.v1",

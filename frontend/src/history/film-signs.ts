@@ -8,6 +8,8 @@ const SIGNS: Record<string, TimeSign["tone"]> = {
   "run.stop_requested.v1": "stopped",
   "run.pause_requested.v1": "stopped",
   "run.resume_requested.v1": "run",
+  "run.modify_requested.v1": "run",
+  "run.modify_refused.v1": "error",
   "run.proof.v1": "true",
   "run.alarm_raised.v1": "error",
   "run.moves_again.v1": "error",
@@ -28,6 +30,10 @@ export function wordsOf(mark: Pick<FilmMark, "kind" | "by" | "text" | "since">):
       return `${by} asked for a pause`;
     case "run.resume_requested.v1":
       return `${by} let it go on`;
+    case "run.modify_requested.v1":
+      return `${by} sent another version`;
+    case "run.modify_refused.v1":
+      return `The other version was not taken${text}`;
     case "run.stop_sent.v1":
       return `Stop message${text}`;
     case "run.proof.v1":

@@ -17,6 +17,8 @@ from action_assistant.journal.events import Event, Snapshot
 from action_assistant.runner.events import (
     AlarmRaised,
     Ended,
+    ModifyRefused,
+    ModifyRequested,
     MovesAgain,
     Observed,
     PauseRequested,
@@ -227,11 +229,11 @@ def words(told: RunEvent) -> tuple[str, str]:
     match told:
         case Requested():
             return told.author.name, told.override.reason if told.override else ""
-        case PauseRequested() | ResumeRequested() | StopRequested():
+        case PauseRequested() | ResumeRequested() | ModifyRequested() | StopRequested():
             return told.author.name, ""
         case StopSent():
             return "", told.failed or f"attempt {told.attempt}"
-        case Silent():
+        case Silent() | ModifyRefused():
             return "", told.why
         case AlarmRaised() | MovesAgain():
             return "", told.text
