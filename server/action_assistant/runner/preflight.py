@@ -13,6 +13,7 @@ from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.admission import Admitted
 from action_assistant.runner.engines import Index
 from action_assistant.runner.links.port import Answer, Standing
+from action_assistant.runner.proof import strangers
 from action_assistant.runner.runs import Run
 from action_assistant.umrf.check import STRUCTURAL, check
 from action_assistant.umrf.facts import EngineFacts
@@ -216,19 +217,15 @@ def _actions(sight: Sight, graph: Graph) -> Item:
 
 def _quiet(sight: Sight, graph: Graph) -> Item:
     """Nothing of somebody else runs there."""
-    moving = [
-        each
-        for each in sight.answer.graphs
-        if each.active and (each.run is None or each.run not in sight.open_runs)
-    ]
-    if any(each.graph == graph.name for each in moving):
+    moving = strangers(sight.answer, sight.open_runs)
+    if graph.name in moving:
         text = (
             f"A graph called {graph.name} runs on {sight.name} already, started by somebody else: "
             "the engine would refuse this one and stop that one. Stop it first."
         )
         return Item(code="quiet", verdict="blocked", text=text)
     if moving:
-        names = ", ".join(sorted({each.graph for each in moving})[:3])
+        names = ", ".join(moving[:3])
         text = f"{sight.name} runs {names}, which nobody started from here."
         return Item(code="quiet", verdict="blocked", text=text, codes=("quiet",), overridable=True)
     return Item(code="quiet", verdict="passed", text=f"Nothing else runs on {sight.name}.")

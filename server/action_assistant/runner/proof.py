@@ -2,13 +2,13 @@
 
 import hashlib
 import logging
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import anyio
 import msgspec
 
-from action_assistant.runner.links.port import Link, NotSent
+from action_assistant.runner.links.port import Answer, Link, NotSent
 from action_assistant.runner.seen import TERMINAL, Snapshot
 
 log: Final = logging.getLogger(__name__)
@@ -39,6 +39,24 @@ async def send_stop(link: Link, graph: str) -> str:
 def hash_of(shown: Sequence[Snapshot]) -> str:
     """SHA-256 over what an answer showed, for the record of a proof."""
     return hashlib.sha256(msgspec.json.encode(list(shown))).hexdigest()
+
+
+def strangers(answer: Answer, going: Collection[str]) -> list[str]:
+    """The graphs that an engine runs and that are no runs of ours `going` on there: also those of
+    which no action has begun yet, or none moves right now. Sub-graphs are named by their graph."""
+    held = {each.graph for each in answer.graphs}
+    tops = {
+        each.graph
+        for each in answer.graphs
+        if (each.active or (each.state == "RUNNING" and not _within(each.graph, held)))
+        and (each.run is None or each.run not in going)
+    }
+    return sorted(name for name in tops if not _within(name, tops))
+
+
+def _within(name: str, graphs: Collection[str]) -> bool:
+    """Whether it is a sub-graph of one of them."""
+    return any(name.startswith(f"{each}__") for each in graphs)
 
 
 class Rest:
@@ -76,3 +94,12 @@ class Rest:
         idle = any(each in _NEVER_BEGAN for graph in shown for each in graph.nodes.values())
         self._since = self._since if self._since is not None else anyio.current_time()
         return asked - self._since >= (_LOADING_S if idle else _STARTING_S)
+
+    def missing(self, parts: Sequence[Snapshot], asked: float) -> bool:
+        """After one more look, asked for at `asked`, that did not show the graph itself: an engine
+        that has just been told to start it does not show it yet."""
+        if any(each.active for each in parts):
+            self._since = None
+            return False
+        self._since = self._since if self._since is not None else anyio.current_time()
+        return self._exact or asked - self._since >= _STARTING_S

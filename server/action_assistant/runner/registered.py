@@ -19,7 +19,8 @@ from action_assistant.umrf.facts import BadProfile, facts_of
 STREAM: Final = "robots"
 
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
-_SERVICE: Final = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+#: Names in ROS 2 hold no two underscores in a row.
+_SERVICE: Final = re.compile(r"(?!.*__)/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 RobotState: TypeAlias = EngineState | Literal["no_link"]
 

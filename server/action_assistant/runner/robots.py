@@ -17,6 +17,7 @@ from action_assistant.runner.events import Author
 from action_assistant.runner.flight import Commanded, EngineBecame, FlightRecorder
 from action_assistant.runner.history import Aside, Ledger
 from action_assistant.runner.links.port import Candidate, ForeignCommand, Link, Reach, Registration
+from action_assistant.runner.proof import strangers
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.registered import (
     STREAM,
@@ -27,7 +28,7 @@ from action_assistant.runner.registered import (
     seen,
 )
 from action_assistant.runner.seen import Snapshot
-from action_assistant.runner.silencing import Silencing, wanted
+from action_assistant.runner.silencing import Silencing
 from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
 
 log: Final = logging.getLogger(__name__)
@@ -175,7 +176,8 @@ class Robots:
         told: list[str] = []
         for robot, engine in self._engines.items():
             if name in {None, robot}:
-                for graph in wanted(engine, going(robot)):
+                answer = engine.answer
+                for graph in [] if answer is None else strangers(answer, going(robot)):
                     self.silencing.stop(engine, graph, author)
                     told.append(f"{robot}: {graph}")
         return told

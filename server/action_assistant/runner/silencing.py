@@ -5,7 +5,7 @@ brought no proof; no start from here leaves before: a late stop would hit a run 
 name.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from typing import Final
 
 import anyio
@@ -128,27 +128,4 @@ def _at_rest(answer: Answer, graph: str, rest: Rest, asked: float) -> bool:
     """Whether neither the graph nor a sub-graph of it moves, or will by itself."""
     own = [each for each in answer.graphs if each.graph == graph]
     parts = [each for each in answer.graphs if each.graph.startswith(f"{graph}__")]
-    if not own:
-        return not any(each.active for each in parts)
-    return rest.seen([*own, *parts], asked)
-
-
-def wanted(engine: KnownEngine, going: Collection[str]) -> list[str]:
-    """The graphs that an engine runs and that are no runs of ours going on there: also those of
-    which no action has begun yet."""
-    answer = engine.answer
-    if answer is None:
-        return []
-    held = {each.graph for each in answer.graphs}
-    tops = {
-        each.graph
-        for each in answer.graphs
-        if (each.active or (each.state == "RUNNING" and not _within(each.graph, held)))
-        and (each.run is None or each.run not in going)
-    }
-    return sorted(name for name in tops if not _within(name, tops))
-
-
-def _within(name: str, graphs: Collection[str]) -> bool:
-    """Whether it is a sub-graph of one of them."""
-    return any(name.startswith(f"{each}__") for each in graphs)
+    return rest.seen([*own, *parts], asked) if own else rest.missing(parts, asked)

@@ -105,17 +105,43 @@ class Outlets:
         self.pause = Outlet(publish(UmrfGraphPause, topics.pause, each))
         self.resume = Outlet(publish(UmrfGraphResume, topics.resume, each))
         self.modify = Outlet(publish(UmrfGraphModify, topics.modify, each))
-        self._stopping: dict[str, set[str]] = {}
+        self._stopping: dict[str, _Stops] = {}
 
     async def send_stop(self, graph: str, target: str) -> None:
         """Publish a stop. Those of one graph that wait for their turn leave as one message, with
-        every robot as a target."""
-        self._stopping.setdefault(graph, set()).add(target)
+        every robot as a target; when that cannot be published, all of them learn it."""
+        stops = self._stopping.setdefault(graph, _Stops())
+        stops.targets.append(target)
 
         def gathered() -> UmrfGraphStop | None:
-            targets = self._stopping.pop(graph, None)
-            if targets is None:  # a message before this one has taken the target along
+            if stops.left:  # a message before this one has taken the target along
                 return None
-            return UmrfGraphStop(umrf_graph_name=graph, targets=sorted(targets))
+            self._close(graph, stops)
+            return UmrfGraphStop(umrf_graph_name=graph, targets=sorted(set(stops.targets)))
 
-        await self.stop.send(gathered)
+        try:
+            await self.stop.send(gathered)
+        except anyio.get_cancelled_exc_class():
+            stops.targets.remove(target)  # it would hit a later run of that name
+            if not stops.targets:
+                self._close(graph, stops)
+            raise
+        except Exception as error:
+            stops.failed = error
+            raise
+        if stops.failed is not None:
+            raise stops.failed
+
+    def _close(self, graph: str, stops: "_Stops") -> None:
+        stops.left = True
+        if self._stopping.get(graph) is stops:
+            del self._stopping[graph]
+
+
+class _Stops:
+    """Stops of one graph that leave as one message."""
+
+    def __init__(self) -> None:
+        self.targets: list[str] = []
+        self.left = False
+        self.failed: Exception | None = None

@@ -19,6 +19,7 @@ from action_assistant.runner.links.port import (
     EngineRefused,
     EngineState,
     NoAnswer,
+    NotSent,
     Order,
     Report,
     Standing,
@@ -95,8 +96,9 @@ class SimulatorLink:
             self._tell(self._engine.resume(graph_name, self._now(), continue_from=continue_from))
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Change the graph at this moment. Raises EngineRefused."""
-        self._alive()
+        """Change the graph at this moment. Raises NotSent, EngineRefused."""
+        if self._dead is not None:
+            raise NotSent(self._dead)
         try:
             self._tell(self._engine.modify(order.graph, self._now(), continue_from=continue_from))
         except semantics.EngineRefused as refused:

@@ -1,0 +1,43 @@
+"""What proves that nothing moves: a look that lasts, and graphs of others that are not overlooked."""
+
+import anyio
+
+from action_assistant.runner.links.port import Answer
+from action_assistant.runner.proof import Rest, strangers
+from action_assistant.runner.seen import Snapshot
+from runner.world import virtual
+
+
+def held(graph: str, state: str, work: str, run: str | None = None) -> Snapshot:
+    return Snapshot(at=0, graph=graph, state=state, nodes={"Work_0": work}, run=run)
+
+
+def answer(*graphs: Snapshot) -> Answer:
+    return Answer(asked_at=0, at=0, incarnation="life", graphs=graphs)
+
+
+def test_a_graph_of_others_that_may_go_on_by_itself_is_one_that_runs() -> None:
+    between = held("theirs", "RUNNING", "FINISHED")
+    assert strangers(answer(between, held("over", "FINISHED", "FINISHED")), ()) == ["theirs"]
+
+
+def test_sub_graphs_are_named_by_their_graph_and_our_own_runs_not_at_all() -> None:
+    found = answer(
+        held("theirs", "RUNNING", "RUNNING"),
+        held("theirs__part", "RUNNING", "RUNNING"),
+        held("ours", "RUNNING", "RUNNING", run="r1"),
+        held("late", "STOPPED", "RUNNING", run="r2"),
+    )
+    assert strangers(found, {"r1"}) == ["late", "theirs"]
+
+
+@virtual
+async def test_a_graph_that_one_look_did_not_show_is_looked_for_again() -> None:
+    rest = Rest(exact=False)
+    assert not rest.missing((), anyio.current_time())
+    await anyio.sleep(0.2)
+    assert not rest.missing((held("theirs__part", "RUNNING", "RUNNING"),), anyio.current_time())
+    await anyio.sleep(0.2)
+    assert not rest.missing((), anyio.current_time())
+    await anyio.sleep(0.5)
+    assert rest.missing((), anyio.current_time())
