@@ -8,15 +8,21 @@ import { asJsonText } from "./values";
 
 const FIELDS = { in: "input_parameters", out: "output_parameters" } as const;
 
-/** Sets the text of a parameter that exists. False when it does not, or when `text` is no JSON. */
+/**
+ * Sets the text of a parameter that exists, from what it is now: a form may show it a moment older.
+ * False when it does not exist, or when what comes of it is no JSON.
+ */
 export function setParameter(
   doc: Y.Doc,
   key: Key,
   side: Side,
   path: string,
-  text: JsonText,
+  change: (now: JsonText) => JsonText,
 ): boolean {
-  if (!exists(doc, key, side, path) || asJsonText(text) === undefined) return false;
+  if (!exists(doc, key, side, path)) return false;
+  const now = asJsonText(rootOf(doc, "actions").get(parameterKey(key, side, path)));
+  const text = change(now ?? "null");
+  if (asJsonText(text) === undefined) return false;
   together(doc, () => {
     put(doc, "actions", parameterKey(key, side, path), text);
     erase(doc, "actions", extraKey(key, FIELDS[side]));

@@ -174,7 +174,7 @@ test("edits of what a colleague deleted do nothing and say so", () => {
   const edits = () => [
     rename(doc, a, "N"),
     setField(doc, a, "type", "t"),
-    setParameter(doc, a, "in", "x", "2"),
+    setParameter(doc, a, "in", "x", () => "2"),
     addParameter(doc, a, "in", "y", "2"),
     removeParameter(doc, a, "in", "x"),
     setResponse(doc, id, "on_true", "stop"),

@@ -180,8 +180,8 @@ test("an imported value that did not fit gives way to the first edit of its fiel
 test("parameters keep their text and their order", () => {
   const [doc, a] = docWith("A") as [Y.Doc, Key];
   for (const path of ["z", "a", "m"]) addParameter(doc, a, "in", path, "1.0");
-  expect(setParameter(doc, a, "in", "a", '{"pvf_value": 5.0}')).toBe(true);
-  expect(setParameter(doc, a, "in", "a", "{no json")).toBe(false);
+  expect(setParameter(doc, a, "in", "a", () => '{"pvf_value": 5.0}')).toBe(true);
+  expect(setParameter(doc, a, "in", "a", () => "{no json")).toBe(false);
   expect(addParameter(doc, a, "in", "a", "1")).toBe(false);
   expect(renameParameter(doc, a, "in", "a", "z")).toBe(false);
   expect(renameParameter(doc, a, "in", "a", "b")).toBe(true);
@@ -191,6 +191,18 @@ test("parameters keep their text and their order", () => {
     { path: "b", text: '{"pvf_value": 5.0}' },
     { path: "m", text: "1.0" },
     { path: "0", text: "2" },
+  ]);
+});
+
+test("a change of a parameter keeps what a colleague has changed of it meanwhile", () => {
+  const [doc, a] = docWith("A") as [Y.Doc, Key];
+  addParameter(doc, a, "in", "x", '{"pvf_type": "number"}');
+  const ben = copyOf(doc);
+  setParameter(ben, a, "in", "x", (now) => now.replace("}", ', "pvf_locked": true}'));
+  exchange(doc, ben);
+  setParameter(doc, a, "in", "x", (now) => now.replace("}", ', "pvf_value": 1.0}'));
+  expect(actionOf(doc, a)?.inputs).toEqual([
+    { path: "x", text: '{"pvf_type": "number", "pvf_locked": true, "pvf_value": 1.0}' },
   ]);
 });
 

@@ -91,7 +91,7 @@ export function ParameterField({ owner, side, parameter, name, others }: Props) 
         name={pathWords(parameter.path)}
         field={field}
         parameter={parameter}
-        write={(text) => setParameter(doc, owner, side, parameter.path, text)}
+        write={(change) => setParameter(doc, owner, side, parameter.path, change)}
       />
       {open && (
         <ParameterSettings
@@ -111,7 +111,7 @@ interface ValueProps {
   name: string;
   field: Field;
   parameter: Parameter;
-  write: (text: string) => void;
+  write: (change: (now: string) => string) => void;
 }
 
 /** The value, as the form field that fits its type. */
@@ -131,7 +131,7 @@ function Value({ label, name, field, parameter, write }: ValueProps) {
             return "This is no JSON.";
           }
         }}
-        onCommit={write}
+        onCommit={(draft) => write(() => draft)}
       />
     );
   }
@@ -150,7 +150,7 @@ function Value({ label, name, field, parameter, write }: ValueProps) {
             { value: "", label: "not given" },
           ]}
           value={value}
-          onChange={(next) => write(withValue(parameter.text, next === "" ? null : next))}
+          onChange={(next) => write((now) => withValue(now, next === "" ? null : next))}
         />
       </fieldset>
     );
@@ -164,7 +164,7 @@ function Value({ label, name, field, parameter, write }: ValueProps) {
         clearable
         data={field.allowed.map((item) => ({ value: item, label: item }))}
         value={field.value}
-        onChange={(next) => write(withValue(parameter.text, next))}
+        onChange={(next) => write((now) => withValue(now, next))}
       />
     );
   }
@@ -180,7 +180,7 @@ function Value({ label, name, field, parameter, write }: ValueProps) {
       check={(draft) => complaint(field, draft)}
       onCommit={(draft) => {
         const result = typed(native, draft);
-        if ("ok" in result) write(withValue(parameter.text, result.ok));
+        if ("ok" in result) write((now) => withValue(now, result.ok));
       }}
       rightSection={
         native === "string" && field.value !== null ? (
@@ -188,7 +188,7 @@ function Value({ label, name, field, parameter, write }: ValueProps) {
             <ActionIcon
               size="sm"
               aria-label={`Take the value of ${name} away`}
-              onClick={() => write(withValue(parameter.text, null))}
+              onClick={() => write((now) => withValue(now, null))}
             >
               <IconBackspace size={14} />
             </ActionIcon>

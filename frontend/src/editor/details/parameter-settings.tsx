@@ -23,9 +23,10 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
   const { doc } = useBench();
   const field = fieldOf(parameter.text);
   const name = pathWords(parameter.path);
-  const write = (text: string) => setParameter(doc, owner, side, parameter.path, text);
+  const write = (change: (now: string) => string) =>
+    setParameter(doc, owner, side, parameter.path, change);
   const retype = (type: string) => {
-    if (type.trim() !== "" && type !== field.type) write(withType(parameter.text, type.trim()));
+    if (type.trim() !== "" && type !== field.type) write((now) => withType(now, type.trim()));
   };
   return (
     <section className={style.adding} aria-label={`What the parameter ${name} is`}>
@@ -56,8 +57,10 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
             return "wrong" in result ? result.wrong : null;
           }}
           onCommit={(draft) => {
-            const result = withAllowed(parameter.text, draft);
-            if ("ok" in result && result.ok !== null) write(result.ok);
+            write((now) => {
+              const result = withAllowed(now, draft);
+              return "ok" in result && result.ok !== null ? result.ok : now;
+            });
           }}
         />
       )}
@@ -65,14 +68,20 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
         label="Required"
         description="The action does not run without a value"
         checked={field.required}
-        onChange={(event) => write(withRequired(parameter.text, event.currentTarget.checked))}
+        onChange={(event) => {
+          const required = event.currentTarget.checked;
+          write((now) => withRequired(now, required));
+        }}
       />
       {side === "in" && (
         <Switch
           label="Locked"
           description="Outputs of other actions never replace the value"
           checked={field.locked}
-          onChange={(event) => write(withLock(parameter.text, event.currentTarget.checked))}
+          onChange={(event) => {
+            const locked = event.currentTarget.checked;
+            write((now) => withLock(now, locked));
+          }}
         />
       )}
       <Group gap="xs">
