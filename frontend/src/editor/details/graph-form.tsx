@@ -36,7 +36,7 @@ export function GraphForm() {
         placeholder="night shift, demo …"
         maxTags={20}
         value={labelsOf(graph)}
-        onChange={(labels) => setLabels(doc, graph, labels)}
+        onChange={(labels) => setLabels(doc, labels)}
       />
       <p className={style.hint}>
         {graph.actions.length === 1 ? "1 action" : `${graph.actions.length} actions`},{" "}

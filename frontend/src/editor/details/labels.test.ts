@@ -8,11 +8,11 @@ test("labels come and go, and what a file keeps beside them stays as it is spell
   const doc = new Y.Doc();
   const read = () => readGraph(mapsOf(doc));
   const meta = doc.getMap<string>("meta");
-  setLabels(doc, read(), ["night", " night", "demo", " "]);
+  setLabels(doc, ["night", " night", "demo", " "]);
   expect(labelsOf(read())).toEqual(["night", "demo"]);
-  setLabels(doc, read(), []);
+  setLabels(doc, []);
   expect(meta.size).toBe(0);
   meta.set("x/gui_attributes", '{"zoom": 1.50}');
-  setLabels(doc, read(), ["a"]);
+  setLabels(doc, ["a"]);
   expect(meta.get("x/gui_attributes")).toBe('{"zoom": 1.50, "labels": ["a"]}');
 });

@@ -4,25 +4,26 @@ import { memberText, withMember } from "../../api/member";
 import { rootOf } from "../../graph/layout";
 import type { Graph } from "../../graph/model";
 import { together } from "../../graph/pen";
+import { asJsonText } from "../../graph/values";
 
 const KEY = "x/gui_attributes";
 
-function attributes(graph: Graph): string {
-  const text = graph.extra.find(([field]) => `x/${field}` === KEY)?.[1] ?? "{}";
-  return text.trimStart().startsWith("{") ? text : "{}";
+function attributes(text: string | undefined): string {
+  return text?.trimStart().startsWith("{") ? text : "{}";
 }
 
 export function labelsOf(graph: Graph): string[] {
-  const text = memberText(attributes(graph), "labels");
+  const kept = graph.extra.find(([field]) => `x/${field}` === KEY)?.[1];
+  const text = memberText(attributes(kept), "labels");
   const value: unknown = text === null ? [] : JSON.parse(text);
   return Array.isArray(value) ? value.filter((label) => typeof label === "string") : [];
 }
 
 /** Everything else that stands in `gui_attributes` stays as it is spelled. */
-export function setLabels(doc: Y.Doc, graph: Graph, labels: readonly string[]): void {
+export function setLabels(doc: Y.Doc, labels: readonly string[]): void {
   const kept = [...new Set(labels.map((label) => label.trim()).filter(Boolean))];
   const text = withMember(
-    attributes(graph),
+    attributes(asJsonText(rootOf(doc, "meta").get(KEY))),
     "labels",
     kept.length === 0 ? null : JSON.stringify(kept),
   );
