@@ -14,8 +14,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unit e2e ros-test soak soak-ros pictures bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 BIN := .venv/bin
-# How many processes share the Python tests; each test file stays with one.
-PROCESSES ?= 2
+# How many processes share the Python tests, of which many wait; each test file stays with one.
+PROCESSES ?= 3
 ROS := .venv-ros/bin
 NODE := scripts/with-node
 NPM := $(NODE) npm --prefix frontend
