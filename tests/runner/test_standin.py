@@ -109,7 +109,7 @@ def test_it_is_deaf_while_an_action_does_not_stop_and_then_answers_everything_at
     david.hear(start(sequence("two")), 3000)
     assert answers(david.advance(5000)) == {}
     said = david.advance(5200)
-    assert david.moving == ("two",)
+    assert david.moving == ("patrol", "two")  # ERROR is what it says of an action that goes on
     shown = answers(said)
     assert sorted(shown) == [0, 1, 2, 3]
     assert all(each["patrol"]["graph_state"] == "ERROR" for each in shown.values())

@@ -42,6 +42,7 @@ from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.semantics import (
     Engine,
     EngineRefused,
+    Execution,
     Script,
     Trace,
 )
@@ -101,6 +102,7 @@ class StandIn:
         self._under_way: list[Callable[[], None]] = []
         self._lingers = 0
         self._frozen = False
+        self._frozen_ms = born_ms
         self._deaf = False
         self._log("The Action Engine is initialized.")
 
@@ -118,9 +120,14 @@ class StandIn:
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """The truth: running graphs that have an action which moves or may move again."""
-        graphs = self._engine.graphs.items()
-        return tuple(name for name, graph in graphs if graph.active and not self.gone)
+        """The truth: running names of graphs in which the code of an action goes on, whatever is
+        said of it."""
+        return tuple(dict.fromkeys(each.graph for each in self.executing))
+
+    @property
+    def executing(self) -> tuple[Execution, ...]:
+        """The calls of actions' code that have not returned. A frozen one goes on when it wakes."""
+        return () if self.gone else tuple(self._engine.executing(self._awake_ms))
 
     def hear(self, message: Message, at_ms: float) -> None:
         """A command has arrived; it may wait, and be overwritten while it does."""
@@ -155,7 +162,7 @@ class StandIn:
     def freeze(self, at_ms: float) -> None:
         """Its process is stopped (SIGSTOP): it does nothing, and messages wait."""
         self._pass(at_ms)
-        self._frozen = True
+        self._frozen, self._frozen_ms = True, self._now
 
     def thaw(self, at_ms: float) -> None:
         """Its process goes on; what was due meanwhile happens now."""
@@ -197,6 +204,10 @@ class StandIn:
         """When the node and when the engine in it do something next."""
         engine = self._engine.due
         return self._tasks[0][0] if self._tasks else inf, inf if engine is None else engine
+
+    @property
+    def _awake_ms(self) -> float:
+        return self._frozen_ms if self._frozen else self._now
 
     def _later(self, wait_ms: float, task: Callable[[], None]) -> None:
         heappush(self._tasks, (self._now + wait_ms, next(self._order), task))

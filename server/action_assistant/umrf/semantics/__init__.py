@@ -2,6 +2,7 @@
 
 from action_assistant.umrf.semantics.engine import Engine, GraphNow
 from action_assistant.umrf.semantics.graphs import EngineRefused
+from action_assistant.umrf.semantics.parts import Execution
 from action_assistant.umrf.semantics.script import Behaviour, Script, script_from
 from action_assistant.umrf.semantics.simulate import simulate
 from action_assistant.umrf.semantics.trace import (
@@ -22,6 +23,7 @@ __all__ = [
     "EdgeEval",
     "Engine",
     "EngineRefused",
+    "Execution",
     "GraphNow",
     "GraphResult",
     "GraphState",

@@ -1,6 +1,6 @@
 """The engine's clockwork: what one action's end sets in motion (SPEC 2.3, 2.4, 2.9)."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
 
@@ -10,6 +10,7 @@ from action_assistant.umrf.semantics.clock import Clock, Task
 from action_assistant.umrf.semantics.parts import (
     HELD,
     Edge,
+    Execution,
     Link,
     Node,
     Outcome,
@@ -50,6 +51,13 @@ class Core(Clock):
         #: How long an action takes from its trigger to RUNNING the first time (dlopen, onInit).
         #: Meanwhile nothing counts it as active: a stop passes it by (recording engine_frozen.2).
         self.loading_ms = 0.0
+        self._executions: list[Execution] = []
+
+    def executing(self, at_ms: float) -> list[Execution]:
+        """The calls of actions' own code that have not returned by then: the truth of what moves,
+        apart from the states that the engine shows. None when its process has ended."""
+        self._executions = [each for each in self._executions if each.ends_ms > at_ms]
+        return [] if self.crashed else list(self._executions)
 
     # Results
 
@@ -213,6 +221,8 @@ class Core(Clock):
         node.calls += 1
         node.rest_ms = None
         self._state(graph, node, "RUNNING")
+        node.execution = Execution(graph.name, node.full_name, self.now)
+        self._executions.append(node.execution)
         duration = node.call.after_s * 1000
         if node.type == "spontaneous":
             duration = max(duration, 1.0)
@@ -220,6 +230,8 @@ class Core(Clock):
 
     def _let_run(self, graph: Running, node: Node, duration_ms: float) -> None:
         node.due_ms = self.now + duration_ms
+        if node.execution is not None:
+            node.execution.ends_ms = node.due_ms
         if node.due_ms < inf:
             self._at(node.due_ms, partial(self._returns, graph, node, node.token))
 
@@ -287,31 +299,39 @@ class Core(Clock):
             return
         node.token += 1
         timeout = self.now + self.facts.stop_timeout_ms
-        self._at(timeout, partial(self._stop_timed_out, graph, node, node.token))
+        self._at(timeout, partial(self._stop_failed, graph, node, node.token))
         if held and not self.facts.pauses_safely:
             message = "A paused action cannot be stopped: ERROR after 5 s, and its thread stays."
             self._hazard(graph, "H5", "goes on", message, node)
-            node.busy_until = inf
+            self._stop_code(node, held)
+            node.busy_until = inf  # also when its code has returned: it waits to be resumed
         elif node.subgraph is not None:
             self._soon(partial(self._stop_sub, node))
         else:
-            self._ask_to_stop(graph, node, held)
+            node.busy_until = ends = self._stop_code(node, held)
+            if ends < inf:
+                self._at(ends, partial(self._stopped, graph, node, node.token))
+        if node.call.stop_error and node.subgraph is None:
+            self._soon(partial(self._stop_failed, graph, node, node.token))
 
-    def _ask_to_stop(self, graph: Running, node: Node, held: bool) -> None:
+    def _stop_code(self, node: Node, held: bool) -> float:
+        """`onStop`: when the action's own code returns now."""
         ends = self.now + node.rest_ms if held and node.rest_ms is not None else node.due_ms
         if ends is None:
             ends = inf
         if not node.call.ignores_stop:
             ends = min(ends, self.now + node.call.stop_s * 1000)
-        if ends < inf:
-            self._at(ends, partial(self._stopped, graph, node, node.token))
-        node.busy_until = ends
+        if node.execution is not None and node.execution.ends_ms > self.now:
+            node.execution.ends_ms = ends
+        return ends
 
     def _stopped(self, graph: Running, node: Node, token: int) -> None:
         if node.token == token:
             self._ended(graph, node, "on_stopped")
 
-    def _stop_timed_out(self, graph: Running, node: Node, token: int) -> None:
+    def _stop_failed(self, graph: Running, node: Node, token: int) -> None:
+        """`onStop` threw, or the engine has waited for five seconds: it says ERROR, while the code of
+        the action goes on. When that returns, its children hear of it as of any other result."""
         if node.token != token or node.state != "STOPPING":
             return
         node.token += 1
@@ -319,6 +339,12 @@ class Core(Clock):
         self._state(graph, node, "ERROR")
         self._result(graph, node, "on_error")
         self._inform(graph, node, "on_error")
+        if self.now < node.busy_until < inf:
+            self._at(node.busy_until, partial(self._returned_late, graph, node, node.token))
+
+    def _returned_late(self, graph: Running, node: Node, token: int) -> None:
+        if node.token == token and self.graphs.get(graph.name) is graph:
+            self._inform(graph, node, _OUTCOMES[node.call.result])
 
     def _stop_downstream(self, graph: Running, node: Node, then: Task) -> None:
         """What a spontaneous action does to everything that it leads to before it informs."""
@@ -336,13 +362,13 @@ class Core(Clock):
         for other in linked:
             if other.active and other.state != "STOPPING":
                 self._stop_node(graph, other)
-        self._wait(linked, self.facts.stop_poll_ms, then)
+        self._wait(lambda: any(n.active for n in linked), self.facts.stop_poll_ms, then)
 
-    def _wait(self, nodes: list[Node], poll_ms: int, then: Task) -> None:
-        """Asks every `poll_ms` whether none of these is active any more."""
+    def _wait(self, going: Callable[[], bool], poll_ms: int, then: Task) -> None:
+        """Asks every `poll_ms` whether it still goes on."""
 
         def look() -> None:
-            if any(node.active for node in nodes):
+            if going():
                 self._at(self.now + poll_ms, look)
             else:
                 then()
@@ -365,6 +391,8 @@ class Core(Clock):
         if node.due_ms is not None:
             node.rest_ms = node.due_ms - self.now
             node.token += 1
+            if node.execution is not None:
+                node.execution.ends_ms = inf
         return True
 
     # Sub-graphs; `Engine` knows how graphs start and stop

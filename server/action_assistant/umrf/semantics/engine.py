@@ -110,7 +110,7 @@ class Engine(Graphs):
                 "A thread of the graph's last run never ended: the engine waits for it for ever."
             )
             self._lock(old, "H5", message)
-        elif any(node.active for node in old.nodes.values()):
+        elif any(node.holds_thread(self.now) for node in old.nodes.values()):
             self._command(partial(self._replace, old, running))
         else:
             self._clear(old)

@@ -121,10 +121,10 @@ class Graphs(Core):
     def _replace(self, old: Running, new: Running) -> None:
         """Starts a graph again although actions of the finished one still run."""
         self._graph_state(old, "CLEARING")
-        stragglers = [node for node in old.nodes.values() if node.active]
+        stragglers = [node for node in old.nodes.values() if node.holds_thread(self.now)]
         self._busy = True
         for node in stragglers:
-            if node.state != "STOPPING":
+            if node.active and node.state != "STOPPING":
                 self._stop_node(old, node)
 
         def then() -> None:
@@ -136,7 +136,10 @@ class Graphs(Core):
             finally:
                 self._free()
 
-        self._wait(stragglers, self.facts.stop_poll_ms, then)
+        def going() -> bool:
+            return any(node.holds_thread(self.now) for node in stragglers)
+
+        self._wait(going, self.facts.stop_poll_ms, then)
 
     def _begin_graph(self, graph: Running) -> None:
         self.graphs[graph.name] = graph
@@ -183,13 +186,12 @@ class Graphs(Core):
         if graph.state not in ("RUNNING", "PAUSED", "HALTED"):
             return
         self._graph_state(graph, "STOPPING")
-        nodes = [node for node in graph.nodes.values() if node.active]
+        nodes = [n for n in graph.nodes.values() if n.active and n.state != "STOPPING"]
         graph.stop_failed = False
         for node in nodes:
-            if node.state != "STOPPING":
-                self._stop_node(graph, node)
-                if self.crashed:
-                    return
+            self._stop_node(graph, node)
+            if self.crashed:
+                return
         if not nodes:
             self._graph_stopped(graph)
             return
@@ -201,7 +203,7 @@ class Graphs(Core):
             if hold:
                 self._free()
 
-        self._wait(nodes, self.facts.stop_poll_ms, then)
+        self._wait(lambda: any(n.active for n in nodes), self.facts.stop_poll_ms, then)
 
     def _graph_stopped(self, graph: Running) -> None:
         graph.result = "on_error" if graph.stop_failed else "on_stopped"

@@ -1,6 +1,7 @@
 """Graphs in motion: nodes, edges and their run state, built from a graph value."""
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from operator import attrgetter
 from typing import TypeAlias
 
@@ -53,17 +54,34 @@ class Edge:
         self.remap = remap
 
 
+class Execution:
+    """One call of an action's own code, whatever the engine says of the action meanwhile: after five
+    seconds an engine calls one that ignores stop ERROR, and its code goes on.
+
+    `ends_ms`: when the code returns; inf while nothing will end it, also while it is held.
+    """
+
+    __slots__ = ("began_ms", "ends_ms", "graph", "node")
+
+    def __init__(self, graph: str, node: str, began_ms: float) -> None:
+        self.graph = graph
+        self.node = node
+        self.began_ms = began_ms
+        self.ends_ms = inf
+
+
 class Node:
     """An action while its graph runs.
 
     `token` counts what makes scheduled events void. `loaded`: the plugin instance lives. `due_ms`:
     when the call returns by itself, `rest_ms`: what was left of it when it was paused. `pending`: the
     result of a call that returned while paused. `returning`: it returned, its children wait.
+    `execution`: the newest call of its code.
     """
 
     __slots__ = (
         "actor", "again", "behaviours", "busy_until", "call", "calls", "children", "due_ms",
-        "failed_to_load", "full_name", "inputs", "instance_id", "key", "links", "loaded", "name", "outputs", "pending",
+        "execution", "failed_to_load", "full_name", "inputs", "instance_id", "key", "links", "loaded", "name", "outputs", "pending",
         "rest_ms", "returning", "started_ms", "state", "sub", "subgraph", "token", "type",
         "waiting_links",
     )  # fmt: skip
@@ -93,6 +111,7 @@ class Node:
         self.busy_until = -1.0
         self.pending: Outcome | None = None
         self.returning = False
+        self.execution: Execution | None = None
         self.again = 0
         self.subgraph: Graph | None = None
         self.sub: Running | None = None
@@ -101,6 +120,10 @@ class Node:
     def active(self) -> bool:
         """Whether it holds a thread."""
         return self.state in ACTIVE
+
+    def holds_thread(self, at_ms: float) -> bool:
+        """Whether a thread of its has not ended by then: also of one that was given up as ERROR."""
+        return self.active or self.busy_until > at_ms
 
     def link(self, parent: str, link: Link) -> None:
         """Adds a parent, unless an earlier listing has it."""

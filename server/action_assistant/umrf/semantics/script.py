@@ -11,8 +11,9 @@ OUTCOMES: Final = ("on_true", "on_false", "on_error")
 class Behaviour(msgspec.Struct, frozen=True, kw_only=True):
     """One call of an action. Times are seconds.
 
-    `never`: does not end by itself. `ignores_stop`: goes on until its own end. `pauses`: has an
-    onPause. `init_error`: throws when it is loaded. `outputs`: values by flat name.
+    `never`: does not end by itself. `ignores_stop`: goes on until its own end. `stop_error`: throws
+    in onStop, which the engine calls ERROR at once, whatever its code does. `pauses`: has an onPause.
+    `init_error`: throws when it is loaded. `outputs`: values by flat name.
     """
 
     after_s: float = 1.0
@@ -21,6 +22,7 @@ class Behaviour(msgspec.Struct, frozen=True, kw_only=True):
     pauses: bool = True
     never: bool = False
     ignores_stop: bool = False
+    stop_error: bool = False
     init_error: bool = False
     outputs: dict[str, Any] | None = None
     message: str | None = None
