@@ -22,6 +22,7 @@ from action_assistant.runner.events import Author, Override
 from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Quirks, Start, index_of
+from action_assistant.runner.steering import RestRequest
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import (
     ENTRY,
@@ -115,6 +116,15 @@ class Stage:
         asked = msgspec.structs.replace(asked, **override)
         return (await self.control.start(asked, ADA)).run.id
 
+    async def at_rest(self) -> None:
+        """Somebody goes there and sees that nothing moves."""
+        with anyio.fail_after(600):
+            while not any(each.run.lost for each in self.control.open.values()):  # noqa: ASYNC110
+                await anyio.sleep(0.1)
+        for run in tuple(self.control.open):
+            asked = RestRequest("I stand beside it; nothing moves.")
+            await self.control.confirm_rest(run, asked, BEN)
+
     async def over(self) -> None:
         """Wait for the end of everything."""
         with anyio.fail_after(600):
@@ -139,6 +149,7 @@ async def missing_action(stage: Stage) -> None:
     run = await stage.start(task, "unknown-action", reason="It was installed this morning.")
     await anyio.sleep(12)
     await stage.control.stop(run, ADA)
+    await stage.at_rest()
     await stage.over()
 
 
@@ -160,6 +171,7 @@ async def engine_restart(stage: Stage) -> None:
     stage.air.kill(stage.air.nodes[0])
     await anyio.sleep(16)  # discovery has to forget the dead one first
     stage.robot()
+    await stage.at_rest()
     await stage.over()
 
 

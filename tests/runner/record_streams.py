@@ -26,6 +26,7 @@ from action_assistant.runner.runs import Run, replay
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Quirks, Start, index_of
 from action_assistant.runner.starting import GroupRequest
+from action_assistant.runner.steering import RestRequest
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Graph, Parameter
 from action_assistant.umrf.semantics import script_from
@@ -70,6 +71,15 @@ class Place:
         """Ann starts it."""
         asked = order(graph, engine=engine, graph=None, request_id=graph.name, **more)
         return (await self.control.start(asked, ANN)).run.id
+
+    async def at_rest(self) -> None:
+        """Somebody goes there and sees that nothing moves."""
+        with anyio.fail_after(600):
+            while not any(each.run.lost for each in self.control.open.values()):  # noqa: ASYNC110
+                await anyio.sleep(0.1)
+        for run in tuple(self.control.open):
+            asked = RestRequest("I stand beside it; nothing moves.")
+            await self.control.confirm_rest(run, asked, BEN)
 
     async def over(self) -> None:
         """Wait for the end of everything."""
@@ -119,6 +129,7 @@ async def engine_lost(place: Place) -> None:
     place.air.kill(place.air.nodes[0])
     await anyio.sleep(16)
     place.robot("Robin")
+    await place.at_rest()
     await place.over()
 
 

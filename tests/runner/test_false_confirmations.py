@@ -25,9 +25,10 @@ from action_assistant.runner.links.port import Link
 from action_assistant.runner.runs import ENDED, State
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Pause, Quirks, Start, Stop
+from action_assistant.runner.steering import RestRequest, confirm_rest
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Graph
-from action_assistant.umrf.semantics import script_from
+from action_assistant.umrf.semantics import Execution, script_from
 from runner.air import Air, Node, now, now_ms
 from runner.air_link import AirLink
 from runner.world import ANN, BEN, World, carousel, live_through, order, sequence, two_ends
@@ -51,6 +52,12 @@ SCRIPTS: list[dict[str, Any]] = [
     {"*": [{"never": True}]},
     {"Work_0": [{"after_s": 0.5}], "*": [{"never": True, "stop_s": 1.5}]},
     {"*": [{"after_s": 8, "ignores_stop": True}]},
+    {"*": [{"after_s": 3, "ignores_stop": True}]},
+    {"*": [{"never": True, "ignores_stop": True}]},
+    {"*": [{"never": True, "stop_s": 9.0}]},
+    {"*": [{"after_s": 6, "ignores_stop": True, "stop_error": True}]},
+    {"Work_0": [{"after_s": 0.3}], "*": [{"after_s": 15, "stop_error": True, "stop_s": 12.0}]},
+    {"Work_0": [{"after_s": 0.3, "result": "on_error"}], "*": [{"never": True, "stop_s": 7.0}]},
     {"*": [{"after_s": 1, "result": "on_error"}]},
     {"Work_0": [{"after_s": 0.4}], "*": [{"after_s": 7}]},
     {"Work_0": [{"after_s": 0.1}], "*": [{"after_s": 20, "pauses": False}]},
@@ -84,6 +91,7 @@ def plot(chance: random.Random) -> list[Step]:
         (2, "made up", lambda: chance.choice(["FINISHED", "STOPPED", "RUNNING"])),
         (1, "journal", lambda: chance.random() < 0.5),
         (0.7, "crash", lambda: None),
+        (1.5, "look", lambda: None),
         (1.5, "well", lambda: None),
     ]  # fmt: skip
     drawn = chance.choices(steps, [each[0] for each in steps], k=chance.randint(8, 40))
@@ -124,6 +132,8 @@ class Story:
         self.rest_s = 18.0  # beyond the lease, any freeze, and the last to come up
         self.stuck: list[str] = []
         self.replayed: set[str] = set()  # runs that a stranger's copy of our start may begin again
+        self.looked: set[str] = set()  # runs of which a person said that they are at rest
+        self.runs: dict[Execution, str] = {}  # which run of ours a call of an action's code is of
 
     def robot(self, name: str = NAME) -> Node:
         """One more engine comes up."""
@@ -209,6 +219,8 @@ class Story:
                 self.make_up(value)
             case "journal":
                 self.world.ledger.down = value
+            case "look":
+                self.look_at_robots(control)
             case "well":
                 self.make_well()
 
@@ -221,6 +233,15 @@ class Story:
         if not node.robot.gone:
             node.robot.thaw(now_ms())
             self.air.stir(node)
+
+    def look_at_robots(self, control: Control) -> None:
+        """Somebody goes there, and says so of what is at rest where the engine's word is none."""
+        moving = self.moving()
+        for run, opened in tuple(control.open.items()):
+            if run not in moving and opened.run.graph_name not in self.names():
+                self.looked.add(run)  # what a frozen engine still has to begin nobody can see
+                with suppress(Refused):
+                    confirm_rest(opened, RestRequest("I stand beside it."), BEN)
 
     def stranger(self, what: str) -> None:
         """Somebody at a terminal."""
@@ -265,18 +286,19 @@ class Story:
     # --- the truth ----------------------------------------------------------------------------
 
     def moving(self) -> dict[str, str]:
-        """Runs of ours that really move, and where."""
+        """Runs of ours of which the code of an action really goes on, and where. What the engine says
+        of the action does not count."""
         found: dict[str, str] = {}
         for node in self.air.nodes:
-            for graph in node.robot.moving:
-                top = graph.partition("__")[0]
-                plan = node.robot._view.plans.get(top)
-                marks = list(plan.attributes.values()) if plan is not None else []
-                for mark in marks[:1]:
-                    run = mark.get("action_assistant", {}).get("run")
-                    if run:
-                        found[run] = f"{graph} on {node.process}"
+            for each in node.robot.executing:
+                if run := self.runs.setdefault(each, run_of(node.robot, each.graph)):
+                    found[run] = f"{each.graph}/{each.node} on {node.process}"
         return found
+
+    def names(self) -> set[str]:
+        """Graphs that move: one that goes on for ever keeps a run of ours of that name open, too."""
+        graphs = (graph for each in self.air.nodes for graph in each.robot.moving)
+        return {graph.partition("__")[0] for graph in graphs}
 
     def judge(self, opened: OpenRun) -> None:
         """Called at every change: what is shown must be true at that moment."""
@@ -293,7 +315,7 @@ class Story:
             where = self.moving().get(run.id)
             if where is not None:
                 self.false.append(f"{run.state} at {now()}: {where} moves")
-            elif run.id not in self.replayed:
+            elif run.id not in self.replayed | self.looked:
                 self.still[run.id] = now()
 
     def compare(self) -> None:
@@ -319,14 +341,12 @@ class Story:
             control.stop_all(BEN)
             for _ in range(2):  # feedback that nobody can contradict opens one again for a moment
                 with anyio.move_on_after(60):
-                    while control.open:  # noqa: ASYNC110 - they end by many ways
+                    while control.open:
                         await anyio.sleep(0.5)
+                        self.look_at_robots(control)
                 await anyio.sleep(5)
             moving = self.moving()
-            # A graph of the same name that goes on for ever keeps a run of ours open, too.
-            names = {
-                graph.partition("__")[0] for each in self.air.nodes for graph in each.robot.moving
-            }
+            names = self.names()
             for run, opened in control.open.items():  # it does not obey, or is blocked for ever
                 named = opened.run.graph_name in names
                 if run not in moving and not named and not self.blocked():
@@ -335,6 +355,13 @@ class Story:
     def blocked(self) -> bool:
         """Whether an engine will never answer again."""
         return any(each.robot._engine.locked for each in self.air.nodes if not each.robot.gone)
+
+
+def run_of(robot: StandIn, graph: str) -> str:
+    """The run that the graph of this running name is marked with now; "" for none of ours."""
+    plan = robot._view.plans.get(graph.partition("__")[0])
+    marks = list(plan.attributes.values()) if plan is not None else []
+    return str(marks[0].get("action_assistant", {}).get("run") or "") if marks else ""
 
 
 def lived(seed: int, link: Callable[[Air], Link] = lambda air: AirLink(air, NAME)) -> Story:

@@ -17,6 +17,7 @@ from action_assistant.runner.links.port import EngineRefused, NoAnswer, Order, R
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.runs import ENDED, State
 from action_assistant.runner.seen import ACTIVE, NodeState
+from action_assistant.runner.steering import RestRequest, confirm_rest
 from runner.world import ANN, BEN, Robot, World, engine, live_through, order, sequence, two_ends
 
 GRAPHS = {"one": sequence("one"), "two": two_ends("two")}
@@ -172,6 +173,10 @@ class Story:
             await anyio.sleep(1)
             control.stop_all(BEN)
             await anyio.sleep(60)
+            for opened in tuple(control.open.values()):
+                if not await self.robot.moving(opened.run.graph_name):  # nor does its engine say so
+                    confirm_rest(opened, RestRequest("I stand beside it."), BEN)
+            await anyio.sleep(1)
             for opened in control.open.values():  # the engine does not obey once it has finished
                 assert opened.run.state == "stopping"
                 assert await self.robot.moving(opened.run.graph_name)

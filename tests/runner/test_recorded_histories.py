@@ -48,9 +48,13 @@ def check(run: Run, told: Index, name: str) -> None:
 def check_end(run: Run, told: Index, name: str) -> None:
     last = (told.last or {}).get(run.graph_name)
     if name.startswith(_TAKEN):
-        assert run.end in {"lost", "finished", "error"}
+        assert run.state in {"lost", "finished", "error", "stopping", "unknown"}
+        assert run.proof_at is None or run.end == "finished"
     elif not told.polled or last not in _ENDS:
         assert run.state not in ENDED - {"lost"}  # no answer has ever proven an end
+    elif last == "ERROR":
+        assert run.end is None  # the code of its actions may go on
+        assert run.unconfirmed
     else:
         assert run.end == _ENDS[last] or (name.startswith(_SHORT) and run.end is None)
         assert run.graph_state == last

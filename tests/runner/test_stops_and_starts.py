@@ -172,7 +172,7 @@ async def test_an_action_that_begins_after_the_stop_keeps_the_run_from_being_cal
 
 
 @virtual
-async def test_a_restarted_engine_ends_the_run_as_lost_and_says_look_at_the_robot() -> None:
+async def test_with_a_restarted_engine_the_run_is_lost_and_it_says_look_at_the_robot() -> None:
     scene = Scene(3)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
@@ -180,9 +180,9 @@ async def test_a_restarted_engine_ends_the_run_as_lost_and_says_look_at_the_robo
         scene.air.kill(scene.nodes["David"])
         await anyio.sleep(1)
         scene.robot("David")
-        await until(lambda: run not in control.open)
+        await until(lambda: shown(control, run).state == "lost")
         told = await control.find(run)
-        assert told.state == "lost"
+        assert told.end is None  # its code may go on, wherever the process is
         assert "look at the robot" in " ".join(each.text for each in told.alarms)
         assert len(scene.starts()) == 1
 

@@ -289,9 +289,11 @@ class Robot:
         """The engine goes on."""
 
     async def moving(self, graph: str) -> bool:
-        """The truth."""
+        """The truth: whether the code of one of its actions goes on, whatever the engine says."""
         answer = await self.engine.get()
-        return any(each.graph == graph and each.active for each in answer.graphs)
+        inside = self.engine._engine
+        going = any(each.graph == graph for each in inside.executing(inside.now))
+        return going or any(each.graph == graph and each.active for each in answer.graphs)
 
 
 def engine(script: dict[str, Any] | None = None) -> SimulatorLink:

@@ -16,16 +16,22 @@ from sqlalchemy import Row
 from action_assistant.errors import BadInput, TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive, robots_api, shapes
-from action_assistant.runner.admission import SIMULATOR, read_request
+from action_assistant.runner.admission import SIMULATOR, decoded, read_request
 from action_assistant.runner.asking import author_of
 from action_assistant.runner.control import Control
-from action_assistant.runner.described import ModifyOperation, StartOperation, StopOperation
+from action_assistant.runner.described import (
+    ModifyOperation,
+    RestOperation,
+    StartOperation,
+    StopOperation,
+)
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.live import Hub, Stopping, attend
 from action_assistant.runner.review import routes as review
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.runs import State
+from action_assistant.runner.steering import RestRequest
 from action_assistant.web.access import Needs, person_of, refuse, require
 from action_assistant.web.crowd import Crowd
 
@@ -149,7 +155,18 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
         body = await request.body()
         return shapes.shown(await house.control.modify(run, body, author_of(request)))
 
-    return [stop_all, stop, pause, resume, modify]
+    @post(
+        "/api/runs/{run:str}/at_rest",
+        status_code=200,
+        summary="Confirm that a run is at rest which no answer of its engine can prove so",
+        operation_class=RestOperation,
+        guards=[Needs("operate")],
+    )
+    async def at_rest(run: str, request: _Asking) -> shapes.RunShown:
+        asked = decoded(await request.body(), RestRequest)
+        return shapes.shown(await house.control.confirm_rest(run, asked, author_of(request)))
+
+    return [stop_all, stop, pause, resume, modify, at_rest]
 
 
 def _reads(house: House) -> list[ControllerRouterHandler]:

@@ -91,13 +91,12 @@ def fold(event: Event) -> Sequence[Executable]:
         case MovesAgain() as again_:
             return _open_again(event.stream.removeprefix("run/"), again_)
         case Ended() as end:
+            summary = func.json_set(run.c.summary, "$.detail", end.detail)
+            if end.at_rest is not None:
+                seen = msgspec.json.encode(end.at_rest).decode()
+                summary = func.json_set(summary, "$.at_rest", func.json(seen))
             return (
-                change.values(
-                    state=end.state,
-                    ended_at=end.at,
-                    result=end.result,
-                    summary=func.json_set(run.c.summary, "$.detail", end.detail),
-                ),
+                change.values(state=end.state, ended_at=end.at, result=end.result, summary=summary),
             )
         case _:
             return ()
@@ -107,7 +106,7 @@ def _open_again(id_: str, moves: MovesAgain) -> Sequence[Executable]:
     """A run that was over is not; its sum is made anew at its next end."""
     text = msgspec.json.encode({"code": "moves_again", "at": moves.at, "text": moves.text})
     more = func.json_insert(run.c.summary, "$.alarms[#]", func.json(text.decode()))
-    summary = func.json_remove(more, "$.proof_at", "$.unknown_since", "$.detail")
+    summary = func.json_remove(more, "$.proof_at", "$.unknown_since", "$.detail", "$.at_rest")
     values = {"state": _OPEN, "ended_at": None, "summary": summary}
     return (
         update(run).where(run.c.id == id_).values(**values),

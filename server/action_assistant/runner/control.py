@@ -27,7 +27,7 @@ from action_assistant.runner.links.port import ForeignCommand, Link, Order, Regi
 from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.registered import Robot
 from action_assistant.runner.robots import Ground, Robots
-from action_assistant.runner.runs import ENDED, Run
+from action_assistant.runner.runs import Run
 from action_assistant.runner.starting import Cleared, Grouped, GroupRequest, Started, Starting
 from action_assistant.runner.stragglers import Stragglers
 from action_assistant.umrf.facts import SIMULATED
@@ -63,6 +63,7 @@ class Control:
             aside=aside,
             taken=self._taken,
             going=self._going,
+            is_settled=self._is_settled,
         )
         self._stragglers = Stragglers(
             self.open, self.history, robots, self._tasks, wall=wall, reopen=self._reopen
@@ -171,6 +172,16 @@ class Control:
     def _taken(self, engine: str) -> Run | None:
         """The run that an engine has from here."""
         return next((each.run for each in self._going(engine).values()), None)
+
+    async def _is_settled(self, run: str) -> bool:
+        """Whether somebody has seen a run of ours at rest that its engine calls ERROR. A start that
+        others played again is theirs."""
+        try:
+            return not self._stragglers.is_of_others(run) and (
+                (await self.find(run)).at_rest is not None
+            )
+        except Refused:
+            return False
 
     def _going(self, engine: str) -> dict[str, OpenRun]:
         """The runs that go on there. Whatever else carries the mark of one was sent by others."""
@@ -290,6 +301,11 @@ class Control:
         facts = SIMULATED if engine is None else engine.facts
         return await steering.modify(opened, body, author, facts=facts, aside=self._aside)
 
+    async def confirm_rest(self, run: str, asked: steering.RestRequest, author: Author) -> Run:
+        """Take somebody's word that a run is at rest, where its engine's is none. Raises NotFound,
+        BadInput, Conflict."""
+        return steering.confirm_rest(await self._movable(run), asked, author)
+
     async def _movable(self, run: str) -> OpenRun:
         opened = self.open.get(run)
         if opened is None or opened.run.end is not None:
@@ -380,7 +396,7 @@ class Control:
             except msgspec.DecodeError:
                 log.exception("run %s cannot be read; it is left as it is", row.id)
                 continue
-            if run is None or run.state in ENDED:
+            if run is None or run.end is not None:
                 log.error("run %s: table and events differ; `rebuild` mends the table", row.id)
                 continue
             self._adopt(run, seq)

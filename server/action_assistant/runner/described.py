@@ -84,6 +84,17 @@ def _stop() -> RequestBody:
     return _body(press, required=False)
 
 
+def _rest() -> RequestBody:
+    how = Schema(type=OpenAPIType.STRING, min_length=3, max_length=500)
+    whole = Schema(
+        type=OpenAPIType.OBJECT,
+        properties={"how": how},
+        required=["how"],
+        additional_properties=False,
+    )
+    return _body(whole, required=True)
+
+
 def _fit() -> RequestBody:
     one = _start().content["application/json"].schema
     assert isinstance(one, Schema)
@@ -114,6 +125,16 @@ class StopOperation(Operation):
 
     def __post_init__(self) -> None:
         self.request_body = _stop()
+
+
+@dataclass
+class RestOperation(Operation):
+    """How it was seen that a robot is at rest."""
+
+    request_body: RequestBody | Reference | None = field(default_factory=_rest)
+
+    def __post_init__(self) -> None:
+        self.request_body = _rest()
 
 
 @dataclass

@@ -11,8 +11,10 @@ from typing import Final
 
 import anyio
 
+from action_assistant.runner.doubts import Doubts
 from action_assistant.runner.events import (
     AlarmRaised,
+    AtRest,
     Author,
     End,
     Ended,
@@ -28,6 +30,7 @@ from action_assistant.runner.events import (
     Silent,
     StopRequested,
     StopSent,
+    Unconfirmed,
 )
 from action_assistant.runner.flight import alarm_of
 from action_assistant.runner.history import Aside
@@ -57,6 +60,8 @@ _UNCONFIRMED_S: Final = 2.0
 _SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobody
 _TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
 _ONE_PRESS_S: Final = 1.0
+_SLOWEST_S: Final = 30.0  # between two stops that can bring nothing more
+_LOOK_AT_IT: Final = "Look at the robot; its hardware stop is the one to use."
 
 _LINES: Final = 2_000  # of the engine's log, kept with one run
 _LONGEST_LINE: Final = 2_000  # characters
@@ -89,6 +94,7 @@ class OpenRun:
         self._owns_link = owns_link
         self._wall = wall
         self._aside = aside
+        self._doubts = Doubts(reached=seq > 1 and not owns_link)  # what came before is not known
         self.watch = self._watched()
         self._lines = 0
         self._changed = changed
@@ -97,6 +103,7 @@ class OpenRun:
         self._is_left = False
         self._handing = anyio.CancelScope()  # while the start is handed over
         self._stop_wanted = anyio.Event()
+        self._pressed = anyio.Event()
         self._stop_ids: set[str] = {""}
         self._stop_asked: tuple[str, float] = ("", 0.0)
         self._hung = ""
@@ -114,11 +121,14 @@ class OpenRun:
             self._stop_asked = (author.id, now)
             self.tell(StopRequested(self._wall(), author, stop_id), author.id)
         self._stop_ids.add(stop_id)
+        self._doubts.reach()
         self._stop_wanted.set()
+        self._pressed.set()
         self._handing.cancel()
 
     async def pause(self, author: Author) -> None:
         """Want the run paused. Raises NotSent."""
+        self._doubts.reach()
         self.tell(PauseRequested(self._wall(), author), author.id)
         await self._link.pause(self.run.graph_name)
         self.watch.look()
@@ -144,6 +154,7 @@ class OpenRun:
             continue_from=continue_from,
         )
         before = self.run
+        self._doubts.reach()
         self.tell(asked, author.id)
         try:
             await self._link.modify(order, continue_from)
@@ -168,6 +179,8 @@ class OpenRun:
 
     def hear_of(self, command: ForeignCommand) -> None:
         """Somebody else has told this robot something while the run goes on there."""
+        if self._is_ours(command.graph):
+            self._doubts.reach()
         if command.command in SET_GOING and command.graph == self.run.graph_name:
             self.watch.disturbed()
         alarm = alarm_of(command, self.run.engine, self.run.graph_name)
@@ -231,6 +244,7 @@ class OpenRun:
             exact=self._owns_link,
             wall=self._wall,
             aside=self._aside,
+            doubts=self._doubts,
             rested_at=rested_at,
         )
 
@@ -289,10 +303,14 @@ class OpenRun:
             return
         except Exception as error:  # also a deadline: the message may have left
             log.exception("run %s: the start may or may not have left", self.run.id)
-            self.tell(Published(at, incarnation))
+            self.tell(self._published(at, incarnation))
             self.tell(Silent(self._wall(), at, f"Nobody knows whether the start left: {error!r}"))
         else:
-            self.tell(Published(at, incarnation))
+            self.tell(self._published(at, incarnation))
+
+    def _published(self, at: int, incarnation: str) -> Published:
+        now = self._link.standing
+        return Published(at, incarnation, now.process if now.incarnation == incarnation else None)
 
     def _let_early_ones_in(self) -> None:
         """What the engine showed while the start was handed over follows it in the history."""
@@ -341,6 +359,7 @@ class OpenRun:
         await self._stop_wanted.wait()
         began, gap = anyio.current_time(), _STOP_POLL_S
         for attempt in itertools.count(self.run.stops_sent + 1):
+            await self._stop_is_due()
             failed = await send_stop(self._link, self.run.graph_name)
             if not failed:
                 self.watch.stop_left()
@@ -353,14 +372,57 @@ class OpenRun:
                 why = self._hung or f"It does not obey: {self.watch.trouble}."
                 self.end("lost", f"{why} The simulated engine was switched off.")
                 return
-            await anyio.sleep(gap)
-            gap = min(gap * 1.5, 1.0)
+            with anyio.move_on_after(gap):
+                await self._pressed.wait()
+            is_vain = self.run.unconfirmed and not self.run.active and not self.run.unknown_since
+            gap = min(gap * 1.5, _SLOWEST_S if is_vain else 1.0)
+
+    async def _stop_is_due(self) -> None:
+        """An engine that does not hold the run any more is told once for each press, and not again: a
+        graph of that name there would be another one."""
+        while self.run.lost and not self._pressed.is_set():
+            with anyio.move_on_after(1.0):
+                await self._pressed.wait()
+        self._pressed = anyio.Event()
+
+    def lose(self, why: str) -> None:
+        """The engine does not hold the run any more: whether its code has ended is not known."""
+        if self.run.simulated:
+            self.end("lost", why)
+        elif self.run.lost != why:
+            self.tell(Unconfirmed(self._wall(), why, lost=True))
+            self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why} {_LOOK_AT_IT}")
+
+    def doubt(self, why: str) -> None:
+        """The code of an action may go on, and the engine will never tell of its end."""
+        self.tell(Unconfirmed(self._wall(), why))
+        self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {_LOOK_AT_IT}")
+
+    def engine_ended(self) -> None:
+        """The engine's process has ended, and the code of every action with it."""
+        process, run = self.run.process, self.run
+        how = (
+            "The simulated engine was switched off."
+            if process is None
+            else f"The engine's process, {process.pid} on this computer, has ended."
+        )
+        self._rests(AtRest(None, self._wall(), how), "error" if run.unconfirmed else "lost")
+
+    def confirm_rest(self, author: Author, how: str) -> None:
+        """Somebody has seen that it is at rest, where no answer of the engine can prove it."""
+        self._rests(AtRest(author, self._wall(), how), "error", author.id)
+
+    def _rests(self, seen: AtRest, state: End, author: str = "") -> None:
+        detail = self.run.unconfirmed or self.run.lost or self.watch.trouble or seen.how
+        self.tell(Ended(seen.at, state, self._result(), detail, seen), author)
+
+    def _result(self) -> str | None:
+        return self.run.result or _RESULTS.get(self.run.graph_state or "")
 
     def end(self, state: End, detail: str) -> None:
         """The run is over. The first end counts."""
-        result = self.run.result or _RESULTS.get(self.run.graph_state or "")
         if self.run.end is None:
-            self.tell(Ended(self._wall(), state, result, detail))
+            self.tell(Ended(self._wall(), state, self._result(), detail))
 
     def alarm(self, code: str, text: str) -> None:
         """Tell people something now, once."""

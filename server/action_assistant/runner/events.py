@@ -10,6 +10,7 @@ from typing import ClassVar, Final, Literal, TypeAlias
 
 import msgspec
 
+from action_assistant.runner.engine_process import EngineProcess
 from action_assistant.runner.seen import Seen
 
 End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "lost"]
@@ -68,12 +69,14 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The one start message has left. `incarnation` names the life of the engine it went to."""
+    """The one start message has left. `incarnation` names the life of the engine it went to,
+    `process` that engine's process where it is one of the runner's own computer."""
 
     kind: ClassVar[str] = "run.published.v1"
 
     at: int
     incarnation: str = ""
+    process: EngineProcess | None = None
 
 
 class Observed(msgspec.Struct, frozen=True):
@@ -197,8 +200,29 @@ class EngineSaid(msgspec.Struct, frozen=True):
     text: str
 
 
+class Unconfirmed(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Nothing that the engine says can show any more that the run is at rest, and why. `lost`: the
+    engine does not hold it any more; else it holds actions that did not obey."""
+
+    kind: ClassVar[str] = "run.unconfirmed.v1"
+
+    at: int
+    why: str
+    lost: bool = False
+
+
+class AtRest(msgspec.Struct, frozen=True):
+    """How rest was seen where the engine's word is none: `by` a person who looked, or by the runner
+    itself (None), which saw the engine's process end."""
+
+    by: Author | None
+    at: int
+    how: str
+
+
 class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The run is over, and in which state; for `refused` and `lost` `detail` says why."""
+    """The run is over, and in which state; for `refused` and `lost` `detail` says why. `at_rest`:
+    who saw that, where no answer of the engine could prove it."""
 
     kind: ClassVar[str] = "run.ended.v1"
 
@@ -206,6 +230,7 @@ class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
     state: End
     result: str | None = None
     detail: str = ""
+    at_rest: AtRest | None = None
 
 
 class MovesAgain(msgspec.Struct, frozen=True):
@@ -239,6 +264,7 @@ RunEvent: TypeAlias = (
     | Answered
     | AlarmRaised
     | EngineSaid
+    | Unconfirmed
     | Ended
     | MovesAgain
     | Unknown
@@ -261,6 +287,7 @@ _KINDS: Final[Mapping[str, type[RunEvent]]] = {
         Answered,
         AlarmRaised,
         EngineSaid,
+        Unconfirmed,
         Ended,
         MovesAgain,
     )

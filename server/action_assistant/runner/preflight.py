@@ -52,7 +52,7 @@ class Preflight(msgspec.Struct, frozen=True, kw_only=True):
 
 class Sight(msgspec.Struct, frozen=True, kw_only=True):
     """An engine at the moment of a pre-flight. `took_ms`: until it answered a get sent for it;
-    `open_runs`: runs of ours that go on there."""
+    `open_runs`: runs of ours that go on there; `settled`: those whose rest somebody has seen."""
 
     name: str
     facts: EngineFacts
@@ -61,6 +61,7 @@ class Sight(msgspec.Struct, frozen=True, kw_only=True):
     index: Index
     took_ms: float
     open_runs: Collection[str] = ()
+    settled: Collection[str] = ()
 
 
 def summed(engine: str, items: Sequence[Item], digest: str = "") -> Preflight:
@@ -110,6 +111,8 @@ def of_taken(engine: str, other: Run | None) -> Item:
         f"{engine} is taken by run {other.number} of {other.graph_name}, started by "
         f"{other.author.name}; it is {other.state}."
     )
+    if doubt := other.lost or other.unconfirmed:
+        text += f" {doubt.rstrip('.')}. Somebody has to see it at rest and confirm that in the run."
     return Item(code="free", verdict="blocked", text=text)
 
 
@@ -135,6 +138,7 @@ def of_robot(sight: Sight, graph: Graph) -> tuple[Item, ...]:
         _proof(sight),
         _actions(sight, graph),
         _quiet(sight, graph),
+        _rest(sight),
         _others(sight),
         _actors(sight, graph),
     )
@@ -229,6 +233,25 @@ def _quiet(sight: Sight, graph: Graph) -> Item:
         text = f"{sight.name} runs {names}, which nobody started from here."
         return Item(code="quiet", verdict="blocked", text=text, codes=("quiet",), overridable=True)
     return Item(code="quiet", verdict="passed", text=f"Nothing else runs on {sight.name}.")
+
+
+def _rest(sight: Sight) -> Item:
+    """Nothing there may still move that its engine calls ERROR. Runs of ours stand in the way as runs,
+    until somebody has seen them at rest."""
+    graphs = [
+        each
+        for each in sight.answer.graphs
+        if each.run is None or each.run not in {*sight.open_runs, *sight.settled}
+    ]
+    doubted = sorted({each.graph for each in graphs if each.state == "ERROR" or each.stoppable})
+    if not doubted:
+        text = f"No action on {sight.name} is known to have been given up by its engine."
+        return Item(code="rest", verdict="passed", text=text)
+    text = (
+        f"{', '.join(doubted[:3])} on {sight.name} did not obey a stop, or failed while it was told to: "
+        "the engine says ERROR, but the code may still run. Look at the robot; restart its engine."
+    )
+    return Item(code="rest", verdict="blocked", text=text, codes=("rest",), overridable=True)
 
 
 def _others(sight: Sight) -> Item:

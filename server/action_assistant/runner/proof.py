@@ -15,6 +15,7 @@ log: Final = logging.getLogger(__name__)
 
 _LOADING_S: Final = 1.0  # an action that is triggered for the first time has begun within this time
 _STARTING_S: Final = 0.3  # and one that has run before within this
+_AGAIN_S: Final = 2.0  # one that begins again by itself is FINISHED for a moment in between
 _NEVER_BEGAN: Final = frozenset({"UNINITIALIZED", "INITIALIZED"})
 _SEND_S: Final = 1.0
 #: Commands after which a graph may move that was at rest.
@@ -91,9 +92,8 @@ class Rest:
             return False
         if self._exact and state in TERMINAL:
             return True
-        idle = any(each in _NEVER_BEGAN for graph in shown for each in graph.nodes.values())
         self._since = self._since if self._since is not None else anyio.current_time()
-        return asked - self._since >= (_LOADING_S if idle else _STARTING_S)
+        return asked - self._since >= _long_enough(shown)
 
     def missing(self, parts: Sequence[Snapshot], asked: float) -> bool:
         """After one more look, asked for at `asked`, that did not show the graph itself: an engine
@@ -103,3 +103,11 @@ class Rest:
             return False
         self._since = self._since if self._since is not None else anyio.current_time()
         return self._exact or asked - self._since >= _STARTING_S
+
+
+def _long_enough(shown: Sequence[Snapshot]) -> float:
+    """For how long a graph like this must be seen at rest, in seconds."""
+    if any(each.spontaneous for each in shown):
+        return _AGAIN_S
+    idle = any(each in _NEVER_BEGAN for graph in shown for each in graph.nodes.values())
+    return _LOADING_S if idle else _STARTING_S

@@ -10,9 +10,11 @@ from typing import Final, Literal, TypeAlias, assert_never
 import msgspec
 from msgspec.structs import replace
 
+from action_assistant.runner.engine_process import EngineProcess
 from action_assistant.runner.events import (
     AlarmRaised,
     Answered,
+    AtRest,
     Author,
     End,
     Ended,
@@ -32,10 +34,12 @@ from action_assistant.runner.events import (
     Silent,
     StopRequested,
     StopSent,
+    Unconfirmed,
     Unknown,
 )
 from action_assistant.runner.seen import (
     ACTIVE,
+    TERMINAL,
     GraphResult,
     GraphState,
     Hazard,
@@ -111,6 +115,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     like: str | None = None
     desired: Desired = "running"
     incarnation: str | None = None  # None: nothing has been sent, as far as is known
+    process: EngineProcess | None = None  # of the engine, where it can be seen to end
     graph_state: str | None = None
     parts: dict[str, str] = {}  # running sub-graphs of this run, and their states
     actions: dict[str, ActionRun] = {}
@@ -122,6 +127,9 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     detail: str = ""
     unknown_since: int | None = None
     proof_at: int | None = None
+    unconfirmed: str = ""  # why nothing that the engine says shows rest any more
+    lost: str = ""  # why the engine does not hold it any more; nobody has seen it at rest
+    at_rest: AtRest | None = None
     moves_again_at: int | None = None  # it had ended, and was seen to move; until its next end
     stop_requested_at: int | None = None
     stopped_by: Author | None = None
@@ -134,6 +142,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
         """One word for where the run is."""
         if self.end is not None:
             return self.end
+        if self.lost:
+            return "lost"
         if self.unknown_since is not None:
             return "unknown"
         if self.desired == "stopped" or self.graph_state == "STOPPING":
@@ -145,6 +155,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
                 return "published"
             case "PAUSED":
                 return "paused"
+            case state if self.unconfirmed and state in TERMINAL and not self.active:
+                return "unknown"
             case _:  # also a graph that has finished while nodes still run (H12)
                 return "running"
 
@@ -202,7 +214,9 @@ def follow(run: Run, event: RunEvent) -> Run:
         return run
     match event:
         case Published():
-            return replace(run, incarnation=event.incarnation, started_at=event.at)
+            return replace(
+                run, incarnation=event.incarnation, started_at=event.at, process=event.process
+            )
         case Observed():
             return _observe(run, event.seen)
         case PauseRequested():
@@ -235,7 +249,7 @@ def follow(run: Run, event: RunEvent) -> Run:
         case Silent():
             return replace(run, unknown_since=event.since)
         case Answered():
-            return replace(run, unknown_since=None)
+            return replace(run, unknown_since=None, lost="")
         case AlarmRaised():
             alarm = Alarm(event.code, event.at, event.text)
             return replace(run, alarms=(*run.alarms, alarm)[-KEPT:])
@@ -243,6 +257,10 @@ def follow(run: Run, event: RunEvent) -> Run:
             return _reopen(run, event)
         case EngineSaid():
             return replace(run, log=(*run.log, Message(event.at, event.text))[-KEPT:])
+        case Unconfirmed(lost=True):
+            return replace(run, lost=event.why)
+        case Unconfirmed():
+            return replace(run, unconfirmed=event.why)
         case Ended():
             return _end(run, event)
         case Requested() | Unknown():
@@ -319,6 +337,7 @@ def _reopen(run: Run, event: MovesAgain) -> Run:
         end=None,
         ended_at=None,
         proof_at=None,
+        at_rest=None,
         unknown_since=None,
         detail="",
         moves_again_at=event.at,
@@ -334,6 +353,9 @@ def _end(run: Run, event: Ended) -> Run:
         ended_at=event.at,
         result=event.result or run.result,
         detail=event.detail,
+        at_rest=event.at_rest,
+        lost="",
+        unconfirmed="",
         moves_again_at=None,
         unknown_since=run.unknown_since if event.state == "lost" else None,
     )

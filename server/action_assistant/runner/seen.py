@@ -79,6 +79,8 @@ class Snapshot(msgspec.Struct, frozen=True, omit_defaults=True, tag="snapshot", 
     `messages`: per node, all runtime messages so far (the engine keeps ten).
     `inputs`: the values of nodes that move, where they could be read.
     `same`: nodes that are not named are as they were before, with the same messages.
+    `stoppable`: nodes in ERROR that the graph's own rules may have stopped or paused before.
+    `spontaneous`: nodes that begin again by themselves, and have begun.
     """
 
     at: int
@@ -92,6 +94,8 @@ class Snapshot(msgspec.Struct, frozen=True, omit_defaults=True, tag="snapshot", 
     messages: dict[str, tuple[str, ...]] = {}
     inputs: dict[str, dict[str, str]] = {}
     same: bool = False
+    stoppable: tuple[str, ...] = ()
+    spontaneous: tuple[str, ...] = ()
 
     @property
     def active(self) -> bool:

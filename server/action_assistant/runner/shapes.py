@@ -6,7 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row
 
-from action_assistant.runner.events import Author, Overridden, Override
+from action_assistant.runner.events import AtRest, Author, Overridden, Override
 from action_assistant.runner.parameters import sent
 from action_assistant.runner.runs import Desired, Run, State
 from action_assistant.runner.visits import ActionRun, How, Outcome, Visit
@@ -56,6 +56,15 @@ class AlarmShown(msgspec.Struct, frozen=True):
     text: str
 
 
+class AtRestShown(msgspec.Struct, frozen=True):
+    """How rest was seen where no answer of the engine could prove it: by whom (null: the runner saw the
+    engine's process end), when, and how."""
+
+    by: Author | None
+    at: datetime
+    how: str
+
+
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
     """A run as a list shows it."""
 
@@ -73,6 +82,8 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     result: str | None
     proof_at: datetime | None
     unknown_since: datetime | None
+    unconfirmed: str | None
+    at_rest: AtRestShown | None
     moves_again_at: datetime | None
     group: str | None
     requested_at: datetime
@@ -171,6 +182,8 @@ def summary_of_row(row: Row[Any]) -> Summary:
         result=row.result,
         proof_at=_time(more.get("proof_at")),
         unknown_since=_time(more.get("unknown_since")) if row.state == "lost" else None,
+        unconfirmed=None,
+        at_rest=_at_rest(msgspec.convert(more["at_rest"], AtRest) if more.get("at_rest") else None),
         moves_again_at=None,
         group=more.get("group"),
         requested_at=time(row.requested_at),
@@ -221,16 +234,22 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "result": run.result,
         "proof_at": _time(run.proof_at),
         "unknown_since": _time(run.unknown_since),
+        "unconfirmed": run.lost or run.unconfirmed or None,
+        "at_rest": _at_rest(run.at_rest),
         "moves_again_at": _time(run.moves_again_at),
         "group": run.group,
         "requested_at": time(run.requested_at),
         "started_at": _time(run.started_at),
         "ended_at": _time(run.ended_at),
         "stopped_by": run.stopped_by,
-        "detail": run.detail,
+        "detail": run.detail or run.lost or run.unconfirmed,
         "alarms": [AlarmShown(each.code, time(each.at), each.text) for each in run.alarms],
         "recorded": recorded,
     }
+
+
+def _at_rest(seen: AtRest | None) -> AtRestShown | None:
+    return None if seen is None else AtRestShown(seen.by, time(seen.at), seen.how)
 
 
 def visit(each: Visit) -> VisitShown:

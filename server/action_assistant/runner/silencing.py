@@ -11,12 +11,14 @@ from typing import Final
 import anyio
 from anyio.abc import TaskGroup
 
+from action_assistant.runner.doubts import Doubts
 from action_assistant.runner.driving import Clock
 from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.events import Author
 from action_assistant.runner.flight import RobotEvent, StopAsked, StopUnproven, StopWasProven
 from action_assistant.runner.links.port import Answer, ForeignCommand, NoAnswer
 from action_assistant.runner.proof import SET_GOING, Rest, send_stop
+from action_assistant.runner.seen import Snapshot
 
 _GAP_S: Final = 0.1
 _SLOWEST_S: Final = 1.0
@@ -87,7 +89,7 @@ class Silencing:
     async def _until_proven(self, engine: KnownEngine, graph: str, robot: str) -> RobotEvent:
         began, gap = anyio.current_time(), _GAP_S
         life = engine.answer.incarnation if engine.answer is not None else ""
-        rest = Rest(exact=False)
+        rest, doubts = Rest(exact=False), Doubts(reached=True)
         while True:
             why = await send_stop(engine, graph)
             asked = anyio.current_time()
@@ -105,6 +107,8 @@ class Silencing:
                 why = f"{engine.standing.servers} engines are seen on the path of its answers"
             elif disturbed:
                 why = "somebody has just set it going again"
+            elif doubt := doubts.look(_shown(answer, graph)):
+                why = doubt
             elif _at_rest(answer, graph, rest, asked) and not why:
                 return StopWasProven(at=answer.at, graph=graph, asked_at=answer.asked_at)
             else:
@@ -126,6 +130,12 @@ async def _ask(engine: KnownEngine) -> Answer | None:
 
 def _at_rest(answer: Answer, graph: str, rest: Rest, asked: float) -> bool:
     """Whether neither the graph nor a sub-graph of it moves, or will by itself."""
+    shown = _shown(answer, graph)
+    is_held = bool(shown) and shown[0].graph == graph
+    return rest.seen(shown, asked) if is_held else rest.missing(shown, asked)
+
+
+def _shown(answer: Answer, graph: str) -> list[Snapshot]:
+    """A graph, if it is held, and then its sub-graphs."""
     own = [each for each in answer.graphs if each.graph == graph]
-    parts = [each for each in answer.graphs if each.graph.startswith(f"{graph}__")]
-    return rest.seen([*own, *parts], asked) if own else rest.missing(parts, asked)
+    return [*own, *(each for each in answer.graphs if each.graph.startswith(f"{graph}__"))]

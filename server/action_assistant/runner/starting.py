@@ -1,6 +1,6 @@
 """What must be true before a start is stored and sent, found out for each engine it shall go to."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Awaitable, Callable, Collection, Sequence
 from typing import Annotated, Final
 
 import anyio
@@ -92,7 +92,8 @@ class Grouped(msgspec.Struct, frozen=True):
 
 class Starting:
     """Looks before starts. `taken(engine)` is the run that an engine has from here, if any;
-    `going(engine)` the ids of all that go on there."""
+    `going(engine)` the ids of all that go on there; `is_settled(run)` whether a run is over as it was
+    started from here, and with nothing of it left to move."""
 
     def __init__(
         self,
@@ -102,12 +103,14 @@ class Starting:
         aside: Aside,
         taken: Callable[[str], Run | None],
         going: Callable[[str], Collection[str]],
+        is_settled: Callable[[str], Awaitable[bool]],
     ) -> None:
         self._robots = robots
         self._wall = wall
         self._aside = aside
         self._taken = taken
         self._going = going
+        self._is_settled = is_settled
 
     async def cleared(self, asked: StartRequest) -> Cleared:
         """Look, and refuse what stands in the way. Raises Refused of many kinds."""
@@ -238,6 +241,7 @@ class Starting:
             index=await robot.index(self._aside),
             took_ms=took,
             open_runs=self._going(robot.registration.name),
+            settled=[each for each in _given_up(answer) if await self._is_settled(each)],
         )
 
     def _simulated(self, asked: StartRequest) -> EngineFacts:
@@ -246,6 +250,12 @@ class Starting:
             return SIMULATED
         facts = facts_of(self._robots.registration(asked.like).profile)
         return msgspec.structs.replace(facts, simulated=True)
+
+
+def _given_up(answer: Answer) -> set[str]:
+    """The runs whose marks graphs in doubt carry."""
+    doubted = (each for each in answer.graphs if each.state == "ERROR" or each.stoppable)
+    return {each.run for each in doubted if each.run is not None}
 
 
 def _despite(admitted: Admitted, items: Sequence[Item]) -> tuple[Overridden, ...]:

@@ -1,10 +1,10 @@
 """What can be done to a run besides stopping it, where its engine makes that safe."""
 
-from typing import Final
+from typing import Annotated, Final
 
 import msgspec
 
-from action_assistant.errors import Conflict, Unavailable
+from action_assistant.errors import BadInput, Conflict, Unavailable
 from action_assistant.runner.admission import SIMULATOR, StartRequest, admit, decoded
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.events import Author, Override
@@ -92,6 +92,32 @@ async def modify(
         raise Unavailable(f"The change could not be sent: {why}") from why
     except EngineRefused as why:
         raise Conflict(f"The engine refuses the change: {why}") from why
+    return opened.run
+
+
+class RestRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Somebody has seen that a run is at rest. `how`: by what."""
+
+    how: Annotated[str, msgspec.Meta(min_length=3, max_length=500)]
+
+
+def confirm_rest(opened: OpenRun, asked: RestRequest, author: Author) -> Run:
+    """End a run of which nothing that its engine says can prove rest. Raises BadInput, Conflict."""
+    run, how = opened.run, asked.how.strip()
+    if len(how) < 3:
+        raise BadInput("Say how it was seen that nothing moves.", where={"path": "/how"})
+    if run.simulated:
+        raise Conflict("A simulation moves nothing; use Stop.")
+    is_silent = bool(run.lost) or run.unknown_since is not None
+    if not is_silent and not run.unconfirmed:
+        raise Conflict(
+            f"{run.engine} answers for this run, so its answers have to show rest; use Stop."
+        )
+    if run.active and not is_silent:
+        raise Conflict(
+            f"{run.engine} shows {', '.join(run.active)} moving; that cannot be confirmed away."
+        )
+    opened.confirm_rest(author, how)
     return opened.run
 
 

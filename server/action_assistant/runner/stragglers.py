@@ -73,6 +73,10 @@ class Stragglers:
         if run is not None:
             _put(self._others, run, None)
 
+    def is_of_others(self, run: str) -> bool:
+        """Whether somebody else has played the start of this run again."""
+        return run in self._others
+
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
         """An engine shows these graphs, in an answer or by feedback. Never waits; feedback comes
         outside of any task, so that none can be started here."""

@@ -7,6 +7,8 @@ from typing import Final, Protocol
 import anyio
 import msgspec
 
+from action_assistant.runner.doubts import Doubts
+from action_assistant.runner.engine_process import has_ended
 from action_assistant.runner.events import Answered, End, Proof, Published, RunEvent, Silent
 from action_assistant.runner.history import Aside
 from action_assistant.runner.lateness import fresh
@@ -45,6 +47,18 @@ class Watched(Protocol):
         """The run is over."""
         ...
 
+    def lose(self, why: str) -> None:
+        """The engine does not hold the run any more."""
+        ...
+
+    def doubt(self, why: str) -> None:
+        """The code of an action may go on whatever the engine says."""
+        ...
+
+    def engine_ended(self) -> None:
+        """The engine's process was seen to end, and the code of all its actions with it."""
+        ...
+
     def alarm(self, code: str, text: str) -> None:
         """Tell people something now."""
         ...
@@ -62,6 +76,7 @@ class Watch:
         exact: bool,
         wall: Callable[[], int],
         aside: Aside,
+        doubts: Doubts,
         rested_at: int | None = None,
     ) -> None:
         self.trouble = ""
@@ -77,7 +92,9 @@ class Watch:
         self._begun = 0  # when feedback was the first to show it
         self._sent: Graph | None = None  # until it was compared with what the engine shows
         self._answered = False  # by a get, since the last feedback
+        self._exact = exact
         self._rest = Rest(exact=exact)
+        self._doubts = doubts
         self._heard_at = self._began_at = anyio.current_time()
         self._seen_wall = rested_at
 
@@ -126,6 +143,9 @@ class Watch:
             else:
                 self._take(answer, order, began)
                 await self._compare(answer)
+            process = self._it.run.process
+            if process is not None and has_ended(process):
+                self._it.engine_ended()
             cost = anyio.current_time() - began
             hurry = self._it.run.desired == "stopped" or self._rest.pending
             pace = _STOP_POLL_S if hurry else _POLL_S
@@ -142,8 +162,9 @@ class Watch:
         """Draw the conclusions that one answer allows, and no others."""
         name = self._it.run.graph_name
         if len({self._it.run.incarnation, answer.incarnation} - {None, ""}) > 1:
-            self._it.alarm("engine_restarted", "The engine was restarted: look at the robot.")
-            self._it.end("lost", "The engine was restarted while the run went on.")
+            if not self._it.run.lost:
+                self._it.alarm("engine_restarted", "The engine was restarted: look at the robot.")
+                self._it.lose("The engine was restarted while the run went on.")
             return
         own = next((each for each in answer.graphs if each.graph == name), None)
         servers = self._link.standing.servers
@@ -157,8 +178,9 @@ class Watch:
             return
         self._heard_at, self.seen_at, self._answered = anyio.current_time(), answer.at, True
         if self._it.run.incarnation is None:  # the runner died between sending and noting it
-            self._it.tell(Published(answer.at, answer.incarnation))
-        if self._it.run.unknown_since is not None:
+            process = self._link.standing.process
+            self._it.tell(Published(answer.at, answer.incarnation, process))
+        if self._it.run.unknown_since is not None or self._it.run.lost:
             self._it.tell(Answered(answer.at))
         parts = [each for each in answer.graphs if each.graph.startswith(f"{name}__")]
         shown = [own, *(part for part in parts if part.run in {None, self._it.run.id})]
@@ -194,22 +216,19 @@ class Watch:
         """The answer does not show this run."""
         self._rest.forget()
         if self._it.run.graph_state is not None:
-            self._it.end(
-                "lost",
+            self._it.lose(
                 "The engine does not hold this run any more."
                 if other is None
-                else "Another start has taken the place of this run.",
+                else "Another start has taken the place of this run."
             )
             return
         waited = anyio.current_time() - self._began_at
         if waited < _APPEAR_S:
             return
         if self._it.run.incarnation is None:
-            self._it.end(
-                "lost", "The runner ended before it could note whether the start was sent."
-            )
+            self._it.lose("The runner ended before it could note whether the start was sent.")
         elif self._it.run.desired == "stopped" and waited >= _GIVEN_UP_S:
-            self._it.end("lost", "The engine answers but has never shown this run.")
+            self._it.lose("The engine answers but has never shown this run.")
         elif self._it.run.unknown_since is None:
             since = answer.at - round(waited * 1e6)
             self._it.tell(
@@ -220,6 +239,15 @@ class Watch:
         if order < self._disturbed:
             return
         own, at_rest = shown[0], self._rest.seen(shown, asked)
+        doubt = self._doubts.look(shown)
+        if doubt and doubt != self._it.run.unconfirmed:
+            self._it.doubt(doubt)
+        if self._it.run.unconfirmed:
+            going = ", ".join(self._it.run.active)
+            self.trouble = f"{going} has not stopped yet" if going else self._it.run.unconfirmed
+            if self._exact and at_rest:
+                self._it.engine_ended()  # a simulated one is switched off, and nothing has moved
+            return
         if self._it.run.desired != "stopped":
             end = self._it.run.apparent_end
             if end is not None and own.state in TERMINAL and at_rest:

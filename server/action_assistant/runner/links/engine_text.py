@@ -5,12 +5,15 @@ refused with the reason, since a proof may rest on it.
 """
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Final, Literal
 
 import msgspec
 
 from action_assistant.runner.parameters import Values, reported
 from action_assistant.runner.seen import ACTIVE, Snapshot
+
+#: Responses of a relation that end or hold an action which runs.
+_HALTING: Final = frozenset({"stop", "pause"})
 
 
 class NotAGraph(ValueError):
@@ -28,6 +31,7 @@ class _Said(msgspec.Struct, frozen=True):
 class _Action(msgspec.Struct, frozen=True):
     name: str
     state: str
+    type: str = ""
     instance_id: int = 0
     input_parameters: msgspec.Raw = msgspec.Raw(b"{}")
     gui_attributes: msgspec.Raw = msgspec.Raw(b"{}")
@@ -38,6 +42,23 @@ class _Graph(msgspec.Struct, frozen=True):
     graph_name: str
     graph_state: str
     actions: tuple[_Action, ...] = ()
+
+
+class _Parent(msgspec.Struct, frozen=True):
+    name: str
+    instance_id: int = 0
+    conditions: tuple[str, ...] = ()
+
+
+class _Child(msgspec.Struct, frozen=True):
+    name: str
+    type: str = ""
+    instance_id: int = 0
+    parents: tuple[_Parent, ...] = ()
+
+
+class _Related(msgspec.Struct, frozen=True):
+    actions: tuple[_Child, ...] = ()
 
 
 class _Named(msgspec.Struct, frozen=True):
@@ -61,6 +82,7 @@ class _Attributes(msgspec.Struct, frozen=True):
 
 
 _GRAPH = msgspec.json.Decoder(_Graph)
+_RELATED = msgspec.json.Decoder(_Related)
 _SENT = msgspec.json.Decoder(_Sent)
 _NAMED = msgspec.json.Decoder(_Named)
 _ATTRIBUTES = msgspec.json.Decoder(_Attributes)
@@ -78,6 +100,7 @@ def snapshot(
         raise NotAGraph(f"This is no graph as engines write them: {error}") from error
     nodes = {f"{each.name}_{each.instance_id}": each for each in graph.actions}
     messages = {name: _messages(each) for name, each in nodes.items()}
+    failed = frozenset(name for name, each in nodes.items() if each.state == "ERROR")
     return Snapshot(
         at=at,
         graph=graph.graph_name,
@@ -88,6 +111,12 @@ def snapshot(
         run=_run(graph.actions),
         messages={name: said for name, said in messages.items() if said},
         inputs=_inputs(nodes),
+        stoppable=tuple(sorted(failed & _stoppable(text, failed))) if failed else (),
+        spontaneous=tuple(
+            name
+            for name, each in nodes.items()
+            if each.type == "spontaneous" and each.state != "UNINITIALIZED"
+        ),
     )
 
 
@@ -126,6 +155,30 @@ def _messages(action: _Action) -> tuple[str, ...]:
     except msgspec.DecodeError:
         return ()
     return tuple(each if isinstance(each, str) else each.message for each in said)
+
+
+def _stoppable(text: str, failed: frozenset[str]) -> frozenset[str]:
+    """The nodes that their graph itself may stop or pause: by a response of a relation, or as one that
+    a spontaneous action leads to. All that have failed, where that cannot be read."""
+    try:
+        actions = _RELATED.decode(text).actions
+    except (msgspec.DecodeError, RecursionError, UnicodeError):
+        return failed
+    leads_to: dict[str, list[str]] = {}
+    found: set[str] = set()
+    behind: set[str] = set()
+    for each in actions:
+        name = f"{each.name}_{each.instance_id}"
+        for parent in each.parents:
+            leads_to.setdefault(f"{parent.name}_{parent.instance_id}", []).append(name)
+            if any(said.rpartition("->")[2].strip() in _HALTING for said in parent.conditions):
+                found.add(name)
+    open_ = [f"{each.name}_{each.instance_id}" for each in actions if each.type == "spontaneous"]
+    while open_:
+        reached = [each for each in leads_to.get(open_.pop(), ()) if each not in behind]
+        behind.update(reached)
+        open_ += reached
+    return frozenset(found | behind)
 
 
 def _inputs(nodes: Mapping[str, _Action]) -> dict[str, Values]:

@@ -13,6 +13,7 @@ from typing import Annotated, Literal, Protocol, TypeAlias
 
 import msgspec
 
+from action_assistant.runner.engine_process import EngineProcess
 from action_assistant.runner.seen import Exact, Snapshot
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph
@@ -67,6 +68,7 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     `servers`: how many answer on the path of its get; only one of them makes answers a proof.
     `listeners`: matched subscriptions by command (`start`, `stop` …). `others`: publishers of starts
     that are not ours. `actor`: what its feedback calls itself, "" until it said something.
+    `process`: of the engine, where it is one of this computer.
     """
 
     state: EngineState
@@ -77,6 +79,7 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     listeners: dict[str, int] = {}
     others: int = 0
     actor: str = ""
+    process: EngineProcess | None = None
 
 
 class Transitions(msgspec.Struct, frozen=True, kw_only=True):

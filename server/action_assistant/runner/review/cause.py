@@ -161,7 +161,7 @@ def _ended_by(run: Run, command: str, alarm: Alarm) -> bool:
     """Whether a command that ends runs came before an end that nobody here asked for."""
     return (
         command in {"start", "stop"}
-        and run.end in {"stopped", "halted", "lost"}
+        and run.end in {"stopped", "halted", "lost", "error"}
         and run.desired != "stopped"
         and (run.ended_at or 0) >= alarm.at
     )
