@@ -5,7 +5,7 @@ import sys
 import time
 import uuid
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, TypeAlias
 
 import msgspec
 
@@ -15,6 +15,8 @@ from action_assistant.errors import CannotStart
 
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _POLL: Final = 0.2  # seconds
+
+Run: TypeAlias = dict[str, Any]
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -36,7 +38,17 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     runs.add_argument("--graph", metavar="GRAPH", help="id or name")
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(deed=_runs)
-    more = runs.add_subparsers(metavar="verify | archive | restore | examples")
+    more = runs.add_subparsers(metavar="at-rest | verify | archive | restore | examples")
+    rests = command(
+        more,
+        "at-rest",
+        "confirm that a run is at rest which no answer of its engine can prove so: after you looked",
+        'RUN --how "I stand beside it; nothing moves."',
+        of="runs",
+    )
+    rests.add_argument("run", metavar="RUN", help="id of the run")
+    rests.add_argument("--how", required=True, help="how you have seen that nothing moves")
+    rests.set_defaults(deed=_at_rest)
     archives.add_to(more)
     brought = command(
         more,
@@ -201,6 +213,28 @@ def _watch(server: Server, run: str) -> int:
         time.sleep(_POLL)
 
 
+def _is_at_rest(run: Run) -> bool:
+    """Whether it was proven or seen that nothing of it moves."""
+    return run["state"] in _ENDED and (run["state"] != "lost" or bool(run["at_rest"]))
+
+
+def _why(run: Run) -> str:
+    said = run["unconfirmed"] or run["detail"]
+    return f"{said.rstrip('.')}. " if said else ""
+
+
+def _at_rest(options: argparse.Namespace) -> int:
+    """Take somebody's word for what no answer of an engine can prove."""
+    with running(options) as server:
+        try:
+            path = f"/api/runs/{options.run}/at_rest"
+            run = server.runner("POST", path, json={"how": options.how}).json()
+        except No as error:
+            return refused(error)
+    print(f"run {run['number']} of {run['graph_name']} is over: {run['state']}")
+    return 0
+
+
 def _stop(options: argparse.Namespace) -> int:
     """Want it stopped, then wait for what proves that nothing moves."""
     with running(options) as server:
@@ -210,8 +244,8 @@ def _stop(options: argparse.Namespace) -> int:
             deadline = time.monotonic() + options.wait
             while True:
                 runs = [server.runner("GET", f"/api/runs/{run}").json() for run in stopping]
-                unproven = [run for run in runs if run["state"] not in _ENDED - {"lost"}]
-                if all(run["state"] in _ENDED for run in runs):
+                unproven = [run for run in runs if not _is_at_rest(run)]
+                if all(_is_at_rest(run) or run["unconfirmed"] for run in runs):
                     break
                 if time.monotonic() > deadline:
                     break
@@ -221,7 +255,7 @@ def _stop(options: argparse.Namespace) -> int:
     for run in unproven:
         print(
             f"STOP UNCONFIRMED for run {run['number']} of {run['graph_name']}: it is "
-            f"{run['state']}. {run['detail']} Look at the robot; use its hardware stop.",
+            f"{run['state']}. {_why(run)}Look at the robot; use its hardware stop.",
             file=sys.stderr,
         )
     if not unproven:

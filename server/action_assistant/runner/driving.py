@@ -1,10 +1,9 @@
 """A run that is not over: keeps it moving, watches it, and stops it until that is proven.
 
-One task listens, one asks, one stops, one writes. None of them waits for another: a stop leaves
+One task listens, one asks, one stops (`stop_loop`), one writes. None of them waits for another: a stop leaves
 while a get hangs, and everything goes on while the journal is down.
 """
 
-import itertools
 import logging
 from collections.abc import Awaitable, Callable
 from typing import Final
@@ -28,8 +27,6 @@ from action_assistant.runner.events import (
     ResumeRequested,
     RunEvent,
     Silent,
-    StopRequested,
-    StopSent,
     Unconfirmed,
 )
 from action_assistant.runner.flight import alarm_of
@@ -47,20 +44,16 @@ from action_assistant.runner.links.port import (
     Report,
     Transitions,
 )
-from action_assistant.runner.proof import SET_GOING, send_stop
+from action_assistant.runner.proof import SET_GOING
 from action_assistant.runner.recorder import Recorder, Store
 from action_assistant.runner.runs import Run, follow, thin
 from action_assistant.runner.seen import Hazard, Seen
+from action_assistant.runner.stop_loop import StopLoop
 from action_assistant.runner.watching import Watch
 
 log: Final = logging.getLogger(__name__)
 
-_STOP_POLL_S: Final = 0.1
-_UNCONFIRMED_S: Final = 2.0
-_SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobody
 _TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
-_ONE_PRESS_S: Final = 1.0
-_SLOWEST_S: Final = 30.0  # between two stops that can bring nothing more
 _LOOK_AT_IT: Final = "Look at the robot; its hardware stop is the one to use."
 
 _LINES: Final = 2_000  # of the engine's log, kept with one run
@@ -102,28 +95,15 @@ class OpenRun:
         self._again = anyio.Event()
         self._is_left = False
         self._handing = anyio.CancelScope()  # while the start is handed over
-        self._stop_wanted = anyio.Event()
-        self._pressed = anyio.Event()
-        self._stop_ids: set[str] = {""}
-        self._stop_asked: tuple[str, float] = ("", 0.0)
-        self._hung = ""
+        self._stopping = StopLoop(self, link, simulated=owns_link, wall=wall)
         self._early: list[Report] = []
-        if run.desired == "stopped":
-            self._stop_wanted.set()
 
     # --- what people want ---------------------------------------------------------------------
 
     def stop(self, author: Author, stop_id: str) -> None:
-        """Want the run stopped, now and until it is. Never waits, never fails. One press may come
-        several times and by several ways; it is recorded once."""
-        now, (who, when) = anyio.current_time(), self._stop_asked
-        if who != author.id or (stop_id not in self._stop_ids and now - when > _ONE_PRESS_S):
-            self._stop_asked = (author.id, now)
-            self.tell(StopRequested(self._wall(), author, stop_id), author.id)
-        self._stop_ids.add(stop_id)
+        """Want the run stopped, now and until it is. Never waits, never fails."""
         self._doubts.reach()
-        self._stop_wanted.set()
-        self._pressed.set()
+        self._stopping.press(author, stop_id)
         self._handing.cancel()
 
     async def pause(self, author: Author) -> None:
@@ -268,7 +248,7 @@ class OpenRun:
             if self._owns_link:
                 tasks.start_soon(self._steadily, self._link.run)
             tasks.start_soon(self._steadily, self.watch.run)
-            tasks.start_soon(self._steadily, self._stop_until_proven)
+            tasks.start_soon(self._steadily, self._stopping.run)
             await self._over.wait()
             tasks.cancel_scope.cancel()
 
@@ -336,7 +316,7 @@ class OpenRun:
                 self.alarm("engine_gone", why)  # a simulated engine does not come back
                 self.end("lost", why)
             case EngineChanged(state="busy", why=why):
-                self._hung = why
+                self._stopping.hung = why
             case _:
                 return
         self.watch.look()
@@ -353,37 +333,7 @@ class OpenRun:
                 place = f" at {item.node}" if item.node else ""
                 self.alarm(item.code, f"{item.code}{place}: {item.message or item.effect}")
 
-    # --- stopping -----------------------------------------------------------------------------
-
-    async def _stop_until_proven(self) -> None:
-        await self._stop_wanted.wait()
-        began, gap = anyio.current_time(), _STOP_POLL_S
-        for attempt in itertools.count(self.run.stops_sent + 1):
-            await self._stop_is_due()
-            failed = await send_stop(self._link, self.run.graph_name)
-            if not failed:
-                self.watch.stop_left()
-            self.tell(StopSent(self._wall(), attempt, failed))
-            self.watch.look()
-            if anyio.current_time() - began >= _UNCONFIRMED_S:
-                why = failed or self.watch.trouble or "no proof has come"
-                self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}.")
-            if self._owns_link and anyio.current_time() - began >= _SWITCH_OFF_S:
-                why = self._hung or f"It does not obey: {self.watch.trouble}."
-                self.end("lost", f"{why} The simulated engine was switched off.")
-                return
-            with anyio.move_on_after(gap):
-                await self._pressed.wait()
-            is_vain = self.run.unconfirmed and not self.run.active and not self.run.unknown_since
-            gap = min(gap * 1.5, _SLOWEST_S if is_vain else 1.0)
-
-    async def _stop_is_due(self) -> None:
-        """An engine that does not hold the run any more is told once for each press, and not again: a
-        graph of that name there would be another one."""
-        while self.run.lost and not self._pressed.is_set():
-            with anyio.move_on_after(1.0):
-                await self._pressed.wait()
-        self._pressed = anyio.Event()
+    # --- without a proof ----------------------------------------------------------------------
 
     def lose(self, why: str) -> None:
         """The engine does not hold the run any more: whether its code has ended is not known."""

@@ -14,6 +14,7 @@ from typing import Final, TypeAlias, assert_never
 import anyio
 from temoto_msgs.msg import UmrfGraphModify, UmrfGraphPause, UmrfGraphResume, UmrfGraphStart
 
+from action_assistant.runner.engine_process import engine_process
 from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.engine_text import NotAGraph
 from action_assistant.runner.links.heard import Endpoint, Heard, LogLine, Sound
@@ -250,7 +251,9 @@ class Ros2Link:
         incarnation = servers[0].gid if len(servers) == 1 else ""
         before = self._standing
         known = before.incarnation
+        process = before.process
         if incarnation and incarnation != known:
+            process = engine_process(servers[0].process, domain.process, self._number)
             self._known_since = time.monotonic()
             self._answered, self._unanswered_since = False, None
             self._restarted = bool(known)
@@ -269,6 +272,7 @@ class Ros2Link:
                 listeners=listeners,
                 others=len(domain.publishers(self._topics.start)),
                 actor=self._actor(domain),
+                process=process,
             )
         )
 
