@@ -356,15 +356,16 @@ class OpenRun:
             if process is None
             else f"The engine's process, {process.pid} on this computer, has ended."
         )
-        self._rests(AtRest(None, self._wall(), how), "error" if run.unconfirmed else "lost")
+        state: End = "error" if run.unconfirmed else "lost"
+        self._rests(AtRest(None, self._wall(), how), state, run.unconfirmed or run.lost or how)
 
     def confirm_rest(self, author: Author, how: str) -> None:
         """Somebody has seen that it is at rest, where no answer of the engine can prove it."""
-        self._rests(AtRest(author, self._wall(), how), "error", author.id)
+        why = self.run.unconfirmed or self.run.lost or self.watch.trouble
+        self._rests(AtRest(author, self._wall(), how), "error", why, author.id)
 
-    def _rests(self, seen: AtRest, state: End, author: str = "") -> None:
-        detail = self.run.unconfirmed or self.run.lost or self.watch.trouble or seen.how
-        self.tell(Ended(seen.at, state, self._result(), detail, seen), author)
+    def _rests(self, seen: AtRest, state: End, why: str, author: str = "") -> None:
+        self.tell(Ended(seen.at, state, self._result(), why, seen), author)
 
     def _result(self) -> str | None:
         return self.run.result or _RESULTS.get(self.run.graph_state or "")
