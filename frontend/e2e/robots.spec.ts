@@ -15,7 +15,11 @@ const late = new StandIn("Late");
 const old = new OlderEngine("Old");
 const stranger = new Stranger();
 /** Everything goes on for a minute, and a graph of one action ends soon. */
-const SCRIPT = { "*": { after_s: 60, stop_s: 0.05 }, "chain_1/Wait_0": { after_s: 2 } };
+const SCRIPT = {
+  "*": { after_s: 60, stop_s: 0.05 },
+  "chain_1/Wait_0": { after_s: 2 },
+  "chain_6/Wait_0": { never: true, ignores_stop: true },
+};
 const robots = [david, eve, late];
 let ada: Person;
 
@@ -40,6 +44,7 @@ interface Run {
   number: number;
   state: string;
   proof_at: string | null;
+  at_rest: { by: { name: string } | null; how: string } | null;
   group: string | null;
 }
 
@@ -224,14 +229,15 @@ test.describe("what the page shows of an engine that", () => {
     const run = await begin("David", await product.chain(4));
     await expect(word("David", run)).toContainText("running");
     await david.end();
-    await expect(word("David", run)).toContainText("unknown since", { timeout: 15_000 });
+    await expect(word("David", run)).toBeHidden({ timeout: 15_000 });
     david.start(product.data, SCRIPT);
-    await expect(word("David", run)).toBeHidden({ timeout: 30_000 });
-    await expect(card(ada.page, "David").getByText(/· restarted \d/)).toBeVisible();
+    await expect(card(ada.page, "David").getByText(/· restarted \d/)).toBeVisible({
+      timeout: 30_000,
+    });
     const [newest] = await runs();
+    expect([newest?.state, newest?.proof_at, newest?.at_rest?.by]).toEqual(["lost", null, null]);
     await ada.page.goto(`${product.url}/runs/${newest?.id}`);
-    await expect(ada.page.getByText("lost: nothing proves its end").first()).toBeVisible();
-    await expect(ada.page.getByText(/look at the robot/).first()).toBeVisible();
+    await expect(ada.page.getByText("lost: its engine has ended").first()).toBeVisible();
   });
 
   test("speaks another generation of messages", async () => {
@@ -244,17 +250,50 @@ test.describe("what the page shows of an engine that", () => {
     await expect(start).toBeDisabled();
   });
 
-  test("was killed: nothing is claimed, and its Stop is loud", async () => {
+  test("calls an action ERROR that does not obey: only who has looked ends that", async () => {
+    const { page } = ada;
+    const graph = await product.chain(6);
+    const run = await begin("David", graph);
+    await expect(word("David", run)).toContainText("running");
+    await page.goto(`${product.url}/graphs/${graph}`);
+    await page.getByRole("button", { name: /^Stop run/ }).click();
+    await expect(alarm(page)).toContainText("Wait_0 did not obey", { timeout: 20_000 });
+    expect((await runs())[0]?.state).toBe("stopping");
+    await expect(page.getByRole("button", { name: /^Stop run/ })).toBeEnabled();
+    await choose(page, await product.chain(1), ["David"]);
+    await expect(lookedAt(page, "David").getByText(/Somebody has to see it at rest/)).toBeVisible();
+    await page.keyboard.press("Escape");
+    const look = alarm(page).getByRole("button", { name: "I looked …" });
+    await look.focus();
+    await page.keyboard.press("Enter");
+    const words = page.getByRole("textbox", { name: "How did you see that nothing moves?" });
+    await expect(words).toBeFocused();
+    await expect(page.getByRole("button", { name: "Say how you saw it first" })).toBeDisabled();
+    await words.fill("I stand beside it; its motors are off.");
+    await hold(page, /^Confirm that run \d+ is at rest/);
+    await expect(alarm(page)).toBeHidden();
+    const [newest] = await runs();
+    expect([newest?.state, newest?.proof_at]).toEqual(["error", null]);
+    await page.goto(`${product.url}/runs/${newest?.id}`);
+    await expect(page.getByText("error: seen at rest by Ada").first()).toBeVisible();
+    await page.getByRole("tab", { name: "Facts" }).click();
+    await expect(page.getByText(/by Ada.*“I stand beside it; its motors are off.”/)).toBeVisible();
+  });
+
+  test("never speaks again: nothing is claimed, and its Stop is loud", async () => {
     const { page } = ada;
     const graph = await product.chain(4);
     const run = await begin("Eve", graph);
     await expect(word("Eve", run)).toContainText("running");
-    await eve.kill();
+    eve.freeze();
     await expect(word("Eve", run)).toContainText("unknown since", { timeout: 20_000 });
     await page.goto(`${product.url}/graphs/${graph}`);
     await page.getByRole("button", { name: /^Stop run/ }).click();
     await expect(alarm(page)).toContainText("Eve");
     expect(["unknown", "stopping"]).toContain((await runs())[0]?.state);
+    await eve.kill();
+    await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("lost");
+    expect((await runs())[0]?.proof_at).toBeNull();
     expect(ada.failures).toEqual([]);
   });
 });

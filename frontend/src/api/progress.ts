@@ -131,6 +131,9 @@ const runWords: Record<Run["state"], { tone: Tone; word: string }> = {
 /** The run's state, with the result where it has one that says more. */
 export function runWord(run: Run): { tone: Tone; word: string } {
   if (run.moves_again_at) return { tone: "error", word: "MOVES AGAIN" };
+  if (run.unconfirmed && run.ended_at === null && run.state !== "running") {
+    return { tone: "error", word: run.state === "lost" ? "lost" : "stop unconfirmed" };
+  }
   if (run.state === "unknown" && run.unknown_since) {
     return { tone: "unknown", word: `unknown since ${clockOf(run.unknown_since)}` };
   }
@@ -146,6 +149,8 @@ export function endWords(run: Run): string {
   const { word } = runWord(run);
   const by = run.stopped_by?.name;
   if (run.state === "stopped" && by) return `stopped by ${by}`;
+  if (run.at_rest?.by) return `${word}: seen at rest by ${run.at_rest.by.name}`;
+  if (run.at_rest) return `${word}: its engine has ended`;
   if (run.state === "lost") return "lost: nothing proves its end";
   if (run.state === "finished" && run.result === "on_true") return "finished";
   return word;

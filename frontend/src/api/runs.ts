@@ -68,6 +68,10 @@ export interface Run {
   desired: "running" | "paused" | "stopped";
   proof_at: string | null;
   unknown_since: string | null;
+  /** Why no answer of its engine can show rest any more; null when one can. */
+  unconfirmed?: string | null;
+  /** Who has seen it at rest instead; `by` null: the runner, which saw the engine's process end. */
+  at_rest?: { by: Asker | null; at: string; how: string } | null;
   /** It had ended, and its engine shows it moving; null at its next end. */
   moves_again_at: string | null;
   result: RunResult | null;
@@ -102,17 +106,25 @@ export function placeOf(run: Run): string {
   return run.engine === "simulator" ? "simulator" : `${run.engine} (simulated)`;
 }
 
-const ENDED: ReadonlySet<RunState> = new Set<RunState>([
-  "finished",
-  "halted",
-  "stopped",
-  "error",
-  "refused",
-  "lost",
-]);
-
+/** A lost run has not: nobody has seen it at rest yet. */
 export function hasEnded(run: Run): boolean {
-  return ENDED.has(run.state);
+  return run.ended_at !== null;
+}
+
+const MOVES: ReadonlySet<string> = new Set(["RUNNING", "STOPPING", "PAUSE_REQUESTED", "PAUSED"]);
+
+/** Whether a person's word can end the run, since no answer of its engine can. */
+export function awaitsLook(run: Run): boolean {
+  if (hasEnded(run) || run.simulated || run.started_at === null) return false;
+  if (run.state === "lost" || run.unknown_since !== null) return true;
+  const moves = Object.values(run.actions ?? {}).some((action) => MOVES.has(action.state));
+  return Boolean(run.unconfirmed) && !moves;
+}
+
+/** Says that somebody has seen the run at rest, and how. */
+export function confirmRest(runner: string, run: string, how: string): Promise<Run> {
+  const path = `/api/runs/${encodeURIComponent(run)}/at_rest`;
+  return ask(`${runner}${path}`, { method: "POST", body: { how } });
 }
 
 export interface StartOrder {

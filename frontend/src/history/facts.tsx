@@ -6,11 +6,18 @@ import { placeOf, type Run, whence } from "../api/runs";
 import { clock, day, duration, instant, useNow } from "../ui/when";
 import style from "./facts.module.css";
 
+type Rest = NonNullable<Run["at_rest"]>;
+
 interface Props {
   runner: string | undefined;
   run: Run;
   version: string;
   by: string;
+}
+
+function restWords(rest: Rest, moment: (at: number | null) => string): string {
+  const who = rest.by ? `by ${rest.by.name}${whence(rest.by)}` : "by the runner";
+  return `${moment(instant(rest.at))} ${who}: “${rest.how}”`;
 }
 
 export function Facts({ runner, run, version, by }: Props) {
@@ -47,6 +54,7 @@ export function Facts({ runner, run, version, by }: Props) {
       ? [["Raw messages", raw.text || `here, ${raw.hours.length} h`] as [string, string]]
       : []),
     ["Last proof", moment(instant(run.proof_at))],
+    ...(run.at_rest ? [["Seen at rest", restWords(run.at_rest, moment)] as [string, string]] : []),
     ...(run.despite ?? []).map(({ code, text }): [string, string] => ["In spite of", text ?? code]),
     ...(run.override ? [["Because", `“${run.override.reason}”`] as [string, string]] : []),
   ];

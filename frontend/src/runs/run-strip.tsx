@@ -13,6 +13,7 @@ import { StateWord } from "../ui/state-word";
 import { Timeline } from "../ui/timeline";
 import { clock, day, instant, stopwatch, useNow } from "../ui/when";
 import { PauseButton } from "./pause-button";
+import { RestButton } from "./rest-button";
 import style from "./run-strip.module.css";
 
 interface Props {
@@ -97,6 +98,7 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, o
             {run.detail}
           </Text>
         )}
+        {goes && <RestButton run={run} />}
         {goes && <PauseButton run={run} />}
         <Button
           component={Link}

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { LiveNow, StopAsked } from "../api/live";
-import type { Run } from "../api/runs";
+import { awaitsLook, type Run } from "../api/runs";
 import { meantBy } from "./stop-button";
 import { movingAgain, noticeOf, othersNotice } from "./stop-notice";
 
@@ -71,6 +71,27 @@ test("a Stop of somebody else that nothing proves is shouted here, too, with the
   const stopping = now({ state: "stopping", desired: "stopped", alarms: [alarm] });
   expect(othersNotice(stopping)?.text).toBe("STOP UNCONFIRMED: run 7 on David: it is deaf.");
   expect(othersNotice(now({ desired: "running", alarms: [alarm] }))).toBeNull();
+});
+
+test("what an engine gave up is shouted whoever asked for it, until somebody has looked", () => {
+  const unconfirmed = "Grip_0 did not obey within 5 s";
+  const left = now({ state: "unknown", desired: "running", unconfirmed });
+  expect(othersNotice(left)?.text).toContain(
+    "run 7 on David: Grip_0 did not obey within 5 s. Look",
+  );
+  const over = { state: "error", unconfirmed: null, ended_at: "1970-01-01T00:00:02Z" } as const;
+  expect(othersNotice(now({ ...over, desired: "running" }))).toBeNull();
+});
+
+test("a person's word is asked for only where no answer can prove rest", () => {
+  const run = { ended_at: null, simulated: false, started_at: "", unknown_since: null } as Run;
+  const moving = { a: { state: "RUNNING" } } as unknown as NonNullable<Run["actions"]>;
+  expect(awaitsLook({ ...run, state: "running" })).toBe(false);
+  expect(awaitsLook({ ...run, state: "lost" })).toBe(true);
+  expect(awaitsLook({ ...run, state: "unknown", unknown_since: "1970" })).toBe(true);
+  expect(awaitsLook({ ...run, state: "stopping", unconfirmed: "why" })).toBe(true);
+  expect(awaitsLook({ ...run, state: "running", unconfirmed: "why", actions: moving })).toBe(false);
+  expect(awaitsLook({ ...run, state: "lost", simulated: true })).toBe(false);
 });
 
 test("beside a graph, Stop means its run or the group it is in, and else everything", () => {

@@ -2,9 +2,10 @@
 import { CloseButton } from "@mantine/core";
 import { useState } from "react";
 import type { LiveNow, StopAsked } from "../api/live";
-import type { Run } from "../api/runs";
+import { awaitsLook, type Run } from "../api/runs";
 import { foreignGraphs, openRuns, useLive } from "../api/use-live";
 import { clock, duration, useNow } from "../ui/when";
+import { RestButton } from "./rest-button";
 import style from "./stop-notice.module.css";
 
 const LOUD = 2_500; // ms without proof until the notice shouts
@@ -30,6 +31,7 @@ function targets(stop: StopAsked, now: LiveNow): Run[] {
 
 /** Why it is not proven, as the runner says; "" when it has not said so yet. */
 function reasonOf(run: Run): string {
+  if (run.unconfirmed) return `${run.unconfirmed.replace(/\.$/, "")}.`;
   const alarm = run.alarms.findLast((each) => each.code === "stop_unconfirmed");
   return alarm ? alarm.text.replace(/^STOP UNCONFIRMED: /, "") : "";
 }
@@ -37,7 +39,10 @@ function reasonOf(run: Run): string {
 function unconfirmed(runs: readonly Run[], since?: string): Notice {
   const each = runs.map((run) => `run ${run.number} on ${run.engine}`).join(", ");
   const why = runs.map(reasonOf).find((reason) => reason !== "") ?? "no proof has come.";
-  const text = `STOP UNCONFIRMED: ${each}: ${why}`;
+  const look = runs.some((run) => run.unconfirmed)
+    ? " Look at the robot; use its hardware stop."
+    : "";
+  const text = `STOP UNCONFIRMED: ${each}: ${why}${look}`;
   return { tone: "loud", stays: true, text, ...(since === undefined ? {} : { since }) };
 }
 
@@ -104,7 +109,9 @@ export function movingAgain(now: LiveNow): Notice {
 /** What somebody else has asked for and what is not proven either: everybody is told. */
 export function othersNotice(now: LiveNow): Notice {
   if (now.link === "down") return null;
-  const shouting = openRuns(now).filter((run) => run.desired === "stopped" && reasonOf(run) !== "");
+  const shouting = openRuns(now).filter(
+    (run) => Boolean(run.unconfirmed) || (run.desired === "stopped" && reasonOf(run) !== ""),
+  );
   if (shouting.length > 0) return unconfirmed(shouting);
   const held = foreignGraphs(now).find((each) => each.held.stopping);
   if (held === undefined) return null;
@@ -125,6 +132,8 @@ export function StopNotice() {
   const notice =
     movingAgain(now) ?? (watching ? noticeOf(last, now, at) : null) ?? othersNotice(now);
   if (notice === null) return null;
+  const looked =
+    notice.tone === "loud" && now.link !== "down" ? openRuns(now).find(awaitsLook) : undefined;
   return (
     <div
       className={style.notice}
@@ -139,6 +148,7 @@ export function StopNotice() {
           </span>
         )}
       </span>
+      {looked && <RestButton run={looked} loud />}
       {!notice.stays && (
         <CloseButton size="sm" aria-label="Hide" onClick={() => setDismissed(last?.id ?? "")} />
       )}
