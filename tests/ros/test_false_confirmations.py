@@ -37,8 +37,11 @@ from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import ENDED
 from action_assistant.runner.standin import StandInNode
 from action_assistant.runner.standin_wire import Quirks
+from action_assistant.runner.steering import RestRequest, confirm_rest
 from action_assistant.umrf import codec
+from action_assistant.umrf.semantics import Execution
 from ros.robots import robot
+from runner.air import run_of
 from runner.world import ANN, BEN, MemoryLedger, at_once, order, sequence, two_ends
 
 HISTORIES = int(os.environ.get("TEST_ROS_HISTORIES", "2"))
@@ -50,6 +53,9 @@ SCRIPTS: list[dict[str, Any]] = [
     {"*": [{"never": True}]},
     {"Work_0": [{"after_s": 0.4}], "*": [{"after_s": 5}]},
     {"Work_0": [{"after_s": 0.5}], "*": [{"never": True, "stop_s": 1.0}]},
+    {"*": [{"never": True, "ignores_stop": True}]},
+    {"*": [{"never": True, "stop_s": 7.0}]},
+    {"*": [{"after_s": 4, "ignores_stop": True, "stop_error": True}]},
 ]
 STILL = ENDED - {"lost", "refused"}
 KNOWINGLY = Override(codes=("proof", "quiet", "others"), reason="it is a test")
@@ -106,7 +112,7 @@ class Story:
         self.judged: set[str] = set()
         self.still: set[str] = set()
         self.ledger = MemoryLedger()
-        self.texts: list[str] = []
+        self.runs: dict[Execution, str] = {}
 
     def robot(self) -> None:
         """An engine comes up."""
@@ -148,8 +154,8 @@ class Story:
         """Something happens."""
         name = self.chance.choice(list(GRAPHS))
         what = self.chance.choices(
-            ["start", "stop", "wait", "stranger", "made up", "second", "reboot", "quit"],
-            [5, 3, 3, 1, 1, 0.4, 0.4, 0.3],
+            ["start", "stop", "wait", "stranger", "made up", "look", "second", "reboot", "quit"],
+            [5, 3, 3, 1, 1, 1, 0.4, 0.4, 0.3],
         )[0]
         match what:
             case "start":
@@ -166,6 +172,11 @@ class Story:
                 for opened in tuple(control.open.values())[:1]:
                     requested = self.ledger.told(opened.run.id)[0]
                     stranger.make_up(getattr(requested, "umrf", "{}"))
+            case "look":
+                for run, opened in tuple(control.open.items()):
+                    if run not in self.moving():
+                        with suppress(Refused):
+                            confirm_rest(opened, RestRequest("I stand beside it."), BEN)
             case "second" if len(self.robots) < 2:
                 await anyio.to_thread.run_sync(self.robot)
             case "reboot" if self.robots:
@@ -179,13 +190,11 @@ class Story:
         await anyio.sleep(self.chance.choice([0.02, 0.1, 0.4, 1.2]))
 
     def moving(self) -> set[str]:
-        """Runs of ours that really move."""
+        """Runs of ours of which the code of an action really goes on."""
         found: set[str] = set()
         for node, _ in self.robots:
-            for graph in node.robot.moving:
-                plan = node.robot._view.plans.get(graph.partition("__")[0])
-                for mark in list(plan.attributes.values())[:1] if plan is not None else []:
-                    found.add(mark.get("action_assistant", {}).get("run", ""))
+            for each in node.robot.executing:
+                found.add(self.runs.setdefault(each, run_of(node.robot, each.graph)))
         return found - {""}
 
     def judge(self, opened: OpenRun) -> None:

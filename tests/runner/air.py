@@ -48,6 +48,13 @@ def now() -> float:
     return asyncio.get_running_loop().time()
 
 
+def run_of(robot: StandIn, graph: str) -> str:
+    """The run that the graph of this running name is marked with now; "" for none of ours."""
+    plan = robot._view.plans.get(graph.partition("__")[0])
+    marks = list(plan.attributes.values()) if plan is not None else []
+    return str(marks[0].get("action_assistant", {}).get("run") or "") if marks else ""
+
+
 class Node:
     """An engine node in the air: a stand-in and what discovery knows of it."""
 

@@ -29,7 +29,7 @@ from action_assistant.runner.steering import RestRequest, confirm_rest
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import Execution, script_from
-from runner.air import Air, Node, now, now_ms
+from runner.air import Air, Node, now, now_ms, run_of
 from runner.air_link import AirLink
 from runner.world import ANN, BEN, World, carousel, live_through, order, sequence, two_ends
 
@@ -355,13 +355,6 @@ class Story:
     def blocked(self) -> bool:
         """Whether an engine will never answer again."""
         return any(each.robot._engine.locked for each in self.air.nodes if not each.robot.gone)
-
-
-def run_of(robot: StandIn, graph: str) -> str:
-    """The run that the graph of this running name is marked with now; "" for none of ours."""
-    plan = robot._view.plans.get(graph.partition("__")[0])
-    marks = list(plan.attributes.values()) if plan is not None else []
-    return str(marks[0].get("action_assistant", {}).get("run") or "") if marks else ""
 
 
 def lived(seed: int, link: Callable[[Air], Link] = lambda air: AirLink(air, NAME)) -> Story:

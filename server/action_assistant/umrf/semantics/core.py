@@ -56,8 +56,7 @@ class Core(Clock):
     def executing(self, at_ms: float) -> list[Execution]:
         """The calls of actions' own code that have not returned by then: the truth of what moves,
         apart from the states that the engine shows. None when its process has ended."""
-        self._executions = [each for each in self._executions if each.ends_ms > at_ms]
-        return [] if self.crashed else list(self._executions)
+        return [] if self.crashed else [e for e in self._executions if e.ends_ms > at_ms]
 
     # Results
 
@@ -222,7 +221,7 @@ class Core(Clock):
         node.rest_ms = None
         self._state(graph, node, "RUNNING")
         node.execution = Execution(graph.name, node.full_name, self.now)
-        self._executions.append(node.execution)
+        self._executions = [*self.executing(self.now), node.execution]
         duration = node.call.after_s * 1000
         if node.type == "spontaneous":
             duration = max(duration, 1.0)
