@@ -5,6 +5,7 @@ engine's process is seen to. That can only be seen here: on another computer, in
 or after a reboot nothing is known.
 """
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -46,18 +47,23 @@ def has_ended(known: EngineProcess) -> bool:
         return False
 
 
-def engine_process(prefix: str, ours: str, domain: int) -> EngineProcess | None:
+def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProcess | None:
     """The process behind a DDS participant, when it certainly is one of this computer.
 
     `prefix` and `ours` are GUID prefixes in hex, of the engine and of this process. Fast DDS puts two
-    bytes of the host and the low two of the process id into them; the process must also hold a port
-    of that domain. None wherever that leaves a doubt, and for every other middleware.
+    bytes of the host and the low two of the process id into them. Containers on one network share the
+    former and count processes anew, so the process must also hold a port of that domain and have been
+    started with the engine's name. None wherever that leaves a doubt, and for every other middleware.
     """
     if len(prefix) < 24 or prefix[:8] != ours[:8] or not prefix.startswith(_FAST_DDS):
         return None
     low = int.from_bytes(bytes.fromhex(prefix[8:12]), "little")
     try:
-        found = [pid for pid in _pids() if pid & 0xFFFF == low and _speaks_dds(pid, domain)]
+        found = [
+            pid
+            for pid in _pids()
+            if pid & 0xFFFF == low and _is_called(pid, name) and _speaks_dds(pid, domain)
+        ]
     except OSError:
         return None
     return process(found[0]) if len(found) == 1 else None
@@ -81,6 +87,15 @@ def _started(pid: int) -> int | None:
 
 def _pids() -> Iterator[int]:
     return (int(each.name) for each in _PROC.iterdir() if each.name.isdigit())
+
+
+def _is_called(pid: int, name: str) -> bool:
+    """Whether a word of its command line is the name."""
+    try:
+        line = (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace")
+    except OSError:
+        return False
+    return name in re.split(r"[\0=,]", line)
 
 
 def _speaks_dds(pid: int, domain: int) -> bool:

@@ -253,7 +253,7 @@ class Ros2Link:
         known = before.incarnation
         process = before.process
         if incarnation and incarnation != known:
-            process = engine_process(servers[0].process, domain.process, self._number)
+            process = engine_process(servers[0].process, domain.process, self._number, self._name)
             self._known_since = time.monotonic()
             self._answered, self._unanswered_since = False, None
             self._restarted = bool(known)
