@@ -1,0 +1,67 @@
+"""Stop on the command line with a robot that does not obey: over rclpy, with the real product."""
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip(
+    "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
+)
+
+from ros.robots import RobotProcess
+from support.product import Product, running
+
+STUBBORN: dict[str, Any] = {"*": [{"never": True, "ignores_stop": True}]}
+GRAPH = {
+    "graph_name": "pair",
+    "graph_entry": [{"name": "A"}],
+    "graph_exit": [{"name": "A"}],
+    "actions": [{"name": "A", "type": "sync"}],
+}
+
+
+def _answering(product: Product) -> None:
+    with product.runner() as runner:
+        deadline = time.monotonic() + 30
+        while time.monotonic() < deadline:
+            robots = {each["name"]: each for each in runner.get("/api/robots").json()}
+            if robots.get("David", {}).get("state") == "answering":
+                return
+            time.sleep(0.1)
+    raise AssertionError(robots)
+
+
+@pytest.mark.timeout(240)
+def test_stop_says_unconfirmed_and_exits_1_until_somebody_has_looked(
+    domain: int, tmp_path: Path
+) -> None:
+    david = RobotProcess(domain, tmp_path, STUBBORN)
+    (tmp_path / "pair.json").write_text(json.dumps(GRAPH))
+    try:
+        with running(tmp_path / "data") as product:
+            with product.runner() as runner:
+                runner.post("/api/robots", json={"name": "David", "domain": domain})
+            _answering(product)
+            graph = product.cli("import", str(tmp_path / "pair.json")).stdout.split()[0]
+            run = product.cli("run", graph, "--engine", "David", "--no-wait").stdout.strip()
+            told = product.cli("stop", run)
+            assert (told.returncode, told.stdout) == (1, "")
+            assert "STOP UNCONFIRMED" in told.stderr
+            assert "A_0 did not obey within 5 s" in told.stderr
+
+            product.kill()
+            product.start()
+            _answering(product)
+            again = product.cli("run", graph, "--engine", "David", "--no-wait")
+            assert again.returncode == 1
+            assert "Somebody has to see it at rest" in again.stderr
+            assert product.cli("stop", "--all").returncode == 1
+
+            looked = product.cli("runs", "at-rest", run, "--how", "I stand beside it.")
+            assert (looked.returncode, looked.stdout) == (0, "run 1 of pair is over: error\n")
+            assert product.cli("stop", "--all").returncode == 0
+    finally:
+        david.end()
