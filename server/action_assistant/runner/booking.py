@@ -20,6 +20,7 @@ from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.runs import Run, begin
 from action_assistant.runner.starting import Cleared
 from action_assistant.umrf import codec
+from action_assistant.umrf.laps import laps
 
 
 def booked(
@@ -54,6 +55,7 @@ def booked(
         despite=cleared.despite,
         group=group,
         like=asked.like,
+        laps=laps(graph),
     )
     targets = () if cleared.own else (asked.engine,)
     return requested, Order(run=run, graph=graph, umrf=umrf, targets=targets)

@@ -12,6 +12,7 @@ import msgspec
 
 from action_assistant.runner.engine_process import EngineProcess
 from action_assistant.runner.seen import Seen
+from action_assistant.umrf.laps import Laps
 
 End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "lost"]
 
@@ -66,6 +67,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     despite: tuple[Overridden, ...] = ()  # what was overridden
     group: str | None = None  # shared by runs that one request has started together
     like: str | None = None  # the robot whose engine the simulator played
+    laps: Laps | None = None  # None: found in `umrf`
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -37,27 +37,19 @@ from action_assistant.runner.events import (
     Unconfirmed,
     Unknown,
 )
-from action_assistant.runner.seen import (
-    ACTIVE,
-    TERMINAL,
-    GraphResult,
-    GraphState,
-    Hazard,
-    NodeResult,
-    NodeState,
-    Seen,
-    Snapshot,
-)
+from action_assistant.runner.seen import ACTIVE, TERMINAL, Seen, Snapshot
+from action_assistant.runner.sights import key_of as key_of
+from action_assistant.runner.sights import names_all, observe
 from action_assistant.runner.visits import (
     KEPT,
     ActionRun,
     Message,
-    changed,
-    heard,
+    awaits_answer,
     is_heard,
-    resulted,
-    shown,
+    paused,
 )
+from action_assistant.umrf import codec
+from action_assistant.umrf.laps import Laps, laps
 
 State: TypeAlias = Literal[
     "requested",
@@ -119,7 +111,10 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     graph_state: str | None = None
     parts: dict[str, str] = {}  # running sub-graphs of this run, and their states
     actions: dict[str, ActionRun] = {}
-    looked: dict[str, int] = {}  # when all actions of a graph were last seen to be as here
+    looked: dict[str, int] = {}  # asking for the newest answer that showed a graph to be as here
+    reshaped: bool = False  # what its arrows rule out may have happened nevertheless
+    failed: bool = False  # an action has, or may have in a sub-graph
+    stoppable: bool = False  # something or somebody may have stopped an action
     result: str | None = None
     started_at: int | None = None
     ended_at: int | None = None
@@ -188,6 +183,8 @@ def replay(events: Iterable[RunEvent]) -> Run | None:
 
 def begin(event: Requested) -> Run:
     """A run at its first event."""
+    known = event.laps if event.laps is not None else _laps(event.umrf)
+    once, joined = frozenset(known.once), frozenset(known.barring_errors)
     return Run(
         id=event.run,
         number=event.number,
@@ -204,8 +201,20 @@ def begin(event: Requested) -> Run:
         despite=event.despite,
         group=event.group,
         like=event.like,
-        actions={name: ActionRun(aid=aid) for name, aid in event.actions.items()},
+        actions={
+            name: ActionRun(aid=aid, once=name in once, joined=name in joined)
+            for name, aid in event.actions.items()
+        },
+        stoppable=known.stops,
     )
+
+
+def _laps(umrf: str) -> Laps:
+    """For runs that were begun before this was recorded with them."""
+    try:
+        return laps(codec.read(umrf.encode()).graph)
+    except codec.Unreadable:
+        return Laps(stops=True)
 
 
 def follow(run: Run, event: RunEvent) -> Run:
@@ -218,9 +227,10 @@ def follow(run: Run, event: RunEvent) -> Run:
                 run, incarnation=event.incarnation, started_at=event.at, process=event.process
             )
         case Observed():
-            return _observe(run, event.seen)
+            return observe(run, event.seen)
         case PauseRequested():
-            return run if run.desired == "stopped" else replace(run, desired="paused")
+            held = _held(run)
+            return held if run.desired == "stopped" else replace(held, desired="paused")
         case ResumeRequested():
             return run if run.desired == "stopped" else replace(run, desired="running")
         case ModifyRequested():
@@ -233,6 +243,7 @@ def follow(run: Run, event: RunEvent) -> Run:
                 version=event.version,
                 digest=event.digest,
                 actions=run.actions | actions,
+                reshaped=True,
             )
         case ModifyRefused():
             return _unmodified(run, event)
@@ -252,7 +263,7 @@ def follow(run: Run, event: RunEvent) -> Run:
             return replace(run, unknown_since=None, lost="")
         case AlarmRaised():
             alarm = Alarm(event.code, event.at, event.text)
-            return replace(run, alarms=(*run.alarms, alarm)[-KEPT:])
+            return replace(_meddled(run, event.code), alarms=(*run.alarms, alarm)[-KEPT:])
         case MovesAgain():
             return _reopen(run, event)
         case EngineSaid():
@@ -269,6 +280,26 @@ def follow(run: Run, event: RunEvent) -> Run:
             assert_never(event)
 
 
+def _held(run: Run) -> Run:
+    actions = {name: paused(action) for name, action in run.actions.items()}
+    return replace(run, actions=actions)
+
+
+def _meddled(run: Run, alarm: str) -> Run:
+    """Strangers may do what the graph rules out."""
+    match alarm:
+        case "foreign_pause":
+            return _held(run)
+        case "foreign_start" | "foreign_modify":
+            return replace(_held(run), reshaped=True, stoppable=True)
+        case "foreign_resume":
+            return replace(run, reshaped=True)
+        case "foreign_stop":
+            return replace(run, stoppable=True)
+        case _:
+            return run
+
+
 def is_news(run: Run, shown: Snapshot) -> bool:
     """Whether a snapshot says anything that is not known yet."""
     own = shown.graph == run.graph_name
@@ -277,6 +308,8 @@ def is_news(run: Run, shown: Snapshot) -> bool:
     for node, state in shown.nodes.items():
         action = run.actions.get(key_of(run, shown.graph, node))
         if action is None or action.state != state:
+            return True
+        if shown.source == "get" and awaits_answer(action):
             return True
         messages = shown.messages.get(node, ())
         if len(messages) != action.heard or not is_heard(action, messages):
@@ -290,20 +323,13 @@ def thin(run: Run, seen: Iterable[Seen]) -> tuple[Seen, ...]:
     thinned: list[Seen] = []
     for item in seen:
         less = _thin(run, item) if isinstance(item, Snapshot) and not item.same else item
-        run = _observe(run, (less,))
+        run = observe(run, (less,))
         thinned.append(less)
     return tuple(thinned)
 
 
 def _thin(run: Run, shown: Snapshot) -> Snapshot:
-    own = shown.graph == run.graph_name
-    prefix = f"{shown.graph}/"
-    known = (
-        name if own else name.removeprefix(prefix)
-        for name in run.actions
-        if ("/" not in name if own else name.startswith(prefix))
-    )
-    if not all(name in shown.nodes for name in known):
+    if not names_all(run, shown):
         return shown  # some are gone: of them nothing may be said
     news: dict[str, str] = {}
     said: dict[str, tuple[str, ...]] = {}
@@ -311,6 +337,7 @@ def _thin(run: Run, shown: Snapshot) -> Snapshot:
         action = run.actions.get(key_of(run, shown.graph, node))
         messages = shown.messages.get(node, ())
         is_new = len(messages) != action.heard or not is_heard(action, messages) if action else True
+        is_new = is_new or (shown.source == "get" and action is not None and awaits_answer(action))
         if is_new or action is None or action.state != state:
             news[node] = state
             if messages:
@@ -359,57 +386,3 @@ def _end(run: Run, event: Ended) -> Run:
         moves_again_at=None,
         unknown_since=run.unknown_since if event.state == "lost" else None,
     )
-
-
-def _observe(run: Run, seen: Iterable[Seen]) -> Run:
-    actions = dict(run.actions)
-    parts, looked = run.parts, run.looked
-    graph_state, result = run.graph_state, run.result
-    begun_at = run.started_at or run.requested_at
-    for item in seen:
-        match item:
-            case NodeState():
-                name = key_of(run, item.graph, item.node)
-                before = actions.get(name, ActionRun())
-                actions[name] = changed(before, item.state, item.at, item.inputs)
-            case NodeResult():
-                name = key_of(run, item.graph, item.node)
-                actions[name] = resulted(actions.get(name, ActionRun()), item)
-            case GraphState():
-                if item.graph == run.graph_name:
-                    graph_state = item.state
-                else:
-                    parts = parts | {item.graph: item.state}
-            case GraphResult():
-                result = item.result if item.graph == run.graph_name else result
-            case Snapshot():
-                for node, state in item.nodes.items():
-                    name = key_of(run, item.graph, node)
-                    known = actions.get(name)
-                    since = max(begun_at, looked.get(item.graph, 0)) if known else begun_at
-                    inputs = item.inputs.get(node)
-                    action = shown(known or ActionRun(), state, item, since, inputs)
-                    actions[name] = heard(action, item.messages.get(node, ()), item.at)
-                if item.same:
-                    looked = looked | {item.graph: item.at}
-                if item.graph == run.graph_name:
-                    graph_state = item.state
-                else:
-                    parts = parts | {item.graph: item.state}
-            case Hazard():
-                pass  # the alarm that comes with it is an event of its own
-            case _:
-                assert_never(item)
-    return replace(
-        run,
-        actions=actions,
-        parts=parts,
-        looked=looked,
-        graph_state=graph_state,
-        result=result,
-    )
-
-
-def key_of(run: Run, graph: str, node: str) -> str:
-    """The name of an action in a run: nodes of sub-graphs stand behind the name of theirs."""
-    return node if graph == run.graph_name else f"{graph}/{node}"

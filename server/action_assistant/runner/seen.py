@@ -74,7 +74,8 @@ class Snapshot(msgspec.Struct, frozen=True, omit_defaults=True, tag="snapshot", 
     """One graph as the engine showed it at `at`; what happened in between is not known.
 
     `source`: `get` was asked for by us at `asked_at`, `feedback` came by itself and may be late.
-    `since`: when this engine was last seen before, so that changes lie between `since` and `at`.
+    `since`: when the answer before this came, and `since_asked` when that one was asked for: it showed
+    the graph as it was known until then, so that changes are later than `since_asked`.
     `run`: the identity that the graph carries; None for graphs that others started.
     `messages`: per node, all runtime messages so far (the engine keeps ten).
     `inputs`: the values of nodes that move, where they could be read.
@@ -96,6 +97,7 @@ class Snapshot(msgspec.Struct, frozen=True, omit_defaults=True, tag="snapshot", 
     same: bool = False
     stoppable: tuple[str, ...] = ()
     spontaneous: tuple[str, ...] = ()
+    since_asked: int | None = None
 
     @property
     def active(self) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Final, Protocol
 
 import anyio
-import msgspec
+from msgspec.structs import replace
 
 from action_assistant.runner.doubts import Doubts
 from action_assistant.runner.engine_process import has_ended
@@ -97,6 +97,7 @@ class Watch:
         self._doubts = doubts
         self._heard_at = self._began_at = anyio.current_time()
         self._seen_wall = rested_at
+        self._seen_asked: int | None = None
 
     def look(self) -> None:
         """Ask now."""
@@ -125,7 +126,8 @@ class Watch:
         overtaken, self._answered = self._answered, False
         self.seen_at = self._wall()
         if news := fresh(self._it.run, ours) if overtaken else ours:
-            self._it.observe(news)
+            asked = self._seen_asked
+            self._it.observe(tuple(replace(each, since_asked=asked) for each in news))
 
     async def run(self) -> None:
         """Ask until cancelled: each second, sooner when there is news, ten times as often for a stop."""
@@ -204,8 +206,9 @@ class Watch:
     def _note(self, shown: list[Snapshot]) -> None:
         """Keep what an answer says beyond what is known already."""
         since, self._seen_wall = self._seen_wall, shown[0].at
+        asked, self._seen_asked = self._seen_asked, shown[0].asked_at
         news = tuple(
-            msgspec.structs.replace(each, since=since)
+            replace(each, since=since, since_asked=asked)
             for each in shown
             if is_news(self._it.run, each)
         )

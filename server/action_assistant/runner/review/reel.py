@@ -35,7 +35,7 @@ from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.runs import Run, begin, follow
 
 #: Raise it when `runs.follow` tells something else of the same events: older keyframes are void then.
-FOLD: Final = 2
+FOLD: Final = 3
 #: Events between two keyframes, and in one page of a film.
 APART: Final = 2_000
 #: Marks that are kept of one run.

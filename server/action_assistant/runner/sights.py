@@ -1,0 +1,112 @@
+"""What was seen of an engine, folded into a run. Pure, and part of the fold of a run."""
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Final, assert_never
+
+from msgspec.structs import replace
+
+from action_assistant.runner.seen import (
+    GraphResult,
+    GraphState,
+    Hazard,
+    NodeResult,
+    NodeState,
+    Seen,
+    Snapshot,
+)
+from action_assistant.runner.visits import ActionRun, Sight, changed, heard, resulted, shown
+
+if TYPE_CHECKING:  # the fold of a run is made of this
+    from action_assistant.runner.runs import Run
+
+#: An answer that took longer was given up.
+_ASKED_US: Final = 1_000_000
+
+
+def observe(run: "Run", seen: Iterable[Seen]) -> "Run":
+    """The run after this was seen, in this order."""
+    actions = dict(run.actions)
+    run = replace(run, actions=actions)  # nobody else has it yet: the loop fills it
+    for item in seen:
+        match item:
+            case NodeState():
+                name = key_of(run, item.graph, item.node)
+                before = actions.get(name, ActionRun())
+                actions[name] = changed(before, item.state, item.at, item.inputs)
+            case NodeResult():
+                name = key_of(run, item.graph, item.node)
+                actions[name] = resulted(actions.get(name, ActionRun()), item)
+            case GraphState():
+                run = _state_of(run, item.graph, item.state)
+            case GraphResult():
+                own = item.graph == run.graph_name
+                run = replace(run, result=item.result) if own else run
+            case Snapshot():
+                run = _state_of(_shown(run, actions, item), item.graph, item.state)
+            case Hazard():
+                pass  # the alarm that comes with it is an event of its own
+            case _:
+                assert_never(item)
+    return run
+
+
+def _state_of(run: "Run", graph: str, state: str) -> "Run":
+    if graph == run.graph_name:
+        return replace(run, graph_state=state)
+    return replace(run, parts=run.parts | {graph: state})
+
+
+def _shown(run: "Run", actions: dict[str, ActionRun], item: Snapshot) -> "Run":
+    """What a snapshot says of its actions. What a failure or a sub-graph may do to others counts
+    first, since both may be told together."""
+    own = item.graph == run.graph_name
+    failed = run.failed or not own or "ERROR" in item.nodes.values()
+    looked = max(run.looked.get(item.graph, 0), _before(item))
+    asked = _asked(item)
+    for node, state in item.nodes.items():
+        name = key_of(run, item.graph, node)
+        action = actions.get(name, ActionRun())
+        sight = Sight(
+            at=item.at,
+            asked=asked,
+            looked=looked,
+            begun=run.requested_at,
+            once=action.once and not run.reshaped and not (action.joined and failed),
+            stoppable=run.stoppable or run.desired == "stopped" or not own,
+        )
+        action = shown(action, state, sight, item.inputs.get(node))
+        actions[name] = heard(action, item.messages.get(node, ()), item.at)
+    if asked is not None and (item.same or names_all(run, item)):
+        looked = max(looked, asked)
+    return replace(run, looked=run.looked | {item.graph: looked}, failed=failed)
+
+
+def names_all(run: "Run", item: Snapshot) -> bool:
+    """Whether a snapshot leaves out no action that is known of its graph."""
+    return all(name in item.nodes for name in _known_of(run, item.graph))
+
+
+def _known_of(run: "Run", graph: str) -> Iterator[str]:
+    own, prefix = graph == run.graph_name, f"{graph}/"
+    for name in run.actions:
+        if "/" not in name if own else name.startswith(prefix):
+            yield name if own else name.removeprefix(prefix)
+
+
+def key_of(run: "Run", graph: str, node: str) -> str:
+    """The name of an action in a run: nodes of sub-graphs stand behind the name of theirs."""
+    return node if graph == run.graph_name else f"{graph}/{node}"
+
+
+def _asked(item: Snapshot) -> int | None:
+    """Not before when an answer shows things; None for feedback, which may be of any age."""
+    if item.source == "feedback":
+        return None
+    return item.asked_at if item.asked_at is not None else item.at - _ASKED_US
+
+
+def _before(item: Snapshot) -> int:
+    """When the answer before this was asked for; older streams have only when it came."""
+    if item.since_asked is not None:
+        return item.since_asked
+    return 0 if item.since is None else item.since - _ASKED_US

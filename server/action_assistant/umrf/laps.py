@@ -1,0 +1,85 @@
+"""Which actions of a graph can run more than once, as far as its arrows tell (SPEC 2.3, 2.9, 2.10).
+
+Two sights of a running action are sights of the same run of it only where it cannot have begun anew in
+between; an engine counts nothing.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import msgspec
+
+from action_assistant.umrf.model import ENTRY, PRECONDITIONS, Graph, Key, Relation
+
+
+class Laps(msgspec.Struct, frozen=True, omit_defaults=True):
+    """`once`: full names of actions that run at most once. `barring_errors`: of those, the ones of
+    which that is true only until an action fails, since a failure is passed on past a join. `stops`:
+    the graph itself stops or pauses actions, or runs them over and over; then nothing is `once`."""
+
+    once: tuple[str, ...] = ()
+    barring_errors: tuple[str, ...] = ()
+    stops: bool = False
+
+
+def laps(graph: Graph) -> Laps:
+    """What the arrows of a graph rule out. Total."""
+    if _stops(graph):
+        return Laps(stops=True)
+    known = _walked(graph)
+    names = Counter(each.full_name for each in graph.actions)
+    once = {
+        each.full_name: known[each.key]
+        for each in graph.actions
+        if each.key in known and names[each.full_name] == 1
+    }
+    return Laps(tuple(once), tuple(name for name, joined in once.items() if joined))
+
+
+def _stops(graph: Graph) -> bool:
+    answers = {
+        each.conditions.answer(outcome) for each in graph.relations for outcome in PRECONDITIONS
+    }
+    spontaneous = any(each.type == "spontaneous" for each in graph.actions)
+    return spontaneous or not answers.isdisjoint({"stop", "pause", "restart"})
+
+
+def _walked(graph: Graph) -> dict[Key, bool]:
+    """The actions that end at most once, each with whether that needs that none fails. Whatever lies
+    in or behind a loop is never come to."""
+    arriving: dict[Key, list[Relation]] = {each.key: [] for each in graph.actions}
+    leaving: dict[Key, list[Key]] = {}
+    for arrow in graph.relations:
+        arriving.setdefault(arrow.child, []).append(arrow)
+        leaving.setdefault(arrow.parent, []).append(arrow.child)
+    awaited = {key: len(arrows) for key, arrows in arriving.items()}
+    ready: list[Key] = [ENTRY, *(key for key, arrows in awaited.items() if not arrows)]
+    known: dict[Key, bool] = {}
+    while ready:
+        key = ready.pop()
+        joined = _joined(arriving.get(key, []))
+        if joined is None:
+            continue
+        known[key] = joined or any(known[each.parent] for each in arriving.get(key, []))
+        for child in leaving.get(key, []):
+            awaited[child] -= 1
+            if not awaited[child]:
+                ready.append(child)
+    return known
+
+
+def _joined(arrows: Sequence[Relation]) -> bool | None:
+    """Whether several parents are waited for; None when more than one of them can set it going."""
+    live = [each for each in arrows if any(_live(each, outcome) for outcome in PRECONDITIONS)]
+    if len(live) <= 1:
+        return False
+    if not all(each.required for each in arrows):
+        return None
+    past = {each.conditions.answer(outcome) for each in live for outcome in PRECONDITIONS[:2]}
+    past |= {each.conditions.on_stopped for each in live}
+    return None if "bypass" in past else True
+
+
+def _live(arrow: Relation, outcome: str) -> bool:
+    answer: str = getattr(arrow.conditions, outcome)
+    return answer != "ignore"
