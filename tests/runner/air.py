@@ -147,7 +147,8 @@ def wire(message: Any) -> Message:
 
 class Air:
     """One domain. `loss` is the chance that a message of that topic, or `get`, gets lost on its way
-    to one node; `late_s` how long starts take."""
+    to one node; `late_s` how long starts take. Answers and feedback take up to `old_s` and
+    `feedback_s`."""
 
     def __init__(self, chance: random.Random | None = None) -> None:
         self.number = 7
@@ -159,6 +160,8 @@ class Air:
         self.loss: dict[str, float] = {}
         self.late_s = 0.0
         self.old_s = 0.0
+        self.feedback_s = 0.0
+        self._shown_at = 0.0
         self.strangers = 0
         self.born = 0
         self.nodes: list[Node] = []
@@ -218,7 +221,12 @@ class Air:
                     event, got = self._asked[ticket]
                     self._later(self.chance.random() * self.old_s, lambda: _put(event, got, said))
             case Feedback(actor=actor, history=history):
-                self.show(actor, history)
+                late = self.chance.random() * self.feedback_s
+                self._shown_at = max(self._shown_at, now() + late)  # one after the other
+                if late:
+                    self._at(self._shown_at, self.show, actor, history)
+                else:
+                    self.show(actor, history)
             case Line(text=text):
                 self.tell(LogLine(NODE, text))
             case Gone():

@@ -16,8 +16,8 @@ an upper bound each, and a bound that nothing proves is none:
 - ERROR is no end where a stop may have reached the action for longer than the engine waits: its code
   may go on, so nothing bounds the end from above.
 - Feedback may be older than an answer that came before it. An action that runs at most once only goes
-  forward, so what looks older is older. Of any other, feedback neither ends what an answer has shown
-  running nor borrows its lower bound from a recent answer (`_OLD_US`); answers, which are ordered
+  forward, so what looks older is older. Of any other, feedback does not tell the end of what an answer
+  has shown, and borrows no lower bound from a recent answer (`_OLD_US`); answers, which are ordered
   among themselves, do both, and one is asked for as soon as feedback comes.
 - The engine calls an action RUNNING a moment before its code begins, and for a moment after it ended;
   `_MOMENT_US` is added to what such a sight proves.
@@ -221,7 +221,7 @@ def shown(
         after = action if is_open(action) else _opened(action, sight, inputs)
     elif is_open(action):
         after = _closed(action, state, sight)
-    elif state in {"FINISHED", "ERROR"}:
+    elif state in {"FINISHED", "ERROR"} and _ran_meanwhile(action, sight):
         after = _missed(action, state, sight)
     else:
         after = action
@@ -266,7 +266,8 @@ def _is_no_news(action: ActionRun, state: str, sight: Sight) -> bool:
     if sight.asked is not None:
         overtaken = action.by == "feedback" and sight.asked < action.changed_at
         return overtaken and not sight.once and state != action.state
-    return not sight.once and action.by == "get" and is_open(action) and state not in ACTIVE
+    told = action.by == "get" and _FAR.get(action.state, 0) > 0
+    return told and not sight.once and state not in ACTIVE
 
 
 def _goes_back(action: ActionRun, state: str) -> bool:
@@ -305,6 +306,12 @@ def _closed(action: ActionRun, state: str, sight: Sight) -> ActionRun:
         how=how,
     )
     return replace(action, visits=(*action.visits[:-1], ended))
+
+
+def _ran_meanwhile(action: ActionRun, sight: Sight) -> bool:
+    """Whether one state of rest after another says that it ran in between. Feedback that was older
+    than an answer may have told the first."""
+    return sight.once or action.by != "feedback" or _FAR.get(action.state, 0) == 0
 
 
 def _missed(action: ActionRun, state: str, sight: Sight) -> ActionRun:

@@ -1,0 +1,147 @@
+"""Runs on an emulated robot, with what the code of its actions really did beside what was recorded."""
+
+from typing import Any
+
+import anyio
+import msgspec
+
+from action_assistant.runner.runs import Run
+from action_assistant.runner.standin_engine import StandIn
+from action_assistant.runner.standin_wire import Quirks, index_of
+from action_assistant.runner.visits import Visit
+from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, EXIT, Conditions, Graph, Relation
+from action_assistant.umrf.semantics import NodeState, script_from
+from runner import world
+from runner.air import now_ms
+from runner.record_streams import Place
+from runner.world import BEN, GO_ON, carousel, live_through, sequence, two_ends
+
+#: One execution of an action's code: microseconds of its begin and its end; None: it went on.
+Real = tuple[int, int | None]
+
+
+class Air(msgspec.Struct, frozen=True, kw_only=True):
+    """What gets lost, and how late things are."""
+
+    loss: float = 0.0
+    get_loss: float = 0.0
+    old_s: float = 0.0
+    feedback_s: float = 0.0
+    seed: int = 0
+
+
+class Lived(msgspec.Struct, frozen=True):
+    """A run as it was recorded, and the truth."""
+
+    run: Run
+    place: Place
+    real: dict[str, list[Real]]
+
+
+def join(name: str = "join") -> Graph:
+    """`Work_0` and `Work_1` at once, then `Work_2`, which waits for both."""
+    line = sequence(name, 3)
+    first, second, last = (action.key for action in line.actions)
+    defaults = Conditions(on_true="run", on_false="run", on_error="bypass")
+    arrows = [(ENTRY, first), (ENTRY, second), (first, last), (second, last), (last, EXIT)]
+    relations = tuple(
+        Relation(
+            parent=parent,
+            child=child,
+            conditions=ENTRY_CONDITIONS if parent == ENTRY else GO_ON if child == EXIT else defaults,
+        )
+        for parent, child in arrows
+    )
+    return msgspec.structs.replace(line, relations=relations)
+
+
+GRAPHS = {"line": lambda: sequence("line", 4), "join": join, "loop": carousel, "ends": two_ends}
+
+
+def lived(graph: str, script: dict[str, Any], air: Air, stop: float | None) -> Lived:
+    """A run of that graph, stopped after so many seconds, up to its end or for some time."""
+    found: Lived = live_through(lambda: _lived(GRAPHS[graph](), script, air, stop))
+    return found
+
+
+async def _lived(graph: Graph, script: dict[str, Any], air: Air, stop: float | None) -> Lived:
+    place = Place(script)
+    place.air.chance.seed(air.seed)
+    place.air.loss["get"] = air.get_loss
+    place.air.old_s, place.air.feedback_s = air.old_s, air.feedback_s
+    robot = StandIn(
+        "Robin",
+        script=script_from({"behaviours": script}),
+        index=index_of([], []),
+        quirks=Quirks(loss=air.loss),
+        seed=air.seed,
+        born_ms=now_ms(),
+        epoch_ms=world.EPOCH // 1000,
+    )
+    traces: list[NodeState] = []
+    take = robot._take
+
+    def overheard(told: Any) -> None:
+        traces.extend(each for each in told if isinstance(each, NodeState))
+        take(told)
+
+    robot._take = overheard  # type: ignore[method-assign]
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(place.air.blow)
+        place.air.join(robot, "/Robin")
+        await anyio.sleep(0.5)
+        async with place.world.runner() as place.control:
+            await anyio.sleep(1.5)
+            run = await _started(place, graph)
+            with anyio.move_on_after(40):
+                if stop is not None:
+                    await anyio.sleep(stop)
+                    await place.control.stop(run, BEN)
+                await place.over()
+            history = place.world.ledger.history(run)
+        tasks.cancel_scope.cancel()
+    return Lived(history, place, {name: _real(name, traces, script) for name in history.actions})
+
+
+async def _started(place: Place, graph: Graph) -> str:
+    """Answers may be lost before the start, too; then a person tries again."""
+    from action_assistant.errors import Refused
+
+    for _ in range(20):
+        try:
+            return await place.start(graph)
+        except Refused:
+            await anyio.sleep(1)
+    raise AssertionError("it could not be started")
+
+
+def _real(name: str, traces: list[NodeState], script: dict[str, Any]) -> list[Real]:
+    """When the code of an action ran. One that ignores stop goes on after the engine has given up."""
+    found: list[Real] = []
+    state = ""
+    for trace in (each for each in traces if each.node == name):
+        at = world.EPOCH + round(trace.t_ms * 1000)
+        if trace.state == "RUNNING":
+            found.append((at, None))
+        elif trace.state in {"FINISHED", "ERROR"} and found and found[-1][1] is None:
+            calls = script.get(name) or script.get("*") or [{}]
+            call = calls[min(len(found), len(calls)) - 1]
+            begun = found[-1][0]
+            end: int | None = at
+            if trace.state == "ERROR" and state == "STOPPING":
+                end = None if call.get("never") else begun + round(call.get("after_s", 1) * 1e6)
+            found[-1] = (begun, end)
+        state = trace.state
+    return found
+
+
+def fits(visit: Visit, real: Real) -> bool:
+    """Whether a visit may be this execution: nothing of it lies outside of the bounds."""
+    begun, over = real
+    if not visit.not_before <= begun <= visit.start:
+        return False
+    if visit.until is None:
+        return True
+    if over is None:
+        return visit.not_after is None
+    return visit.until <= over <= (visit.not_after if visit.not_after is not None else over)

@@ -1,0 +1,93 @@
+"""What really happened lies inside of what is said of it, however much is lost or late."""
+
+import os
+from typing import Any
+
+import msgspec
+from hypothesis import HealthCheck, Phase, example, given, settings
+from hypothesis import strategies as st
+
+from runner.bounds import GRAPHS, Air, fits, lived
+
+CALL = st.fixed_dictionaries(
+    {
+        "after_s": st.one_of(st.floats(0.01, 0.4), st.floats(0.4, 7.0)),
+        "result": st.sampled_from(["on_true", "on_true", "on_true", "on_false", "on_error"]),
+        "stop_s": st.sampled_from([0.05, 0.5, 4.0]),
+    },
+    optional={"ignores_stop": st.just(True)},
+)
+SCRIPTS = st.dictionaries(
+    st.sampled_from(["Work_0", "Work_1", "Work_2", "*"]),
+    st.lists(CALL, min_size=1, max_size=3),
+    max_size=4,
+)
+AIRS = st.builds(
+    Air,
+    loss=st.sampled_from([0.0, 0.15, 0.5, 0.95]),
+    get_loss=st.sampled_from([0.0, 0.0, 0.3]),
+    old_s=st.sampled_from([0.0, 0.05, 0.9]),
+    feedback_s=st.sampled_from([0.0, 0.02, 1.5]),
+    seed=st.integers(0, 10_000),
+)
+CALM = Air()
+
+
+@settings(
+    max_examples=int(os.environ.get("BOUNDS_HISTORIES", "20")),
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    phases=[Phase.explicit, Phase.reuse, Phase.generate, Phase.shrink],
+)
+@given(
+    graph=st.sampled_from(sorted(GRAPHS)),
+    script=SCRIPTS,
+    air=AIRS,
+    stop=st.none() | st.floats(0.1, 15.0),
+)
+@example(graph="line", script={"*": [{"after_s": 0.1}]}, air=CALM, stop=None)
+@example(graph="line", script={"*": [{"after_s": 3.0}]}, air=CALM, stop=None)
+@example(graph="line", script={"*": [{"after_s": 20.0, "ignores_stop": True}]}, air=CALM, stop=3.0)
+@example(graph="loop", script={"*": [{"after_s": 0.2}]}, air=Air(loss=0.5), stop=14.0)
+@example(graph="loop", script={"*": [{"after_s": 0.3}]}, air=Air(feedback_s=1.5, seed=3), stop=12.0)
+def test_every_visit_holds_what_the_code_of_the_action_did(
+    graph: str, script: dict[str, list[dict[str, Any]]], air: Air, stop: float | None
+) -> None:
+    if graph == "loop" and stop is None:
+        stop = 12.0  # else it never ends
+    told = lived(graph, script, air, stop)
+    for name, action in told.run.actions.items():
+        real = told.real[name]
+        if graph != "loop":
+            assert len(action.visits) <= len(real) == min(1, len(real))
+        for visit in action.visits:
+            assert any(fits(visit, each) for each in real), (name, visit, real)
+            assert visit.not_before <= visit.start
+            assert visit.not_after is None or (visit.until or 0) <= visit.not_after
+            assert visit.least >= 0
+            assert visit.most is None or visit.least <= visit.most
+
+
+def test_an_action_of_three_seconds_is_not_said_to_have_taken_none() -> None:
+    told = lived("line", {"*": [{"after_s": 3.0}]}, CALM, None)
+    for action in told.run.actions.values():
+        (visit,) = action.visits
+        assert visit.most is not None
+        assert 1_000_000 <= visit.least <= 3_000_000 <= visit.most <= 5_000_000
+
+
+def test_what_outlasts_a_stop_has_no_end() -> None:
+    script = {"*": [{"never": True, "ignores_stop": True}]}
+    told = lived("line", script, CALM, 2.0)
+    (visit,) = told.run.actions["Work_0"].visits
+    assert told.real["Work_0"][0][1] is None
+    assert visit.not_after is None
+
+
+def test_no_bound_is_lost_when_it_is_stored(tmp_path: Any) -> None:
+    told = lived("join", {"*": [{"after_s": 0.7}]}, Air(loss=0.3), None)
+    events = told.place.world.ledger.told(told.run.id)
+    seen = [item for event in events for item in getattr(event, "seen", ())]
+    assert any(item.source == "feedback" and item.since_asked is not None for item in seen)
+    assert any(item.source == "get" and item.since_asked is not None for item in seen)
+    assert msgspec.json.decode(msgspec.json.encode(seen[0]), type=type(seen[0])) == seen[0]
