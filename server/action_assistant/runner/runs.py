@@ -118,6 +118,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     result: str | None = None
     started_at: int | None = None
     ended_at: int | None = None
+    going_at: int = 0  # it was not over at that moment, or any before
+    over_at: int | None = None  # nothing of it moved any more when that was seen first
     end: End | None = None
     detail: str = ""
     unknown_since: int | None = None

@@ -6,6 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row
 
+from action_assistant.runner.durations import Took, of_run, of_visit
 from action_assistant.runner.events import AtRest, Author, Overridden, Override
 from action_assistant.runner.parameters import sent
 from action_assistant.runner.runs import Desired, Run, State
@@ -18,8 +19,10 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
-    """One execution of an action: seen from `from` to `until`, at most from `not_before` to
-    `not_after`. `inputs`: values that the engine reported for it, by flat name, as JSON texts (a long
+    """One execution of an action. It began between `not_before` and `from`, and ended between `until`
+    (null: no end was seen) and `not_after` (null: it may go on still); where `until` lies before
+    `from`, no moment is known at which it went on for certain. `took` says the same in seconds; null
+    while no end was seen. `inputs`: values that the engine reported for it, by flat name, as JSON texts (a long
     one is cut and ends with an ellipsis); null when nobody saw them."""
 
     start: datetime
@@ -29,6 +32,7 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     result: Outcome | None
     how: How
     inputs: dict[str, str] | None = None
+    took: Took | None = None
 
 
 class MessageShown(msgspec.Struct, frozen=True):
@@ -66,7 +70,8 @@ class AtRestShown(msgspec.Struct, frozen=True):
 
 
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
-    """A run as a list shows it."""
+    """A run as a list shows it. `took`: from `started_at` to when nothing of it moved any more, as far
+    as that was seen, which is before `ended_at`, when that was proven; null where that is not known."""
 
     id: str
     number: int
@@ -89,6 +94,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     requested_at: datetime
     started_at: datetime | None
     ended_at: datetime | None
+    took: Took | None
     stopped_by: Author | None
     detail: str
     alarms: list[AlarmShown]
@@ -189,6 +195,7 @@ def summary_of_row(row: Row[Any]) -> Summary:
         requested_at=time(row.requested_at),
         started_at=_time(row.started_at),
         ended_at=_time(row.ended_at),
+        took=_took(more.get("took")),
         stopped_by=Author(**stopped_by) if stopped_by else None,
         detail=more.get("detail", ""),
         alarms=[
@@ -241,6 +248,7 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "requested_at": time(run.requested_at),
         "started_at": _time(run.started_at),
         "ended_at": _time(run.ended_at),
+        "took": of_run(run),
         "stopped_by": run.stopped_by,
         "detail": run.detail or run.lost or run.unconfirmed,
         "alarms": [AlarmShown(each.code, time(each.at), each.text) for each in run.alarms],
@@ -262,6 +270,7 @@ def visit(each: Visit) -> VisitShown:
         each.result,
         each.how,
         each.inputs,
+        of_visit(each),
     )
 
 
@@ -280,6 +289,10 @@ def _action(action: ActionRun, most: int) -> ActionShown:
 
 def _log(run: Run, most: int) -> list[MessageShown]:
     return [MessageShown(time(each.at), each.text) for each in run.log[-most:]]
+
+
+def _took(kept: dict[str, Any] | None) -> Took | None:
+    return None if kept is None else Took(least=kept["least"], most=kept["most"])
 
 
 def _time(us: int | None) -> datetime | None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final, assert_never
 from msgspec.structs import replace
 
 from action_assistant.runner.seen import (
+    TERMINAL,
     GraphResult,
     GraphState,
     Hazard,
@@ -33,16 +34,19 @@ def observe(run: "Run", seen: Iterable[Seen]) -> "Run":
                 name = key_of(run, item.graph, item.node)
                 before = actions.get(name, ActionRun())
                 actions[name] = changed(before, item.state, item.at, item.inputs)
+                run = _timed(run, item.at, item.at)
             case NodeResult():
                 name = key_of(run, item.graph, item.node)
                 actions[name] = resulted(actions.get(name, ActionRun()), item)
             case GraphState():
-                run = _state_of(run, item.graph, item.state)
+                run = _timed(_state_of(run, item.graph, item.state), item.at, item.at)
             case GraphResult():
                 own = item.graph == run.graph_name
                 run = replace(run, result=item.result) if own else run
             case Snapshot():
-                run = _state_of(_shown(run, actions, item), item.graph, item.state)
+                known = _looked_at(run, max(run.looked.get(item.graph, 0), _before(item)))
+                run = _state_of(_shown(known, actions, item), item.graph, item.state)
+                run = _timed(run, item.at, _asked(item))
             case Hazard():
                 pass  # the alarm that comes with it is an event of its own
             case _:
@@ -79,6 +83,23 @@ def _shown(run: "Run", actions: dict[str, ActionRun], item: Snapshot) -> "Run":
     if asked is not None and (item.same or names_all(run, item)):
         looked = max(looked, asked)
     return replace(run, looked=run.looked | {item.graph: looked}, failed=failed)
+
+
+def _looked_at(run: "Run", looked: int) -> "Run":
+    """Answers have shown it as it was known until now."""
+    if run.over_at is not None or looked <= run.going_at:
+        return run
+    return replace(run, going_at=looked)
+
+
+def _timed(run: "Run", at: int, asked: int | None) -> "Run":
+    """Since when it is over, as far as that is seen. Only when the graph says so is it worth a look
+    at every action."""
+    if run.graph_state in TERMINAL and run.apparent_end is not None:
+        return run if run.over_at is not None else replace(run, over_at=at)
+    if run.over_at is None and (asked is None or asked <= run.going_at):
+        return run
+    return replace(run, over_at=None, going_at=max(run.going_at, asked or 0))
 
 
 def names_all(run: "Run", item: Snapshot) -> bool:

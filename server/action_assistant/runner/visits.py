@@ -20,7 +20,7 @@ an upper bound each, and a bound that nothing proves is none:
   has shown, and borrows no lower bound from a recent answer (`_OLD_US`); answers, which are ordered
   among themselves, do both, and one is asked for as soon as feedback comes.
 - The engine calls an action RUNNING a moment before its code begins, and for a moment after it ended;
-  `_MOMENT_US` is added to what such a sight proves.
+  `MOMENT_US` is added to what such a sight proves.
 
 Pure, and part of the fold of a run: what stands in old streams folds by the same rules.
 """
@@ -40,7 +40,7 @@ KEPT: Final = 100
 #: Messages of one action that an engine keeps.
 _RING: Final = 10
 #: What may lie between a state of the engine and the action's code, in microseconds.
-_MOMENT_US: Final = 100_000
+MOMENT_US: Final = 100_000
 #: Feedback of actions that may run again is taken to be younger than this: twice what a stop that is
 #: not obeyed holds an engine up for.
 _OLD_US: Final = 10_000_000
@@ -255,7 +255,7 @@ def _looked_at(action: ActionRun, sight: Sight) -> ActionRun:
         return replace(action, rests=action.rests.and_at(sight.looked), since=sight.looked)
     if not sight.once or action.held or action.state not in {"RUNNING", "STOPPING"}:
         return action
-    going = max(action.going, sight.looked - _MOMENT_US)
+    going = max(action.going, sight.looked - MOMENT_US)
     return replace(action, going=going, since=sight.looked)
 
 
@@ -281,13 +281,13 @@ def _confirmed(action: ActionRun, sight: Sight) -> ActionRun:
         return action
     last = action.visits[-1]
     before = min(sight.at, max(last.not_before, action.rests.newest))
-    anchored = replace(last, not_before=before, start=sight.at + _MOMENT_US)
+    anchored = replace(last, not_before=before, start=sight.at + MOMENT_US)
     return replace(action, visits=(*action.visits[:-1], anchored), by="get", going=before)
 
 
 def _opened(action: ActionRun, sight: Sight, inputs: dict[str, str] | None) -> ActionRun:
     before = _not_before(action, sight)
-    visit = Visit(start=sight.at + _MOMENT_US, not_before=before, inputs=inputs)
+    visit = Visit(start=sight.at + MOMENT_US, not_before=before, inputs=inputs)
     visits, older = _kept(action.visits, action.older, visit)
     return replace(action, visits=visits, older=older, going=before, held=False)
 

@@ -15,6 +15,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.tables import action_sum, review, run_label
 from action_assistant.journal.tables import run as runs
+from action_assistant.runner.durations import Took, of_run, of_visit, took_us
 from action_assistant.runner.events import Author
 from action_assistant.runner.review.cause import causes
 from action_assistant.runner.review.cause_words import words
@@ -24,6 +25,8 @@ from action_assistant.umrf.model import Graph
 
 _PREFIX: Final = "about/"
 _WORDS: Final = 8_000  # characters of messages that a search looks through
+#: Raise it when a run adds up to something else than before: older sums are made again.
+FIGURES: Final = 1
 _TOOK: Final = 100  # durations kept per action and run
 
 Label = Annotated[str, msgspec.Meta(min_length=1, max_length=60, pattern=r"^\S(.*\S)?$")]
@@ -48,18 +51,21 @@ class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """One action of a run that is over. `results` counts results that are known; `took` has the
-    durations (microseconds) of visits whose both ends were seen, the newest hundred at most."""
+    """One action of a run that is over. `results` counts results that are known; `spans` has how long
+    visits took that have ended, the newest hundred at most. `took` is of older versions: microseconds
+    that they took at least."""
 
     aid: str | None = None
     visits: int = 0
     results: dict[str, int] = {}
     inferred: int = 0
     took: tuple[int, ...] = ()
+    spans: tuple[Took, ...] = ()
 
 
 class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A run that is over, as lists and statistics need it: they must not read every run again."""
+    """A run that is over, as lists and statistics need it: they must not read every run again.
+    `figures`: `FIGURES` when it was summed up; what is older is summed up again."""
 
     kind: ClassVar[str] = "run.summed_up.v1"
 
@@ -67,6 +73,8 @@ class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
     actions: dict[str, ActionSum]
     words: str = ""
     cause: str = ""
+    took: Took | None = None
+    figures: int = 0
 
 
 class Put(msgspec.Struct, frozen=True):
@@ -108,7 +116,8 @@ def sum_of(run: Run, graph: Graph | None, at: int) -> SummedUp:
         (message.text for action in run.actions.values() for message in action.messages),
     )
     told = "\n".join(dict.fromkeys(text for text in said if text))[:_WORDS]
-    return SummedUp(at, {name: _sum(each) for name, each in run.actions.items()}, told, cause)
+    actions = {name: _sum(each) for name, each in run.actions.items()}
+    return SummedUp(at, actions, told, cause, of_run(run), FIGURES)
 
 
 def _sum(action: ActionRun) -> ActionSum:
@@ -116,13 +125,13 @@ def _sum(action: ActionRun) -> ActionSum:
     for visit in action.visits:
         if visit.result is not None:
             results[visit.result] = results.get(visit.result, 0) + 1
-    took = [v.until - v.start for v in action.visits if v.until is not None and v.how == "observed"]
+    spans = [took for visit in action.visits if (took := of_visit(visit)) is not None]
     return ActionSum(
         aid=action.aid,
         visits=action.older + len(action.visits),
         results=results,
         inferred=sum(visit.how == "inferred" for visit in action.visits),
-        took=tuple(took[-_TOOK:]),
+        spans=tuple(spans[-_TOOK:]),
     )
 
 
@@ -163,13 +172,13 @@ def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
             "visits": each.visits,
             "results": each.results,
             "inferred": each.inferred,
-            "took": list(each.took),
+            "took": [[each.least, each.most] for each in _spans(each)],
         }
         for name, each in summed.actions.items()
     ]
     return [
-        _review(run, {"words": summed.words, "summed": True}),
-        *_told(run, summed.cause),
+        _review(run, {"words": summed.words, "summed": summed.figures == FIGURES}),
+        *_told(run, summed),
         delete(action_sum).where(action_sum.c.run == run),
         *(insert(action_sum).values(rows[i : i + 100]) for i in range(0, len(rows), 100)),
     ]
@@ -188,9 +197,18 @@ def _review(run: str, fields: Mapping[str, object]) -> Executable:
     return statement.on_conflict_do_update(index_elements=["run"], set_=dict(fields))
 
 
-def _told(run: str, cause: str) -> Sequence[Executable]:
-    """The sentence that the list shows."""
-    if not cause:
-        return ()
-    told = func.json_set(runs.c.summary, "$.cause", cause)
-    return (update(runs).where(runs.c.id == run).values(summary=told),)
+def _told(run: str, summed: SummedUp) -> Sequence[Executable]:
+    """The sentence that the list shows, and how long it took."""
+    change = update(runs).where(runs.c.id == run)
+    found: list[Executable] = []
+    if summed.cause:
+        told = func.json_set(runs.c.summary, "$.cause", summed.cause)
+        found.append(change.values(summary=told))
+    if summed.took is not None:
+        text = func.json(msgspec.json.encode(summed.took).decode())
+        found.append(change.values(summary=func.json_set(runs.c.summary, "$.took", text)))
+    return found
+
+
+def _spans(action: ActionSum) -> Sequence[Took]:
+    return action.spans or tuple(took_us(each, None) for each in action.took)

@@ -139,7 +139,7 @@ class Desk:
             raise  # it will be, later
         except Exception:  # whatever a run of long ago holds, those that go on are not ended by it
             log.exception("run %s cannot be read; it is left out of sums", run_id)
-            summed = about.SummedUp(self._wall(), {})
+            summed = about.SummedUp(self._wall(), {}, figures=about.FIGURES)
         await self._ledger.append(about.stream_about(run_id), [about.draft(summed)])
 
     async def known(self, run_id: str) -> Run:
