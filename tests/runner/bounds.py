@@ -48,7 +48,11 @@ def join(name: str = "join") -> Graph:
         Relation(
             parent=parent,
             child=child,
-            conditions=ENTRY_CONDITIONS if parent == ENTRY else GO_ON if child == EXIT else defaults,
+            conditions=ENTRY_CONDITIONS
+            if parent == ENTRY
+            else GO_ON
+            if child == EXIT
+            else defaults,
         )
         for parent, child in arrows
     )

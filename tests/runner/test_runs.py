@@ -34,7 +34,8 @@ from action_assistant.runner.seen import (
     Seen,
     Snapshot,
 )
-from action_assistant.runner.visits import KEPT
+from action_assistant.runner.visits import KEPT, MOMENT_US
+from action_assistant.umrf.laps import Laps
 
 ANN = Author("ann", "Ann")
 REQUESTED = Requested(
@@ -100,17 +101,103 @@ def test_a_visit_that_no_snapshot_showed_running_is_inferred_and_has_no_result()
     run = follow(run, Observed(3_000, (snapshot(3_000, "RUNNING", Go_0="FINISHED"),)))
     (visit,) = run.actions["Go_0"].visits
     assert (visit.how, visit.result) == ("inferred", None)
-    assert (visit.not_before, visit.not_after) == (2_900, 3_000)
+    assert (visit.not_before, visit.not_after) == (1_000, 3_000)  # not before it was asked for
+    assert (visit.until, visit.start) == (1_000, 3_000)  # no moment is known at which it went on
 
 
-def test_snapshots_bound_a_visit_by_what_was_seen_before_and_after() -> None:
-    run = run_of(
-        snapshot(2_000, "RUNNING", Go_0="RUNNING"), snapshot(3_000, "RUNNING", Go_0="FINISHED")
+S = 1_000_000
+ONCE = msgspec.structs.replace(REQUESTED, laps=Laps(once=("Go_0", "Grip_0")))
+
+
+def answer(at: int, state: str, **nodes: str) -> Snapshot:
+    """Asked a tenth of a second before; the one before that a second earlier."""
+    return Snapshot(
+        at=at,
+        graph="patrol",
+        state=state,
+        nodes=nodes,
+        run="r1",
+        asked_at=at - S // 10,
+        since=at - S,
+        since_asked=at - S - S // 10,
     )
-    (visit,) = run.actions["Go_0"].visits
-    assert (visit.not_before, visit.start) == (1_900, 2_000)
-    assert (visit.until, visit.not_after) == (2_900, 3_000)
+
+
+def feedback(at: int, state: str, **nodes: str) -> Snapshot:
+    """It came then; how old it is nobody knows."""
+    return Snapshot(
+        at=at, graph="patrol", state=state, nodes=nodes, run="r1", source="feedback", since_asked=0
+    )
+
+
+def test_answers_bound_a_visit_by_when_they_were_asked_for() -> None:
+    seen = (
+        answer(10 * S, "RUNNING", Go_0="UNINITIALIZED"),
+        answer(11 * S, "RUNNING", Go_0="RUNNING"),
+        answer(14 * S, "RUNNING", Go_0="FINISHED"),
+    )
+    (visit,) = run_of(*seen, after=(ONCE,)).actions["Go_0"].visits
+    assert visit.not_before == 10 * S - S // 10
+    assert visit.start == 11 * S + MOMENT_US
+    assert visit.until == 14 * S - S - S // 10 - MOMENT_US
+    assert visit.not_after == 14 * S
     assert visit.result is None
+
+
+def test_what_comes_in_one_message_of_feedback_has_no_bound_at_its_arrival() -> None:
+    run = run_of(
+        answer(10 * S, "RUNNING", Go_0="UNINITIALIZED", Grip_0="UNINITIALIZED"),
+        feedback(12 * S, "RUNNING", Go_0="RUNNING", Grip_0="UNINITIALIZED"),
+        feedback(12 * S, "RUNNING", Go_0="FINISHED", Grip_0="RUNNING"),
+        feedback(12 * S, "FINISHED", Go_0="FINISHED", Grip_0="FINISHED"),
+        after=(ONCE,),
+    )
+    for action in run.actions.values():
+        (visit,) = action.visits
+        assert (visit.not_before, visit.not_after) == (10 * S - S // 10, 12 * S)
+        assert (visit.start, visit.until) == (12 * S, visit.not_before)
+        assert (visit.least, visit.most) == (0, 2 * S + S // 10)
+
+
+def test_two_sights_of_an_action_that_may_run_again_are_not_one_long_visit() -> None:
+    seen = (
+        answer(10 * S, "RUNNING", Go_0="UNINITIALIZED"),
+        answer(11 * S, "RUNNING", Go_0="RUNNING"),
+        answer(19 * S, "RUNNING", Go_0="FINISHED"),
+    )
+    (visit,) = run_of(*seen).actions["Go_0"].visits
+    assert visit.least == 0
+    (visit,) = run_of(*seen, after=(ONCE,)).actions["Go_0"].visits
+    assert visit.least > 6 * S
+
+
+def test_what_ran_before_a_pause_is_all_that_is_known_to_have_run() -> None:
+    paused_ = PauseRequested(12 * S, ANN)
+    seen = [
+        Observed(11 * S, (answer(11 * S, "RUNNING", Go_0="RUNNING"),)),
+        paused_,
+        Observed(15 * S, (answer(15 * S, "PAUSED", Go_0="PAUSED"),)),
+        Observed(20 * S, (answer(20 * S, "FINISHED", Go_0="FINISHED"),)),
+    ]
+    run = replay([ONCE, *seen])
+    assert run is not None
+    (visit,) = run.actions["Go_0"].visits
+    assert visit.until is not None
+    assert visit.until <= 12 * S
+
+
+def test_an_error_long_after_a_stop_is_no_end_of_the_code() -> None:
+    told = [
+        Observed(11 * S, (answer(11 * S, "RUNNING", Go_0="RUNNING"),)),
+        StopRequested(12 * S, ANN),
+        Observed(18 * S, (answer(18 * S, "ERROR", Go_0="ERROR"),)),
+    ]
+    run = replay([ONCE, *told])
+    assert run is not None
+    (visit,) = run.actions["Go_0"].visits
+    assert visit.until is not None
+    assert visit.not_after is None
+    assert visit.most is None
 
 
 def test_error_in_a_snapshot_is_an_inferred_error() -> None:

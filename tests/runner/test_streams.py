@@ -23,13 +23,28 @@ def events_of(path: Path) -> list[Event]:
     ]
 
 
+#: Lower bounds, of which those that older versions told may have been too high, and upper ones.
+LOWER, UPPER = ("not_before", "until"), ("from", "not_after")
+
+
 def assert_tells(now: Any, then: Any, place: str = "") -> None:
-    """Everything that was told then is told now; more may be."""
+    """Everything that was told then is told now; more may be, and bounds may be further apart."""
     match then:
+        case str() if place.rpartition("/")[2] in LOWER and "/visits/" in place:
+            assert now <= then, place
+        case str() if place.rpartition("/")[2] in UPPER and "/visits/" in place:
+            assert now is None or now >= then, place
         case dict():
             assert then.keys() <= now.keys(), place
             for name, value in then.items():
                 assert_tells(now[name], value, f"{place}/{name}")
+        case list() if place.endswith("/visits") and len(now) < len(then):
+            for visit in then:  # late feedback was taken for one more
+                assert any(
+                    each["not_before"] <= visit["not_before"]
+                    and each["not_after"] >= visit["not_after"]
+                    for each in now
+                ), place
         case list():
             assert len(now) == len(then), place
             for number, value in enumerate(then):

@@ -73,7 +73,8 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     run = command(
         commands,
         "run",
-        "publish a graph as it is now, start it and wait for its end; exit 1 unless it ends true",
+        "publish a graph as it is now, start it and wait for its end; exit 1 if it does not "
+        "finish, or is known to have ended otherwise than true",
         "patrol --script fast.json",
     )
     run.add_argument("graph", metavar="GRAPH", help="id or name")
@@ -208,8 +209,8 @@ def _watch(server: Server, run: str) -> int:
                 seen[name] = action["state"]
                 print(f"{name}: {action['state']}", flush=True)
         if now["state"] in _ENDED:
-            print(now["state"] + (f" ({now['result']})" if now["result"] else ""))
-            return 0 if now["state"] == "finished" and now["result"] == "on_true" else 1
+            print(_ended(now))
+            return 0 if now["state"] == "finished" and not _failed(now) else 1
         time.sleep(_POLL)
 
 
@@ -233,6 +234,24 @@ def _at_rest(options: argparse.Namespace) -> int:
             return refused(error)
     print(f"run {run['number']} of {run['graph_name']} is over: {run['state']}")
     return 0
+
+
+def _failed(run: dict[str, Any]) -> bool:
+    """Whether a finished run is known to have failed. Robots do not tell results; an action that has
+    ended in error tells enough."""
+    if run["result"] is not None:
+        return bool(run["result"] != "on_true")
+    return any(
+        visit["result"] == "error" for each in run["actions"].values() for visit in each["visits"]
+    )
+
+
+def _ended(run: dict[str, Any]) -> str:
+    if run["result"] is not None or run["state"] != "finished":
+        return f"{run['state']} ({run['result']})" if run["result"] else str(run["state"])
+    if _failed(run):
+        return "finished, and an action ended in error"
+    return "finished; nothing failed that was seen, but the robot does not tell the result"
 
 
 def _stop(options: argparse.Namespace) -> int:

@@ -77,6 +77,7 @@ def _shown(run: "Run", actions: dict[str, ActionRun], item: Snapshot) -> "Run":
             begun=run.requested_at,
             once=action.once and not run.reshaped and not (action.joined and failed),
             stoppable=run.stoppable or run.desired == "stopped" or not own,
+            followed=item.since_asked is not None,
         )
         action = shown(action, state, sight, item.inputs.get(node))
         actions[name] = heard(action, item.messages.get(node, ()), item.at)

@@ -98,7 +98,8 @@ class Sight(msgspec.Struct, frozen=True, kw_only=True):
     """A snapshot as evidence. `asked`: when it was asked for; None for feedback. `looked`: when the
     newest answer was asked for that showed the graph as it was known until now. `begun`: when nothing
     can have happened before. `once`: the action runs at most once. `stoppable`: somebody or something
-    may have stopped it."""
+    may have stopped it. `followed`: an answer that comes after it is recorded, if that says more;
+    older streams left out answers that said the same as feedback had."""
 
     at: int
     asked: int | None
@@ -106,6 +107,7 @@ class Sight(msgspec.Struct, frozen=True, kw_only=True):
     begun: int
     once: bool
     stoppable: bool
+    followed: bool = True
 
 
 class Message(msgspec.Struct, frozen=True):
@@ -211,12 +213,12 @@ def shown(
     action: ActionRun, state: str, sight: Sight, inputs: dict[str, str] | None = None
 ) -> ActionRun:
     """After a snapshot, which says how things are but not when they became so."""
+    if state == action.state:
+        return _confirmed(action, sight)
     action = _looked_at(action, sight)
     if _is_no_news(action, state, sight):
         asked = sight.asked or 0  # it does not show the state that is known
         return replace(action, since=max(action.since, asked)) if asked else action
-    if state == action.state:
-        return _confirmed(action, sight)
     if state in ACTIVE:
         after = action if is_open(action) else _opened(action, sight, inputs)
     elif is_open(action):
@@ -266,7 +268,7 @@ def _is_no_news(action: ActionRun, state: str, sight: Sight) -> bool:
     if sight.asked is not None:
         overtaken = action.by == "feedback" and sight.asked < action.changed_at
         return overtaken and not sight.once and state != action.state
-    told = action.by == "get" and _FAR.get(action.state, 0) > 0
+    told = sight.followed and action.by == "get" and _FAR.get(action.state, 0) > 0
     return told and not sight.once and state not in ACTIVE
 
 
@@ -294,6 +296,11 @@ def _opened(action: ActionRun, sight: Sight, inputs: dict[str, str] | None) -> A
 
 def _closed(action: ActionRun, state: str, sight: Sight) -> ActionRun:
     last = action.visits[-1]
+    if (
+        action.by == "get" and sight.asked is None and not sight.once
+    ):  # of this visit, or an older one
+        before = min(last.not_before, max(action.rests.by(sight.at - _OLD_US), sight.begun))
+        last, action = replace(last, not_before=before), replace(action, going=before)
     implied = last.result or _implied(action.state, state)
     how: How = "inferred" if implied is not None and last.result is None else last.how
     after = _not_after(state, last.not_before, sight)

@@ -177,7 +177,7 @@ def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
         for name, each in summed.actions.items()
     ]
     return [
-        _review(run, {"words": summed.words, "summed": summed.figures == FIGURES}),
+        _review(run, {"words": summed.words, "summed": True}),
         *_told(run, summed),
         delete(action_sum).where(action_sum.c.run == run),
         *(insert(action_sum).values(rows[i : i + 100]) for i in range(0, len(rows), 100)),
@@ -199,15 +199,15 @@ def _review(run: str, fields: Mapping[str, object]) -> Executable:
 
 def _told(run: str, summed: SummedUp) -> Sequence[Executable]:
     """The sentence that the list shows, and how long it took."""
-    change = update(runs).where(runs.c.id == run)
-    found: list[Executable] = []
+    told: list[object] = ["$.figures", summed.figures] if summed.figures else []
     if summed.cause:
-        told = func.json_set(runs.c.summary, "$.cause", summed.cause)
-        found.append(change.values(summary=told))
+        told += ["$.cause", summed.cause]
     if summed.took is not None:
-        text = func.json(msgspec.json.encode(summed.took).decode())
-        found.append(change.values(summary=func.json_set(runs.c.summary, "$.took", text)))
-    return found
+        told += ["$.took", func.json(msgspec.json.encode(summed.took).decode())]
+    if not told:
+        return ()
+    change = update(runs).where(runs.c.id == run)
+    return (change.values(summary=func.json_set(runs.c.summary, *told)),)
 
 
 def _spans(action: ActionSum) -> Sequence[Took]:

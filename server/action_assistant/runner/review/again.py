@@ -14,6 +14,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Event
 from action_assistant.journal.tables import expectation
+from action_assistant.runner.durations import of_visit
 from action_assistant.runner.events import Author
 from action_assistant.runner.runs import Run
 from action_assistant.runner.visits import ActionRun, Visit
@@ -142,7 +143,7 @@ def fitted(found: Recorded, run: Run, graph: Graph) -> Recorded:
 def _spread(action: ActionRun) -> Iterable[str]:
     """Messages by visit: an action says one thing per visit at most that a script can repeat."""
     for visit in action.visits:
-        until = visit.not_after or visit.until
+        until = visit.not_after
         yield next(
             (
                 each.text
@@ -154,13 +155,20 @@ def _spread(action: ActionRun) -> Iterable[str]:
 
 
 def _behaviour(name: str, visit: Visit, said: str, doubts: list[Doubt]) -> dict[str, Any]:
-    if visit.until is None or visit.result == "stopped":
+    span = of_visit(visit)
+    if span is None or visit.result == "stopped":
         return {"never": True}
-    took = round((visit.until - visit.start) / 1e6, 3)
+    if span.most is None:
+        doubts.append(Doubt(name, "No end of its code was seen; in the script it never ends."))
+        return {"never": True, "ignores_stop": True}
+    took = round((span.least + span.most) / 2, 3) if span.exact is None else span.exact
     if visit.result is None:
         doubts.append(Doubt(name, "Its result was not seen; the script says true."))
-    if visit.how == "inferred":
-        doubts.append(Doubt(name, "Its duration is inferred."))
+    if span.exact is None:
+        told = (
+            f"It took between {span.least:.1f} and {span.most:.1f} s; the script says {took:.1f} s."
+        )
+        doubts.append(Doubt(name, told))
     found: dict[str, Any] = {"after_s": took, "result": f"on_{visit.result or 'true'}"}
     return found | ({"message": said} if said else {})
 

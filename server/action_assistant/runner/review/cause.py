@@ -227,14 +227,15 @@ def _given(action: Action, problem: Overridden) -> tuple[str, str]:
 def _failures(run: Run) -> Iterator[Cause]:
     """The first action that ended in error; of a run that ended false, the last that did."""
     ended = [
-        (visit.until, name, visit)
+        (visit.not_after or visit.start, name, visit)
         for name, action in run.actions.items()
         for visit in action.visits
         if visit.until is not None
     ]
-    wrong = sorted(each for each in ended if each[2].result == "error")[:1]
+    ended.sort(key=lambda each: each[:2])
+    wrong = [each for each in ended if each[2].result == "error"][:1]
     if not wrong and run.result == "on_false":
-        wrong = sorted(each for each in ended if each[2].result == "false")[-1:]
+        wrong = [each for each in ended if each[2].result == "false"][-1:]
     for at, name, visit in wrong:
         yield ActionFailed(
             at=at,
@@ -295,7 +296,7 @@ def _waiting(
             yield Waiting(at=going.start, action=child, parent=name, until=until)
         elif (over := _over(action, moment)) is not None and _passes_over(arrow, over):
             yield Waiting(
-                at=over.until or over.start,
+                at=over.not_after or over.start,
                 action=child,
                 parent=name,
                 ended=over.result or "",
@@ -308,7 +309,7 @@ def _going(action: ActionRun, moment: int) -> Visit | None:
     last = action.visits[-1] if action.visits else None
     if last is None or last.start > moment:
         return None
-    reported = last.not_after or last.until
+    reported = last.not_after if last.until is None or last.not_after else last.start
     return last if reported is None or reported > moment else None
 
 
@@ -354,7 +355,7 @@ def _failed(action: ActionRun) -> Visit | None:
 
 def _said(action: ActionRun, visit: Visit) -> str:
     """The last thing that an action said in a visit."""
-    until = visit.not_after or visit.until
+    until = visit.not_after
     said = [
         each.text
         for each in action.messages

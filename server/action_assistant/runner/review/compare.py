@@ -16,13 +16,14 @@ _MOST: Final = 2_000  # steps in an answer
 _SLOWER: Final = 1.5  # times as long
 _NOTABLE_US: Final = 500_000  # and this much longer
 
-#: How the two visits of one step relate. `unknown`: one of the two results is not known.
-Relation: TypeAlias = Literal["same", "result", "only_a", "only_b", "unknown"]
+#: How the two visits of one step relate. `unknown`: a result is not known. `end`: one has ended, and of
+#: the other no end was seen.
+Relation: TypeAlias = Literal["same", "result", "only_a", "only_b", "unknown", "end"]
 
 
 class Step(msgspec.Struct, frozen=True, kw_only=True):
     """The `visit`-th visit (from 1) of an action in both runs. `slower` names the run in which it
-    took notably longer."""
+    took notably longer, whatever of its bounds is true."""
 
     action: str
     aid: str | None
@@ -130,23 +131,26 @@ def _relation(a: Visit | None, b: Visit | None) -> Relation:
         return "only_b"
     if b is None:
         return "only_a"
-    if a.result == b.result:
-        return "same"
-    return "unknown" if a.result is None or b.result is None else "result"
+    if a.result is not None and b.result is not None:
+        return "same" if a.result == b.result else "result"
+    return "unknown" if (a.until is None) == (b.until is None) else "end"
 
 
 def _slower(a: Visit | None, b: Visit | None) -> Literal["a", "b"] | None:
     if a is None or b is None or a.until is None or b.until is None:
         return None
-    one, other = a.until - a.start, b.until - b.start
-    longer, shorter = max(one, other), min(one, other)
-    if longer < _SLOWER * shorter or longer - shorter < _NOTABLE_US:
-        return None
-    return "a" if one > other else "b"
+    if _longer(a, b):
+        return "a"
+    return "b" if _longer(b, a) else None
+
+
+def _longer(one: Visit, other: Visit) -> bool:
+    most = other.most
+    return most is not None and one.least >= max(_SLOWER * most, most + _NOTABLE_US)
 
 
 def _begun(step: Step, a: Run, b: Run) -> tuple[float, str, int]:
-    """When a step began, counted from the start of its run; the earlier of the two."""
+    """When a step had begun, counted from the start of its run; the earlier of the two."""
     moments = [
         (shown.start - shapes.time(run.started_at or run.requested_at)).total_seconds()
         for shown, run in ((step.a, a), (step.b, b))
@@ -192,11 +196,12 @@ def _said(step: Step, shown: shapes.VisitShown | None, run: Run) -> list[str]:
     action = run.actions.get(step.action)
     if action is None or shown is None:
         return []
-    until = shown.not_after or shown.until
+    until = shown.not_after
     return [
         each.text
         for each in action.messages
-        if shapes.time(each.at) >= shown.start and (until is None or shapes.time(each.at) <= until)
+        if shapes.time(each.at) >= shown.not_before
+        and (until is None or shapes.time(each.at) <= until)
     ]
 
 
@@ -211,10 +216,15 @@ def _verdict(a: Run, b: Run, steps: list[Step], parting: Parting | None) -> str:
         return f"{lead}: {parting.text}" if not same else f"{lead} {parting.text}"
     if not steps:
         return "Nothing was seen of either run."
-    if any(step.relation == "unknown" for step in steps):
-        return "No difference was seen, but some results are not known."
     if a.end is None or b.end is None:
         return "No difference so far."
+    if any(step.relation == "end" for step in steps):
+        return (
+            "No difference is proven: of some visits no end was seen in one of the runs, so that "
+            "their results are not known."
+        )
+    if any(step.relation == "unknown" for step in steps):
+        return "No difference was seen, but some results are not known."
     return "Every visit ended the same."
 
 

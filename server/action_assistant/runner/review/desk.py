@@ -7,7 +7,7 @@ from typing import Any, Final, Literal, TypeAlias
 
 import anyio
 import msgspec
-from sqlalchemy import Row, select
+from sqlalchemy import Row, func, select
 
 from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refused
 from action_assistant.journal.events import Draft
@@ -115,7 +115,10 @@ class Desk:
     async def _sum_up_some(self) -> bool:
         """Sum up the newest runs that are over and are not yet. Whether any was."""
         before, since = self._wall(), self._summed_up
-        done = select(review.c.run).where(review.c.run == run.c.id, review.c.summed)
+        figures = func.coalesce(func.json_extract(run.c.summary, "$.figures"), 0)
+        done = select(review.c.run).where(
+            review.c.run == run.c.id, review.c.summed, figures == about.FIGURES
+        )
         query = (
             select(run.c.id)
             .where(run.c.archived_at.is_(None), run.c.ended_at > (since or 0), ~done.exists())

@@ -10,6 +10,7 @@ from mcap.writer import CompressionType, Writer
 
 from action_assistant.journal.events import Event
 from action_assistant.runner import shapes
+from action_assistant.runner.durations import of_visit
 from action_assistant.runner.events import Observed
 from action_assistant.runner.review.reel import fold
 from action_assistant.runner.runs import Run
@@ -28,6 +29,8 @@ _COLUMNS: Final = (
     "seconds",
     "result",
     "how",
+    "seconds_least",
+    "seconds_most",
 )
 _ANY: Final = b'{"type":"object"}'
 #: Of foxglove.Log, so that its panel shows what actions and engines say.
@@ -68,7 +71,8 @@ def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
 
 
 def intervals(run: Run) -> bytes:
-    """CSV: a line per visit, in the order they began. Empty where nothing is known."""
+    """CSV: a line per visit, in the order they began. Empty where nothing is known, so is `seconds`
+    where only its bounds are, which follow at the end."""
     text = io.StringIO()
     sheet = csv.writer(text)
     sheet.writerow(_COLUMNS)
@@ -78,11 +82,19 @@ def intervals(run: Run) -> bytes:
         for number, visit in enumerate(action.visits, action.older + 1)
     ]
     for _, name, number, visit in sorted(rows, key=lambda row: row[:3]):
-        took = "" if visit.until is None else f"{(visit.until - visit.start) / 1e6:.6f}"
+        took = of_visit(visit)
+        seconds, *bounds = (
+            (None, None, None) if took is None else (took.exact, took.least, took.most)
+        )
         moments = (visit.start, visit.until, visit.not_before, visit.not_after)
         shown = ("" if each is None else shapes.time(each).isoformat() for each in moments)
-        sheet.writerow([_cell(name), number, *shown, took, visit.result or "", visit.how])
+        told = [_cell(name), number, *shown, _figure(seconds), visit.result or "", visit.how]
+        sheet.writerow([*told, *map(_figure, bounds)])
     return text.getvalue().encode()
+
+
+def _figure(seconds: float | None) -> str:
+    return "" if seconds is None else f"{seconds:.3f}"
 
 
 def _cell(text: str) -> str:
@@ -90,7 +102,8 @@ def _cell(text: str) -> str:
 
 
 def mcap(events: Iterable[Event]) -> bytes:
-    """MCAP with JSON messages: `/run` (state), `/actions/NAME` (state and result), `/log`."""
+    """MCAP with JSON messages: `/run` (state), `/actions/NAME` (state and result, when they were shown),
+    `/visits/NAME` (a visit that has ended, between its bounds, when that was known), `/log`."""
     out = io.BytesIO()
     writer = Writer(out, compression=CompressionType.NONE)
     writer.start(profile="", library=f"temoto-action-assistant {VERSION}")
@@ -110,6 +123,7 @@ class _Track:
         self._schemas = {
             "run": writer.register_schema("action_assistant.Run", "jsonschema", _ANY),
             "action": writer.register_schema("action_assistant.Action", "jsonschema", _ANY),
+            "visit": writer.register_schema("action_assistant.Visit", "jsonschema", _ANY),
             "log": writer.register_schema("foxglove.Log", "jsonschema", _LOG),
         }
         self._count = 0
@@ -123,7 +137,19 @@ class _Track:
         if isinstance(told, Observed):
             for item in told.seen:
                 self._seen(item)
+        self._ended(at, before, after)
         self._said(before, after)
+
+    def _ended(self, at: int, before: Run | None, after: Run) -> None:
+        for name, action in after.actions.items():
+            was = before.actions.get(name) if before is not None else None
+            if was is action:
+                continue
+            known = () if was is None else was.visits
+            for number, visit in enumerate(action.visits, action.older + 1):
+                if visit.until is not None and visit not in known:
+                    body = {"visit": number, **msgspec.to_builtins(shapes.visit(visit))}
+                    self._write("visit", f"/visits/{name}", at, body)
 
     def _seen(self, item: object) -> None:
         match item:
