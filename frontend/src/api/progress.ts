@@ -8,9 +8,10 @@ export interface Progress {
   word: string;
   /** When the present visit began, ms; null when none goes on. */
   since: number | null;
-  /** How long the last visit took, ms; null when none ended. */
+  /** How long the last visit took at least, ms; null when none ended. */
   took: number | null;
-  /** How long it took at most, ms, where its ends were not seen exactly; null where they were. */
+  /** How long it took at most, ms, where its ends were not seen exactly (Infinity: its code may go on
+   * still); null where they were. */
   atMost: number | null;
   visits: number;
   inferred: boolean;
@@ -70,14 +71,13 @@ function stateOf(action: ActionRun, over: boolean, unsure: boolean): { tone: Ton
   }
 }
 
-const NOTABLE = 200; // ms that make a difference to a person
-
-/** How long a visit took at most; null where its ends are known well enough. */
+/** How long a visit took at most; null where its ends are known exactly, and while it goes on. */
 export function atMost(visit: Visit): number | null {
   const [from, until] = [time(visit.from), time(visit.until)];
   const [before, after] = [time(visit.not_before), time(visit.not_after)];
-  if (from === null || until === null || before === null || after === null) return null;
-  return after - before - (until - from) >= NOTABLE ? after - before : null;
+  if (from === null || until === null || before === null) return null;
+  if (after === null) return Number.POSITIVE_INFINITY;
+  return before === from && until === after ? null : after - before;
 }
 
 /** `unsure`: nobody has heard of the run for too long. */
@@ -91,7 +91,7 @@ export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progre
     tone,
     word,
     since: until === null && !over ? from : null,
-    took: from !== null && until !== null ? until - from : null,
+    took: from !== null && until !== null ? Math.max(0, until - from) : null,
     atMost: last ? atMost(last) : null,
     visits: action.visits.length,
     inferred: last?.how === "inferred",
@@ -141,6 +141,7 @@ export function runWord(run: Run): { tone: Tone; word: string } {
     const word = run.result.replace(/^on_/, "");
     return { tone: resultTone[run.result] ?? "done", word: `finished: ${word}` };
   }
+  if (run.state === "finished" && !run.result) return { tone: "done", word: "finished" };
   return runWords[run.state] ?? { tone: "unknown", word: run.state };
 }
 

@@ -1,7 +1,7 @@
 /** What the runner tells of past runs: films, marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
 import { ask, askLines } from "./http";
-import { type ActionRun, getRun, type Run, type Visit } from "./runs";
+import { type ActionRun, getRun, type Run, type Took, type Visit } from "./runs";
 
 /** What became of an action. From the visit number `first` on, its visits are now `visits`. */
 export interface ActionFrame {
@@ -82,7 +82,7 @@ export interface Step {
   visit: number;
   a: Visit | null;
   b: Visit | null;
-  relation: "same" | "result" | "only_a" | "only_b" | "unknown";
+  relation: "same" | "result" | "only_a" | "only_b" | "unknown" | "end";
   slower: "a" | "b" | null;
 }
 
@@ -108,12 +108,14 @@ export interface ActionStatistics {
   runs: number;
   visits: number;
   results: Partial<Record<"true" | "false" | "error" | "stopped", number>>;
+  unknown: number;
   inferred: number;
   timed: number;
   p50: number | null;
   p90: number | null;
   p99: number | null;
   longest: number | null;
+  spans: Record<"p50" | "p90" | "p99" | "longest", Took | null>;
 }
 
 export interface Statistics {
@@ -123,11 +125,14 @@ export interface Statistics {
     state: Run["state"];
     result: Run["result"];
     took: number | null;
+    span: Took | null;
   }[];
   judged: number;
   succeeded: number;
+  unknown: number;
   actions: ActionStatistics[];
   never_taken: { parent: string; child: string; outcomes: string[] }[];
+  untold: number;
 }
 
 /** Which runs a list shows; what is empty asks for all. */

@@ -20,7 +20,15 @@ export type RunResult = "on_true" | "on_false" | "on_error" | "on_stopped" | "on
 
 export type VisitResult = "true" | "false" | "error" | "stopped" | null;
 
-/** One execution: seen going on from `from` to `until`, at most from `not_before` to `not_after`. */
+/** Seconds: at least `least`, at most `most`; null: nothing bounds it from above. */
+export interface Took {
+  least: number;
+  most: number | null;
+}
+
+/** One execution: it began between `not_before` and `from`, and ended between `until` and
+ * `not_after` (null: it may go on still). Where `until` lies before `from`, no moment is known at
+ * which it went on for certain. */
 export interface Visit {
   from: string | null;
   not_before: string | null;
@@ -28,6 +36,8 @@ export interface Visit {
   until: string | null;
   result: VisitResult;
   how: "observed" | "inferred";
+  /** Null while no end was seen. */
+  took?: Took | null;
   /** Values that the engine reported, as JSON texts by flat name; null when nobody saw them. */
   inputs?: Record<string, string> | null;
 }
@@ -78,6 +88,8 @@ export interface Run {
   requested_at: string;
   started_at: string | null;
   ended_at: string | null;
+  /** From the start to when nothing of it moved any more, as far as that was seen. */
+  took?: Took | null;
   author: Asker | null;
   stopped_by: Asker | null;
   /** Why it was refused, lost or ended so. */

@@ -19,24 +19,28 @@ import { getRun, type Run, type Visit } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { Empty } from "../ui/empty";
 import { StateWord } from "../ui/state-word";
-import { clock, day, duration, instant, useNow } from "../ui/when";
+import { spanWords } from "../ui/took";
+import { clock, day, instant, useNow } from "../ui/when";
 import style from "./compare-page.module.css";
 import type { BarParts } from "./run-page";
 
+/** How it ended; that nobody knows how is something else than that nobody saw an end. */
+function outcome(visit: Visit): string {
+  return visit.result ?? (visit.until === null ? "went on" : "result unknown");
+}
+
 function took(visit: Visit): string {
-  const from = instant(visit.from);
-  const until = instant(visit.until);
-  return from === null || until === null ? "no end seen" : duration(until - from);
+  if (visit.until === null) return "no end seen";
+  return spanWords(visit.took) ?? "its code may go on";
 }
 
 function VisitCell({ visit, slower }: { visit: Visit | null; slower: boolean }) {
   if (visit === null) return <span className={style.none}>never ran</span>;
   const result = visit.result;
   const tone = result ?? (visit.until === null ? "run" : "unknown");
-  const word = result ?? (visit.until === null ? "went on" : "result unknown");
   return (
     <span className={style.visit}>
-      <StateWord tone={tone} word={word} />
+      <StateWord tone={tone} word={outcome(visit)} />
       <span className={style.took} data-slower={slower || undefined}>
         {took(visit)}
         {slower && " · slower"}
@@ -52,6 +56,7 @@ const RELATIONS: Record<Step["relation"], string> = {
   only_a: "only in the first",
   only_b: "only in the second",
   unknown: "not known",
+  end: "only one end was seen",
 };
 
 function Steps({ found }: { found: Comparison }) {
@@ -170,7 +175,7 @@ function Head({ run, title }: { run: Run; title: string }) {
       <span className={style.meta}>
         {run.simulated ? "simulator" : run.engine} · {authorName(run.author)}
         {start !== null && ` · ${day(start, now)} ${clock(start)}`}
-        {start !== null && end !== null && ` · ${duration(end - start)}`}
+        {end !== null && spanWords(run.took) && ` · ${spanWords(run.took)}`}
       </span>
     </section>
   );

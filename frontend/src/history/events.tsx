@@ -58,11 +58,13 @@ export function happenings(
       if (until !== null) {
         const result = visit.result?.replace(/^on_/, "") ?? null;
         const tone = (result ?? "done") as Tone;
-        const last = atMost(visit) === null ? null : instant(visit.not_after);
+        const last = atMost(visit) === null ? until : instant(visit.not_after);
         const seen = visit.how === "inferred" ? " (inferred)" : "";
         const since =
-          last === null || start === null ? "" : ` (last seen at ${after(start, until)})`;
-        all.push({ at: last ?? until, tone, ...who, text: (result ?? "finished") + seen + since });
+          last === until || start === null ? "" : ` (not before ${after(start, until)})`;
+        const open = last === null ? "; its code may go on" : "";
+        const at = last ?? Math.max(until, from ?? until);
+        all.push({ at, tone, ...who, text: (result ?? "finished") + seen + since + open });
       }
     });
     for (const message of action.messages) {

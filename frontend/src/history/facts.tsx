@@ -3,7 +3,8 @@
 import { endWords } from "../api/progress";
 import { useRaw } from "../api/review";
 import { placeOf, type Run, whence } from "../api/runs";
-import { clock, day, duration, instant, useNow } from "../ui/when";
+import { spanWords } from "../ui/took";
+import { clock, day, instant, useNow } from "../ui/when";
 import style from "./facts.module.css";
 
 type Rest = NonNullable<Run["at_rest"]>;
@@ -36,8 +37,8 @@ export function Facts({ runner, run, version, by }: Props) {
     ...(run.stopped_by
       ? [["Stopped by", `${run.stopped_by.name}${whence(run.stopped_by)}`] as [string, string]]
       : []),
-    ["Ended", moment(end)],
-    ["Took", start !== null && end !== null ? duration(end - start) : "—"],
+    ["End known", moment(end)],
+    ["Took", (end !== null && spanWords(run.took)) || "—"],
     ["End", end === null ? "goes on" : endWords(run)],
     ["Result", run.result?.replace(/^on_/, "") ?? "—"],
     ["Why", run.detail || "—"],

@@ -27,7 +27,8 @@ import { hasEnded, placeOf, type Run } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { Empty } from "../ui/empty";
 import { StateWord } from "../ui/state-word";
-import { clock, day, duration, instant, stopwatch, useNow } from "../ui/when";
+import { spanWords } from "../ui/took";
+import { clock, day, instant, stopwatch, useNow } from "../ui/when";
 import { Filters } from "./filters";
 import style from "./runs-page.module.css";
 import { useVersionLabel } from "./version-label";
@@ -68,7 +69,8 @@ function Row({ run, now, chosen, onChoose }: RowProps) {
   const { tone, word } = runWord(run);
   const start = instant(run.started_at);
   const end = instant(run.ended_at);
-  const took = start === null ? "" : end === null ? stopwatch(now - start) : duration(end - start);
+  const over = end === null ? null : (spanWords(run.took) ?? "—");
+  const took = over ?? (start === null ? "" : stopwatch(now - start));
   const to = `/runs/${run.id}`;
   return (
     <tr className={style.row} onClick={() => go(to)}>

@@ -6,32 +6,33 @@ import { Link, useSearch } from "wouter";
 import { sentence } from "../api/http";
 import { runWord } from "../api/progress";
 import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
-import type { Run } from "../api/runs";
+import type { Run, Took } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { Empty } from "../ui/empty";
 import { toneColor } from "../ui/state-word";
-import { duration } from "../ui/when";
+import { spanWords } from "../ui/took";
 import type { BarParts } from "./run-page";
 import style from "./statistics-page.module.css";
 
-const seconds = (s: number | null) => (s === null ? "—" : duration(s * 1000));
+const seconds = (took: Took | null) => spanWords(took) ?? "—";
+const high = (took: Took | null) => took?.most ?? took?.least ?? 0;
 
 /** One bar per run, the oldest on the left; its height is how long it took. */
 function RunBars({ runs }: { runs: Statistics["runs"] }) {
-  const longest = Math.max(0.001, ...runs.map((run) => run.took ?? 0));
+  const longest = Math.max(0.001, ...runs.map((run) => high(run.span)));
   const ordered = [...runs].reverse();
   return (
     <ol className={style.bars} aria-label="Runs, the oldest first">
       {ordered.map((run) => {
         const { tone, word } = runWord(run as unknown as Run);
-        const text = `Run ${run.number}: ${word}, ${seconds(run.took)}`;
+        const text = `Run ${run.number}: ${word}, ${seconds(run.span)}`;
         return (
           <li key={run.id}>
             <Link to={`/runs/${run.id}`} title={text} aria-label={text}>
               <i
-                data-unknown={run.took === null || undefined}
+                data-unknown={run.span?.most == null || undefined}
                 style={{
-                  height: `${Math.max(8, ((run.took ?? longest) / longest) * 100)}%`,
+                  height: `${Math.max(8, (run.span?.most == null ? 1 : high(run.span) / longest) * 100)}%`,
                   color: toneColor[tone],
                 }}
               />
@@ -48,8 +49,7 @@ function ResultBar({ action }: { action: ActionStatistics }) {
     "true" | "false" | "error" | "stopped",
     number,
   ][];
-  const counted = known.reduce((sum, [, count]) => sum + count, 0);
-  const unknown = Math.max(0, action.visits - counted);
+  const { unknown } = action;
   const parts = [...known, ...(unknown > 0 ? ([["unknown", unknown]] as const) : [])];
   const text = parts.map(([name, count]) => `${count} ${name}`).join(", ");
   return (
@@ -61,25 +61,31 @@ function ResultBar({ action }: { action: ActionStatistics }) {
   );
 }
 
-/** Median as a dot, from there to the 90th percentile as a bar, the longest as a tick. */
+/** Where the median may lie as a bar, from its upper bound on to that of the 90th percentile as a line,
+ * the upper bound of the longest as a tick. */
 function SpreadBar({ action, most }: { action: ActionStatistics; most: number }) {
-  const share = (s: number | null) => `${((s ?? 0) / most) * 100}%`;
-  if (action.p50 === null) return <span className={style.quiet}>no end was seen</span>;
+  const { p50, p90, longest } = action.spans;
+  const share = (s: number) => `${Math.min(100, (s / most) * 100)}%`;
+  if (p50 === null) return <span className={style.quiet}>no end was seen</span>;
   return (
     <span className={style.spread} aria-hidden>
       <i
         className={style.range}
-        style={{ left: share(action.p50), right: `calc(100% - ${share(action.p90)})` }}
+        style={{ left: share(p50.least), right: `calc(100% - ${share(high(p90))})` }}
       />
-      <i className={style.longest} style={{ left: share(action.longest) }} />
-      <i className={style.median} style={{ left: share(action.p50) }} />
+      <i className={style.longest} style={{ left: share(high(longest)) }} />
+      <i
+        className={style.median}
+        style={{ left: share(p50.least), width: `max(3px, ${share(high(p50) - p50.least)})` }}
+      />
     </span>
   );
 }
 
 function Actions({ actions }: { actions: readonly ActionStatistics[] }) {
-  const most = Math.max(0.001, ...actions.map((action) => action.longest ?? 0));
-  const slowest = [...actions].sort((a, b) => (b.p50 ?? 0) * b.visits - (a.p50 ?? 0) * a.visits);
+  const most = Math.max(0.001, ...actions.map((action) => high(action.spans.longest)));
+  const weight = (action: ActionStatistics) => high(action.spans.p50) * action.visits;
+  const slowest = [...actions].sort((a, b) => weight(b) - weight(a));
   return (
     <div className={style.scroll}>
       <table className={style.table}>
@@ -105,9 +111,9 @@ function Actions({ actions }: { actions: readonly ActionStatistics[] }) {
               <td className={style.wide}>
                 <SpreadBar action={action} most={most} />
               </td>
-              <td className={style.number}>{seconds(action.p50)}</td>
-              <td className={style.number}>{seconds(action.p90)}</td>
-              <td className={style.number}>{seconds(action.longest)}</td>
+              <td className={style.number}>{seconds(action.spans.p50)}</td>
+              <td className={style.number}>{seconds(action.spans.p90)}</td>
+              <td className={style.number}>{seconds(action.spans.longest)}</td>
             </tr>
           ))}
         </tbody>
@@ -122,6 +128,7 @@ function failures(action: ActionStatistics): number {
 
 function Found({ found }: { found: Statistics }) {
   const rate = found.judged === 0 ? null : Math.round((found.succeeded / found.judged) * 100);
+  const hidden = found.actions.reduce((sum, action) => sum + action.unknown, 0);
   const failing = found.actions
     .filter((action) => failures(action) > 0)
     .sort((a, b) => failures(b) / b.visits - failures(a) / a.visits)
@@ -133,14 +140,21 @@ function Found({ found }: { found: Statistics }) {
           <h3>Success</h3>
           <p className={style.big}>{rate === null ? "—" : `${rate} %`}</p>
           <p className={style.quiet}>
-            {found.succeeded} of {found.judged} runs finished true. Stopped, refused and lost ones
-            say nothing about the graph and are not counted.
+            {found.judged > 0 &&
+              `${found.succeeded} of ${found.judged} runs with a known result finished true. `}
+            {found.unknown > 0 &&
+              `Of ${found.unknown} that finished the result is not known: robots do not tell it. `}
+            Stopped, refused and lost ones say nothing about the graph and are not counted.
           </p>
         </section>
         <section className={style.card}>
           <h3>Most failing</h3>
           {failing.length === 0 ? (
-            <p className={style.quiet}>No action ended false or in error.</p>
+            <p className={style.quiet}>
+              {hidden > 0
+                ? `No action is known to have ended false or in error; of ${hidden} visits nobody knows.`
+                : "No action ended false or in error."}
+            </p>
           ) : (
             <ul className={style.list}>
               {failing.map((action) => (
@@ -154,7 +168,11 @@ function Found({ found }: { found: Statistics }) {
         <section className={style.card}>
           <h3>Arrows never taken</h3>
           {found.never_taken.length === 0 ? (
-            <p className={style.quiet}>Every arrow of the newest version was taken.</p>
+            <p className={style.quiet}>
+              {found.untold > 0
+                ? "None is known."
+                : "Every arrow of the newest version whose action ran was taken."}
+            </p>
           ) : (
             <ul className={style.list}>
               {found.never_taken.slice(0, 6).map((arrow) => (
@@ -167,6 +185,12 @@ function Found({ found }: { found: Statistics }) {
                 <li className={style.quiet}>and {found.never_taken.length - 6} more</li>
               )}
             </ul>
+          )}
+          {found.untold > 0 && (
+            <p className={style.quiet}>
+              Of {found.untold === 1 ? "1 arrow" : `${found.untold} arrows`} it is not known whether
+              it was ever taken: robots do not tell results.
+            </p>
           )}
         </section>
       </div>

@@ -11,6 +11,7 @@ import type { Graph } from "../graph/model";
 import { lanesOf } from "../ui/lanes";
 import { StateWord } from "../ui/state-word";
 import { Timeline } from "../ui/timeline";
+import { spanWords } from "../ui/took";
 import { clock, day, instant, stopwatch, useNow } from "../ui/when";
 import { PauseButton } from "./pause-button";
 import { RestButton } from "./rest-button";
@@ -88,7 +89,7 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, o
         <Text span c="dimmed" size="xs" truncate>
           {run.simulated && "simulated · "}
           started by {authorName(run.author)} {started} ·{" "}
-          {stopwatch((instant(run.ended_at) ?? until) - start)}
+          {(!goes && spanWords(run.took)) || stopwatch((instant(run.ended_at) ?? until) - start)}
         </Text>
         <span className={style.gap} />
         {alarm && <span className={style.alarm}>{alarm.text}</span>}

@@ -47,8 +47,8 @@ export interface TimeGap {
 }
 
 interface Bar {
-  left: number;
-  width: number;
+  /** Where it went on for certain; null where no such moment is known. */
+  sure: { left: number; width: number } | null;
   tone: Tone;
   open: boolean;
   /** Where it may have gone on as well: nobody saw its ends. */
@@ -72,11 +72,10 @@ function barOf(
   const tone: Tone = known ? result : open && !over ? "run" : open ? "unknown" : "done";
   const at = (t: number) => Math.min(100, Math.max(0, ((t - start) / span) * 100));
   const earliest = instant(visit.not_before) ?? from;
-  const latest = open ? to : (instant(visit.not_after) ?? to);
-  const wider = at(latest) - at(earliest) - (at(to) - at(from)) > 0.5;
+  const latest = open ? to : (instant(visit.not_after) ?? until);
+  const wider = at(latest) - at(earliest) - Math.max(0, at(to) - at(from)) > 0.5;
   return {
-    left: at(from),
-    width: Math.max(0.4, at(to) - at(from)),
+    sure: to > from || !wider ? { left: at(from), width: Math.max(0.4, at(to) - at(from)) } : null,
     tone,
     open: open && !over,
     maybe: wider ? { left: at(earliest), width: at(latest) - at(earliest) } : null,
@@ -170,7 +169,8 @@ function LaneRow({ run, lane, axis, unsure, selected, onPick }: RowProps) {
               {bar.maybe && (
                 <i
                   className={style.maybe}
-                  title="Seen at one moment only: it may have gone on for this long"
+                  data-bounds={bar.sure === null ? "all" : undefined}
+                  title="It went on at some time within this: its ends were not seen exactly"
                   style={{
                     left: `${bar.maybe.left}%`,
                     width: `${bar.maybe.width}%`,
@@ -178,15 +178,17 @@ function LaneRow({ run, lane, axis, unsure, selected, onPick }: RowProps) {
                   }}
                 />
               )}
-              <i
-                data-tone={unsure && bar.open ? "unknown" : bar.tone}
-                data-inferred={visit.how === "inferred" || undefined}
-                style={{
-                  left: `${bar.left}%`,
-                  width: `${bar.width}%`,
-                  color: toneColor[bar.tone],
-                }}
-              />
+              {bar.sure && (
+                <i
+                  data-tone={unsure && bar.open ? "unknown" : bar.tone}
+                  data-inferred={visit.how === "inferred" || undefined}
+                  style={{
+                    left: `${bar.sure.left}%`,
+                    width: `${bar.sure.width}%`,
+                    color: toneColor[bar.tone],
+                  }}
+                />
+              )}
             </Fragment>
           );
         })}
