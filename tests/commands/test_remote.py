@@ -12,6 +12,7 @@ from httpx_ws import aconnect_ws
 from pycrdt import Doc, Map, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
+from action_assistant.commands.remote import verdict
 from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
 from support.product import TOKEN, Product, running
@@ -144,3 +145,29 @@ def test_without_a_server_it_says_how_to_start_one(tmp_path: Path) -> None:
     answer = Product(tmp_path).cli("graphs")
     assert answer.returncode == 2
     assert "action-assistant serve" in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("state", "result", "visits", "code"),
+    [
+        ("finished", "on_true", ["true"], 0),
+        ("finished", "on_false", ["false"], 1),
+        ("finished", "on_error", ["error"], 1),
+        ("finished", None, [None, None], 0),
+        ("finished", None, ["error", None], 1),
+        ("stopped", "on_stopped", ["stopped"], 1),
+        ("stopped", None, [None], 1),
+        ("error", None, [None], 1),
+        ("halted", "on_halted", [None], 1),
+        ("lost", None, [None], 1),
+        ("refused", None, [], 1),
+    ],
+)
+def test_a_run_fails_the_command_only_if_it_did_not_finish_or_is_known_to_have_failed(
+    state: str, result: str | None, visits: list[str | None], code: int
+) -> None:
+    actions = {"Work_0": {"visits": [{"result": each} for each in visits]}}
+    found, words = verdict({"state": state, "result": result, "actions": actions})
+    assert found == code
+    assert words.startswith(state)
+    assert ("does not tell" in words) == (state == "finished" and result is None and code == 0)

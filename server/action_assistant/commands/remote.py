@@ -209,8 +209,9 @@ def _watch(server: Server, run: str) -> int:
                 seen[name] = action["state"]
                 print(f"{name}: {action['state']}", flush=True)
         if now["state"] in _ENDED:
-            print(_ended(now))
-            return 0 if now["state"] == "finished" and not _failed(now) else 1
+            code, words = verdict(now)
+            print(words)
+            return code
         time.sleep(_POLL)
 
 
@@ -236,22 +237,16 @@ def _at_rest(options: argparse.Namespace) -> int:
     return 0
 
 
-def _failed(run: dict[str, Any]) -> bool:
-    """Whether a finished run is known to have failed. Robots do not tell results; an action that has
-    ended in error tells enough."""
-    if run["result"] is not None:
-        return bool(run["result"] != "on_true")
-    return any(
-        visit["result"] == "error" for each in run["actions"].values() for visit in each["visits"]
-    )
-
-
-def _ended(run: dict[str, Any]) -> str:
-    if run["result"] is not None or run["state"] != "finished":
-        return f"{run['state']} ({run['result']})" if run["result"] else str(run["state"])
-    if _failed(run):
-        return "finished, and an action ended in error"
-    return "finished; nothing failed that was seen, but the robot does not tell the result"
+def verdict(run: dict[str, Any]) -> tuple[int, str]:
+    """The exit code for a run that is over, and its end in words. Robots do not tell results: what has
+    finished went well unless something is known to have failed, as an action in error is."""
+    if run["state"] != "finished" or run["result"] is not None:
+        words = f"{run['state']} ({run['result']})" if run["result"] else str(run["state"])
+        return 0 if run["state"] == "finished" and run["result"] == "on_true" else 1, words
+    visits = [visit for each in run["actions"].values() for visit in each["visits"]]
+    if any(visit["result"] == "error" for visit in visits):
+        return 1, "finished, after an action had ended in error"
+    return 0, "finished; nothing is known to have failed, but the robot does not tell the result"
 
 
 def _stop(options: argparse.Namespace) -> int:
