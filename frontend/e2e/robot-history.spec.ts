@@ -10,6 +10,7 @@ test.skip(NO_ROS !== "", NO_ROS);
 test.describe.configure({ mode: "serial" });
 
 interface Run {
+  graph: string;
   id: string;
   state: string;
   result: string | null;
@@ -254,6 +255,18 @@ test("a loop shows its visits, as many as were seen", async () => {
   await open(page, runs.loop);
   await expect(card(page, "Check").getByText(/[23]×/)).toBeVisible();
   await expect(page.getByText("again (2.)").first()).toBeVisible();
+});
+
+test("figures of a robot say what is not known, and between which bounds the rest lies", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/statistics?graph=${runs.good?.graph}`);
+  const success = page.locator("section").filter({ hasText: "Success" }).first();
+  await expect(success).toContainText("Of 1 that finished the result is not known");
+  await expect(page.getByText(/arrows? it is not known whether/)).toBeVisible();
+  await expect(page.getByRole("row").filter({ hasText: "Grip_0" })).toContainText(/[–≤]/);
+  await open(page, runs.good);
+  await page.getByRole("tab", { name: "Facts" }).click();
+  await expect(page.locator("dl > div").filter({ hasText: "Took" })).toContainText(/[–≤]/);
 });
 
 test("time without an answer is hatched, and said", async () => {

@@ -77,3 +77,19 @@ test("a run that moves again is never called by the end that it had", () => {
   expect(runWord(again)).toEqual({ tone: "error", word: "MOVES AGAIN" });
   expect(runWord({ ...again, state: "unknown", unknown_since: "t" }).word).toBe("MOVES AGAIN");
 });
+
+test("what is known between bounds is no value, and what may go on has no upper one", () => {
+  const seen = { ...visit, until: "2026-01-01T00:00:03Z", not_after: "2026-01-01T00:00:04Z" };
+  const told = (one: Partial<typeof seen>) =>
+    progressOf({ ...going, state: "FINISHED", visits: [{ ...seen, ...one } as never] }, run, false);
+  expect(told({})).toMatchObject({ took: 2_000, atMost: 4_000 });
+  expect(told({ until: "2026-01-01T00:00:00Z" })).toMatchObject({ took: 0, atMost: 4_000 });
+  expect(told({ not_after: null as never }).atMost).toBe(Number.POSITIVE_INFINITY);
+  expect(told({ not_before: visit.from as never, not_after: seen.until }).atMost).toBeNull();
+});
+
+test("a run that finished with a result that nobody told is not called true", () => {
+  const over = { ...run, state: "finished", ended_at: "t" } as const;
+  expect(runWord(over)).toEqual({ tone: "done", word: "finished" });
+  expect(runWord({ ...over, result: "on_true" }).tone).toBe("true");
+});

@@ -80,6 +80,13 @@ export function atMost(visit: Visit): number | null {
   return before === from && until === after ? null : after - before;
 }
 
+/** How long a visit took, at least and at most, ms. */
+export function tookOf(visit: Visit): Pick<Progress, "took" | "atMost"> {
+  const [from, until] = [begun(visit), ended(visit)];
+  const took = from !== null && until !== null ? Math.max(0, until - from) : null;
+  return { took, atMost: atMost(visit) };
+}
+
 /** `unsure`: nobody has heard of the run for too long. */
 export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progress {
   const over = run.ended_at !== null;
@@ -91,8 +98,7 @@ export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progre
     tone,
     word,
     since: until === null && !over ? from : null,
-    took: from !== null && until !== null ? Math.max(0, until - from) : null,
-    atMost: last ? atMost(last) : null,
+    ...(last ? tookOf(last) : { took: null, atMost: null }),
     visits: action.visits.length,
     inferred: last?.how === "inferred",
     message: action.messages.at(-1)?.text ?? null,

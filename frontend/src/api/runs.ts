@@ -36,8 +36,6 @@ export interface Visit {
   until: string | null;
   result: VisitResult;
   how: "observed" | "inferred";
-  /** Null while no end was seen. */
-  took?: Took | null;
   /** Values that the engine reported, as JSON texts by flat name; null when nobody saw them. */
   inputs?: Record<string, string> | null;
 }

@@ -6,7 +6,7 @@ import type { ReactNode } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
 import { sentence } from "../api/http";
-import { endWords, runWord } from "../api/progress";
+import { endWords, runWord, tookOf } from "../api/progress";
 import {
   type Comparison,
   EVERYTHING,
@@ -19,7 +19,7 @@ import { getRun, type Run, type Visit } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { Empty } from "../ui/empty";
 import { StateWord } from "../ui/state-word";
-import { spanWords } from "../ui/took";
+import { spanWords, tookWords } from "../ui/took";
 import { clock, day, instant, useNow } from "../ui/when";
 import style from "./compare-page.module.css";
 import type { BarParts } from "./run-page";
@@ -31,7 +31,7 @@ function outcome(visit: Visit): string {
 
 function took(visit: Visit): string {
   if (visit.until === null) return "no end seen";
-  return spanWords(visit.took) ?? "its code may go on";
+  return tookWords(tookOf(visit)) ?? "its code may go on";
 }
 
 function VisitCell({ visit, slower }: { visit: Visit | null; slower: boolean }) {

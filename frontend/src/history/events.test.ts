@@ -59,3 +59,16 @@ test("nothing comes before the start, although the engine's clock stands behind"
     [null, "Run finished"],
   ]);
 });
+
+test("an end that was seen between two moments is told between them", () => {
+  const run = ran("2026-11-20T09:00:01.000Z", "2026-11-20T09:00:02.000Z");
+  const [look] = Object.values(run.actions ?? {});
+  const visit = look?.visits[0];
+  if (visit === undefined) throw new Error("no visit");
+  visit.not_after = "2026-11-20T09:00:02.900Z";
+  expect(happenings(run, "v1").map(({ text }) => text)).toContain("true (not before +1.0)");
+  visit.not_after = null;
+  expect(happenings(run, "v1").map(({ text }) => text)).toContain(
+    "true (not before +1.0); its code may go on",
+  );
+});

@@ -6,7 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row
 
-from action_assistant.runner.durations import Took, of_run, of_visit
+from action_assistant.runner.durations import Took, of_run
 from action_assistant.runner.events import AtRest, Author, Overridden, Override
 from action_assistant.runner.parameters import sent
 from action_assistant.runner.runs import Desired, Run, State
@@ -21,8 +21,7 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     """One execution of an action. It began between `not_before` and `from`, and ended between `until`
     (null: no end was seen) and `not_after` (null: it may go on still); where `until` lies before
-    `from`, no moment is known at which it went on for certain. `took` says the same in seconds; null
-    while no end was seen. `inputs`: values that the engine reported for it, by flat name, as JSON texts (a long
+    `from`, no moment is known at which it went on for certain. `inputs`: values that the engine reported for it, by flat name, as JSON texts (a long
     one is cut and ends with an ellipsis); null when nobody saw them."""
 
     start: datetime
@@ -32,7 +31,6 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     result: Outcome | None
     how: How
     inputs: dict[str, str] | None = None
-    took: Took | None = None
 
 
 class MessageShown(msgspec.Struct, frozen=True):
@@ -270,7 +268,6 @@ def visit(each: Visit) -> VisitShown:
         each.result,
         each.how,
         each.inputs,
-        of_visit(each),
     )
 
 

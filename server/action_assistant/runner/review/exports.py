@@ -148,7 +148,8 @@ class _Track:
             known = () if was is None else was.visits
             for number, visit in enumerate(action.visits, action.older + 1):
                 if visit.until is not None and visit not in known:
-                    body = {"visit": number, **msgspec.to_builtins(shapes.visit(visit))}
+                    shown = msgspec.to_builtins(shapes.visit(visit))
+                    body = {"visit": number, **shown, "took": of_visit(visit)}
                     self._write("visit", f"/visits/{name}", at, body)
 
     def _seen(self, item: object) -> None:
