@@ -322,11 +322,11 @@ def test_scripts_reach_into_sub_graphs_and_the_closest_key_wins() -> None:
     assert traces[-1].t_ms == 3000
 
 
-def test_a_graph_does_not_contain_itself() -> None:
+def test_a_graph_that_contains_itself_is_refused() -> None:
     inner = msgspec.structs.replace(graph_of("entry>B", "B>exit"), name="B")
     traces = list(simulate(graph_of("entry>B", "B>exit"), library={"B": inner}))
-    assert graph_states(traces, "g__B__0")[-1] == "FINISHED"
-    assert not [t for t in traces if getattr(t, "graph", "") == "g__B__0__B__0"]
+    assert hazards(traces) == ["refused"]
+    assert graph_states(traces) == []
 
 
 # Parameters

@@ -6,11 +6,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from action_assistant.umrf.check import blocking, check, check_reading
 from action_assistant.umrf.codec import read
 from action_assistant.umrf.model import Graph, Signature
+from action_assistant.umrf.semantics import Engine, EngineRefused
 
 ROOT = Path(__file__).parents[2]
 SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf" / "traces"
@@ -75,6 +77,79 @@ def test_graphs_that_contain_each_other_are_found() -> None:
     first, second = graph("First", action("Second")), graph("Second", action("First"))
     assert found(first, first, second) == {"recursion": "error"}
     assert found(graph("outer", action("First")), first, second) == {"recursion": "error"}
+
+
+def beside(*names: str) -> Graph:
+    """A chain of actions of these full names."""
+    actions = []
+    for full_name in names:
+        name, _, number = full_name.rpartition("_")
+        actions.append(action(name, instance_id=int(number)))
+    file: dict[str, Any] = {"graph_name": "outer", "actions": actions}
+    for first, second in pairwise(actions):
+        first["children"] = [{k: second[k] for k in ("name", "instance_id")}]
+        above = {k: first[k] for k in ("name", "instance_id")}
+        second["parents"] = [above | {"conditions": SAFE}]
+    file["graph_entry"] = [{k: actions[0][k] for k in ("name", "instance_id")}]
+    end = {k: actions[-1][k] for k in ("name", "instance_id")}
+    file["graph_exit"] = [end | {"conditions": RUN}]
+    return read(json.dumps(file)).graph
+
+
+#: What the real node did with these on 2026-11-22, each started as the first graph of its name.
+RESOLVED = [
+    (("Seq_0",), True),
+    (("Seq_0", "Seq_1"), False),
+    (("Nest_0", "Seq_0"), True),  # in the order of names, Nest is resolved before Seq is used up
+    (("Seq_0", "Nest_0"), True),  # whatever the order of arrows
+    (("Seq_0", "ZNest_0"), False),
+    (("Nest_0", "ZNest_0"), True),
+    (("Twice_0",), False),
+    (("Nest_0", "Nest_1"), False),
+]
+
+
+@pytest.mark.parametrize(("names", "resolves"), RESOLVED)
+def test_a_sub_graph_is_used_up_for_what_the_engine_resolves_after_it(
+    names: tuple[str, ...], resolves: bool
+) -> None:
+    outer = beside(*names)
+    inner = {
+        "Seq": graph("Seq", action("A")),
+        "Nest": graph("Nest", action("Seq")),
+        "ZNest": graph("ZNest", action("Seq")),
+        "Twice": msgspec.structs.replace(beside("Seq_0", "Seq_1"), name="Twice"),
+    }
+    problems = [p for p in check(outer, graphs=inner) if p.code == "subgraph-twice"]
+    assert [p.severity for p in problems] == ([] if resolves else ["error"])
+    engine = Engine(library=inner)
+    if resolves:
+        engine.start(outer, 0.0)
+        return
+    assert problems[0].where.path == f"/actions/{len(names) - 1}/name"
+    with pytest.raises(EngineRefused, match="Could not resolve graph 'outer'"):
+        engine.start(outer, 0.0)
+
+
+def test_each_robot_resolves_its_own_sub_graphs() -> None:
+    both = beside("Seq_0", "Seq_1")
+    first, second = both.actions
+    shared = tuple(
+        msgspec.structs.replace(each, actor=actor)
+        for each, actor in ((first, "Arm"), (second, "Base"))
+    )
+    apart = msgspec.structs.replace(both, actions=shared)
+    seq = graph("Seq", action("A"))
+    assert "subgraph-twice" not in {p.code for p in check(apart, graphs={"Seq": seq})}
+
+
+def test_sub_graphs_that_double_with_each_level_are_looked_at_for_a_moment_only() -> None:
+    library = {
+        f"{side}{level}": graph(f"{side}{level}", action(f"L{level + 1}"), action(f"R{level + 1}"))
+        for level in range(60)
+        for side in "LR"
+    }
+    check(graph("outer", action("L0"), action("R0")), graphs=library)
 
 
 def test_an_action_comes_before_a_graph_of_its_name_and_a_graph_before_the_unknown() -> None:

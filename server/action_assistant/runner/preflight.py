@@ -22,7 +22,9 @@ from action_assistant.umrf.model import Graph, Problem
 Verdict: TypeAlias = Literal["passed", "warned", "blocked"]
 
 #: Problems that the index of an engine shows.
-_OF_INDEX: Final = frozenset({"unknown-action", "signature", "parameter-type"})
+_OF_INDEX: Final = frozenset(
+    {"unknown-action", "signature", "parameter-type", "recursion", "subgraph-twice"}
+)
 _SHOWN: Final = 20
 
 

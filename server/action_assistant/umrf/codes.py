@@ -127,6 +127,10 @@ CODES: Final[dict[str, Code]] = {
         "hazard", _ERROR, "a sub-graph that contains itself, or the graph that it is in",
         "the engine cannot resolve the graph",
     ),
+    "subgraph-twice": Code(
+        "hazard", _ERROR, "one sub-graph used twice, beside itself or beside one that contains it",
+        "the engine cannot resolve the graph",
+    ),
     "actors": Code(
         "hazard", _ERROR, "several actors, and an engine that cannot synchronise",
         "the engine refuses to start the graph",

@@ -7,7 +7,8 @@ from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.scenarios import halted
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.values import check_signature, check_values
-from action_assistant.umrf.model import EXIT, PRECONDITIONS, Action, Graph, Problem, Severity
+from action_assistant.umrf.model import EXIT, PRECONDITIONS, Action, Graph, Key, Problem, Severity
+from action_assistant.umrf.semantics.matching import unresolved
 from action_assistant.umrf.semantics.values import slots_of
 from action_assistant.umrf.signatures import signature_of_graph, with_inputs
 
@@ -35,6 +36,29 @@ def check_subgraphs(
         for code, severity, message in inner[action.name]:
             subject.report(code, severity, message, action=action, member="/name")
         _check_pauses(subject, action)
+    _check_again(subject, graphs, known)
+
+
+def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container[str]) -> None:
+    """Sub-graphs that an engine has used up when it comes to them. Each engine resolves its own."""
+    told: set[tuple[Key, str]] = set()
+    for actor in sorted({action.actor for action in subject.real} - {""}) or [""]:
+
+        def is_other(action: Action, own: tuple[str, str] = ("", actor)) -> bool:
+            return action.actor not in own or action.name in known
+
+        for found in unresolved(subject.graph, graphs, is_other):
+            place = (found.action.key, found.name)
+            if found.why == "recursion" or place in told:
+                continue
+            told.add(place)
+            inside = "" if found.action.name == found.name else f" inside {found.action.full_name}"
+            message = (
+                f"The sub-graph “{found.name}”{inside} comes a second time: the engine has used it up "
+                "then and cannot resolve the graph. Give the sub-graph another name for the second "
+                "place, or put its actions there."
+            )
+            subject.report("subgraph-twice", "error", message, action=found.action, member="/name")
 
 
 def _contains(

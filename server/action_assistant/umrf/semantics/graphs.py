@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from functools import partial
 
 from action_assistant.umrf.facts import EngineFacts
-from action_assistant.umrf.model import Graph, Signature
+from action_assistant.umrf.model import Action, Graph, Signature
 from action_assistant.umrf.semantics.clock import Task
 from action_assistant.umrf.semantics.core import Core
-from action_assistant.umrf.semantics.matching import fits, has_action
+from action_assistant.umrf.semantics.matching import fits, has_action, unresolved
 from action_assistant.umrf.semantics.parts import (
     Node,
     Outcome,
@@ -88,6 +88,14 @@ class Graphs(Core):
 
     def _resolves(self, graph: Running) -> bool:
         """Whether the engine has every action that it shall run itself."""
+        own = {"", self.actor} if self.actor else {node.actor for node in graph.nodes.values()}
+        known = self.signatures or {}
+
+        def is_other(action: Action) -> bool:
+            return action.actor not in own or action.name in known
+
+        if next(unresolved(graph.graph, self.library, is_other), None) is not None:
+            return False
         if self.signatures is None:
             return True
         own = {"", self.actor}

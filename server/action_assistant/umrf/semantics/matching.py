@@ -1,9 +1,77 @@
 """Which indexed action or graph a node stands for (SPEC 2.1)."""
 
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Final, Literal
+
+import msgspec
+
 from action_assistant.umrf.jsontext import parse_small
-from action_assistant.umrf.model import ENTRY, EXIT, Graph, Parameter, Signature
+from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Parameter, Signature
 from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.semantics.parts import Node
+from action_assistant.umrf.semantics.values import slots_of
+
+#: Actions that are looked at while sub-graphs of sub-graphs are resolved; their number can double
+#: with each level, in the engine too.
+BUDGET: Final = 20_000
+
+
+class Unresolved(msgspec.Struct, frozen=True):
+    """A sub-graph that the engine does not look for. `action`: of the top graph, through which it
+    comes; `name`: the sub-graph. `recursion`: it is one of those around it; `again`: the engine has
+    used it up, beside this place or beside one around it."""
+
+    why: Literal["recursion", "again"]
+    action: Action
+    name: str
+
+
+class _Level:
+    """One graph while its actions are resolved. `above`: the graphs around it and itself; `used`:
+    what the engine does not look for here any more, of this graph and of those around it."""
+
+    def __init__(self, graph: Graph, above: frozenset[str], used: frozenset[str]) -> None:
+        self.above = above | {graph.name}
+        self.used = set(used | self.above)
+        real = (action for action in graph.actions if not action.missing)
+        self.left = iter(sorted(real, key=lambda action: action.full_name.encode()))
+
+
+def unresolved(
+    graph: Graph, library: Mapping[str, Graph], is_other: Callable[[Action], bool]
+) -> Iterator[Unresolved]:
+    """The sub-graphs that an engine refuses a graph for although it has them.
+
+    It goes through the actions by full name, and takes a graph off its list when it has used it:
+    for what comes later in the same graph and for whatever is inside that, not for what is beside.
+    So one sub-graph twice in one graph is refused, and one beside a later one that contains it; the
+    same inside two different sub-graphs is not (measured). `is_other`: what is no sub-graph: an
+    action, or somebody else's.
+    """
+    levels = [_Level(graph, frozenset(), frozenset())]
+    top: Action | None = None
+    for _ in range(BUDGET):
+        if not levels:
+            return
+        level = levels[-1]
+        action = next(level.left, None)
+        if action is None:
+            levels.pop()
+            continue
+        top = action if len(levels) == 1 or top is None else top
+        sub = library.get(action.name)
+        if sub is None or is_other(action) or not fits_parameters(action, sub):
+            continue
+        if sub.name in level.used:
+            yield Unresolved("recursion" if sub.name in level.above else "again", top, sub.name)
+            continue
+        level.used.add(sub.name)
+        levels.append(_Level(sub, level.above, frozenset(level.used)))
+
+
+def fits_parameters(action: Action, sub: Graph) -> bool:
+    """Whether an indexed graph has the signature that an action expects."""
+    return _fits(slots_of(action.inputs).keys(), slots_of(action.outputs).keys(), sub)
 
 
 def has_action(node: Node, known: Signature | None) -> bool:
@@ -17,6 +85,10 @@ def has_action(node: Node, known: Signature | None) -> bool:
 
 def fits(node: Node, sub: Graph) -> bool:
     """Whether an indexed graph has the signature that a node expects."""
+    return _fits(node.inputs.keys(), node.outputs.keys(), sub)
+
+
+def _fits(wanted: Collection[str], given: Collection[str], sub: Graph) -> bool:
     entries = {r.child for r in sub.relations if r.parent == ENTRY}
     exits = sorted((r.child_order, r.parent) for r in sub.relations if r.child == EXIT)
     inputs: set[str] = set()
@@ -27,7 +99,7 @@ def fits(node: Node, sub: Graph) -> bool:
     for _, key in exits:
         own = {name for a in sub.actions if a.key == key for name, _ in _leaves(a.outputs)}
         outputs = own or outputs
-    return set(node.inputs) == inputs and set(node.outputs) == outputs
+    return set(wanted) == inputs and set(given) == outputs
 
 
 def _leaves(parameters: tuple[Parameter, ...]) -> list[tuple[str, bool]]:
