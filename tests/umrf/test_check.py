@@ -156,9 +156,13 @@ def test_two_branches_of_a_decision_that_the_exit_both_requires_are_found() -> N
         action("C", parents=[{"name": "A", "conditions": ["on_true -> ignore", *SAFE]}]),
         exits=["B", "C"],
     )
-    messages = [p.message for p in problems(graph) if p.code == "H8"]
-    assert len(messages) == 1
-    assert "the exit still waits for parents" in messages[0]
+    found = [p for p in problems(graph) if p.code == "H8"]
+    assert [(p.severity, p.where.path, p.fix) for p in found] == [
+        ("error", "/graph_exit/1/required", "not-required"),
+        ("warning", "/graph_exit/0/required", "not-required"),
+    ]
+    assert "If all goes well" in found[0].message
+    assert "the exit waits for C_0, which then does not run" in found[0].message
     for end in graph["graph_exit"]:
         end["required"] = False
     assert problems(graph) == []

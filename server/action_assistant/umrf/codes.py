@@ -109,7 +109,7 @@ CODES: Final[dict[str, Code]] = {
     ),
     "H8": Code(
         "hazard", _BOTH, "something waits for what may never come (error: never comes)",
-        "the graph stays RUNNING for ever", ("not-required",),
+        "the graph stays RUNNING for ever", ("not-required", "outputs-optional"),
     ),
     "H9": Code(
         "hazard", _ERROR, "a spontaneous action that leads into a loop",

@@ -5,7 +5,8 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.umrf.model import Action, Graph, Key, Problem, Relation
+from action_assistant.umrf.jsontext import dump, parse_small
+from action_assistant.umrf.model import Action, Graph, Key, Parameter, Problem, Relation
 from action_assistant.umrf.relations import MAX_REFERRED_ID
 
 
@@ -73,6 +74,29 @@ def _typed(graph: Graph, problem: Problem) -> Graph:
     return graph
 
 
+def _optional_outputs(graph: Graph, problem: Problem) -> Graph:
+    for action in graph.actions:
+        if action.key == problem.where.aid:
+            return _with_action(graph, with_optional_outputs(action))
+    return graph
+
+
+def with_optional_outputs(action: Action) -> Action:
+    """The action with outputs that nobody waits for; those with a value are there anyway."""
+    outputs = tuple(_optional(parameter) for parameter in action.outputs)
+    return msgspec.structs.replace(action, outputs=outputs)
+
+
+def _optional(parameter: Parameter) -> Parameter:
+    """Every leaf of it that has no value."""
+    value = parse_small(parameter.text)
+    if not isinstance(value, dict) or "pvf_type" not in value or "pvf_value" in value:
+        return parameter
+    if value.get("pvf_required") is False:
+        return parameter
+    return Parameter(parameter.path, dump({**value, "pvf_required": False}))
+
+
 def _with_action(graph: Graph, changed: Action) -> Graph:
     actions = tuple(changed if a.key == changed.key else a for a in graph.actions)
     return msgspec.structs.replace(graph, actions=actions)
@@ -83,6 +107,7 @@ _Fix = Callable[[Graph, Problem], Graph]
 _FIXES: Final[dict[str, _Fix]] = {
     "mirror-relation": _mend_relation(_mirrored),
     "not-required": _mend_relation(_not_required),
+    "outputs-optional": _optional_outputs,
     "remove-relation": _mend_relation(lambda _: None),
     "renumber": _renumbered,
     "type-sync": _typed,

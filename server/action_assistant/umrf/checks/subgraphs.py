@@ -4,7 +4,7 @@ from collections.abc import Container, Mapping
 
 from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
-from action_assistant.umrf.checks.scenarios import halted
+from action_assistant.umrf.checks.scenarios import check_scenarios, halted
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.values import check_signature, check_values
 from action_assistant.umrf.model import EXIT, PRECONDITIONS, Action, Graph, Key, Problem, Severity
@@ -85,12 +85,19 @@ def _problems_of(subject: Subject, graph: Graph) -> list[tuple[str, Severity, st
     check_structure(inside)
     check_flow(inside)
     check_values(inside, None)
+    check_scenarios(inside)
     errors: list[Problem] = [p for p in inside.problems if p.severity == "error"]
     if errors:
         message = (
             f"The sub-graph “{graph.name}” has an error ({errors[0].code}): {errors[0].message}"
         )
         return [("subgraph", "error", message)]
+    for problem in inside.problems:
+        if problem.code == "H8":
+            message = (
+                f"The sub-graph “{graph.name}” may never end, and the graph with it: {problem.message}"
+            )
+            return [("H8", "warning", message)]
     when = halted(inside)
     if when is None:
         return []

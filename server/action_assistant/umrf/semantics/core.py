@@ -248,7 +248,7 @@ class Core(Clock):
         node.token += 1
         node.returning = True
         node.due_ms = None
-        if node.subgraph is None and result in ("on_true", "on_false"):
+        if node.subgraph is None and result != "on_error":  # also of one that was stopped
             fill_outputs(node.outputs, node.call.outputs)
         self._result(graph, node, result)
         failed = result == "on_error" and node.subgraph is None

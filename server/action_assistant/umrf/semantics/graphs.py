@@ -14,7 +14,6 @@ from action_assistant.umrf.semantics.parts import (
     Outcome,
     Running,
     build,
-    exit_nodes,
     restructure,
 )
 from action_assistant.umrf.semantics.script import Script
@@ -313,10 +312,9 @@ class Graphs(Core):
         above, home = graph.above, graph.home
         if above is None or home is None or above.sub is not graph:
             return
-        for node in exit_nodes(graph):
-            for name, slot in node.outputs.items():
-                if target := above.outputs.get(name):
-                    target.receive(slot.type, slot.value)
+        for name, slot in graph.exit.inputs.items():
+            if target := above.outputs.get(name):
+                target.receive(slot.type, slot.value)
         above.sub = None
         if above.state in ("RUNNING", "STOPPING", "PAUSED", "PAUSE_REQUESTED"):
             self._ended(home, above, result)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from operator import attrgetter
 from typing import TypeAlias
 
 from action_assistant.umrf.model import (
@@ -200,6 +199,7 @@ def build(running: Running, behaviours: Mapping[Key, tuple[Behaviour, ...]]) -> 
     ghosts = {a.key: a.full_name for a in graph.actions if a.missing}
     _link_parents(running, nodes, ghosts)
     _link_children(running, nodes, ghosts)
+    running.exit.inputs = exit_inputs(running.graph)
 
 
 def _end(name: str) -> Node:
@@ -281,12 +281,21 @@ def restructure(running: Running, new: Running) -> None:
     running.linked.clear()
 
 
-def exit_nodes(running: Running) -> list[Node]:
-    """The actions that lead to the exit, in the order of `graph_exit`."""
-    ends = [r for r in running.graph.relations if r.child == EXIT]
-    ends.sort(key=attrgetter("child_order"))
-    by_key = {node.key: node for node in running.nodes.values()}
-    return [by_key[r.parent] for r in ends if r.parent in by_key]
+def exit_owner(graph: Graph) -> Action | None:
+    """The action whose outputs the exit takes in: the last of `graph_exit` that has any."""
+    by_key = {action.key: action for action in graph.actions if not action.missing}
+    ends = [r for r in graph.relations if r.child == EXIT and r.only != "children"]
+    ends.sort(key=lambda r: (r.child_order, name_order(r)), reverse=True)
+    parents = (by_key.get(r.parent) for r in ends)
+    return next((action for action in parents if action and slots_of(action.outputs)), None)
+
+
+def exit_inputs(graph: Graph) -> dict[str, Slot]:
+    """What the exit takes in, and as a sub-graph gives out: the engine makes the outputs of each
+    action of `graph_exit` its inputs, and those of the last one that has any stay, required like
+    any input. Whoever leads to the exit has to hand them over, or the graph does not end."""
+    owner = exit_owner(graph)
+    return slots_of(owner.outputs) if owner is not None else {}
 
 
 def linked_nodes(running: Running, node: Node) -> list[Node] | None:
