@@ -2,7 +2,8 @@
 
 import type * as Y from "yjs";
 import { writeParameters } from "./edit-parameters";
-import { connect } from "./edit-relations";
+import { draw } from "./edit-relations";
+import { keepingEnds } from "./ends";
 import { newAid } from "./ids";
 import { actionKey, endsOf, extraKey, rootOf, splitKey } from "./layout";
 import {
@@ -79,19 +80,28 @@ export function removeActions(
   keys: Iterable<Key>,
   options: { readonly heal?: boolean } = {},
 ): void {
+  const gone = new Set([...keys].filter((key) => key !== ENTRY && key !== EXIT));
   together(doc, () => {
     settleGhosts(doc);
-    const gone = new Set([...keys].filter((key) => key !== ENTRY && key !== EXIT));
-    if (options.heal) for (const key of gone) heal(doc, key);
-    const actions = rootOf(doc, "actions");
-    const relations = rootOf(doc, "relations");
-    for (const key of [...actions.keys()]) if (gone.has(splitKey(key).head)) actions.delete(key);
-    for (const key of [...relations.keys()]) {
-      const ends = endsOf(splitKey(key).head);
-      if (ends && (gone.has(ends.parent) || gone.has(ends.child))) relations.delete(key);
-    }
-    erase(doc, "positions", ...gone);
+    if (options.heal) keepingEnds(doc, () => healAndRemove(doc, gone));
+    else remove(doc, gone);
   });
+}
+
+function healAndRemove(doc: Y.Doc, gone: ReadonlySet<Key>): void {
+  for (const key of gone) heal(doc, key);
+  remove(doc, gone);
+}
+
+function remove(doc: Y.Doc, gone: ReadonlySet<Key>): void {
+  const actions = rootOf(doc, "actions");
+  const relations = rootOf(doc, "relations");
+  for (const key of [...actions.keys()]) if (gone.has(splitKey(key).head)) actions.delete(key);
+  for (const key of [...relations.keys()]) {
+    const ends = endsOf(splitKey(key).head);
+    if (ends && (gone.has(ends.parent) || gone.has(ends.child))) relations.delete(key);
+  }
+  erase(doc, "positions", ...gone);
 }
 
 function heal(doc: Y.Doc, key: Key): void {
@@ -100,7 +110,7 @@ function heal(doc: Y.Doc, key: Key): void {
   for (const parent of before) {
     for (const child of next) {
       const outcomes = PRECONDITIONS.filter((outcome) => parent.conditions[outcome] === "run");
-      for (const outcome of outcomes) connect(doc, parent.parent, child.child, outcome);
+      for (const outcome of outcomes) draw(doc, parent.parent, child.child, outcome, "run");
     }
   }
 }

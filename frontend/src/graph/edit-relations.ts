@@ -1,6 +1,7 @@
 /** Edits of relations: connect, responses, order of waiting, remaps, the graph's two ends. */
 
 import type * as Y from "yjs";
+import { keepingEnds } from "./ends";
 import { endsOf, relationId, rootOf } from "./layout";
 import { ENTRY, EXIT, type Key, type Precondition, type Response, spoken } from "./model";
 import {
@@ -17,9 +18,10 @@ import {
 } from "./pen";
 
 /**
- * Draws an arrow that says what was drawn and nothing else: after `outcome` the child runs. Between
- * two that are connected already it adds that response. Answers the relation's id, or null when the
- * ends do not fit: nothing leads into the entry or out of the exit, nor from one to the other.
+ * Draws an arrow that says what was drawn: after `outcome` the child runs. Between two that are
+ * connected already it adds that response. What the end of the graph waits for follows (`ends.ts`).
+ * Answers the relation's id, or null when the ends do not fit: nothing leads into the entry or out
+ * of the exit, nor from one to the other.
  */
 export function connect(
   doc: Y.Doc,
@@ -27,6 +29,17 @@ export function connect(
   child: Key,
   outcome: Precondition = "on_true",
   response: Response = "run",
+): string | null {
+  return together(doc, () => keepingEnds(doc, () => draw(doc, parent, child, outcome, response)));
+}
+
+/** The arrow alone, as a part of an edit that keeps the ends itself. */
+export function draw(
+  doc: Y.Doc,
+  parent: Key,
+  child: Key,
+  outcome: Precondition,
+  response: Response,
 ): string | null {
   const drawn = relationId({ parent, child });
   if (endsOf(drawn) === null || !hasEnd(doc, parent) || !hasEnd(doc, child)) return null;
@@ -105,6 +118,10 @@ export function setResponse(
   response: Response,
 ): boolean {
   if (endsOf(id)?.parent === ENTRY) return false;
+  return together(doc, () => keepingEnds(doc, () => answer(doc, id, outcome, response)));
+}
+
+function answer(doc: Y.Doc, id: string, outcome: Precondition, response: Response): boolean {
   return edit(doc, id, () => {
     put(doc, "relations", `${id}|${outcome}`, response);
     forget(doc, id, "conditions", "parents");
@@ -153,6 +170,14 @@ export function moveRelation(
   id: string,
   ends: { readonly parent?: Key; readonly child?: Key },
 ): string | null {
+  return together(doc, () => keepingEnds(doc, () => move(doc, id, ends)));
+}
+
+function move(
+  doc: Y.Doc,
+  id: string,
+  ends: { readonly parent?: Key; readonly child?: Key },
+): string | null {
   return together(doc, () => {
     settleGhosts(doc);
     const old = endsOf(id);
@@ -183,6 +208,15 @@ export function retarget(
   outcome: Precondition,
   to: { readonly parent?: Key; readonly child?: Key; readonly outcome?: Precondition },
 ): string | null {
+  return together(doc, () => keepingEnds(doc, () => led(doc, id, outcome, to)));
+}
+
+function led(
+  doc: Y.Doc,
+  id: string,
+  outcome: Precondition,
+  to: { readonly parent?: Key; readonly child?: Key; readonly outcome?: Precondition },
+): string | null {
   return together(doc, () => {
     settleGhosts(doc);
     const relation = relationOf(doc, id);
@@ -195,18 +229,18 @@ export function retarget(
     const same = parent === relation.parent && child === relation.child;
     if (same && lands === outcome) return id;
     const alone = spoken(conditions).every((other) => other === outcome);
-    const moved = alone && !same ? moveRelation(doc, id, { parent, child }) : null;
+    const moved = alone && !same ? move(doc, id, { parent, child }) : null;
     if (moved !== null) {
       if (lands !== outcome) {
-        setResponse(doc, moved, lands, response);
-        setResponse(doc, moved, outcome, "ignore");
+        answer(doc, moved, lands, response);
+        answer(doc, moved, outcome, "ignore");
       }
       return moved;
     }
-    const drawn = connect(doc, parent, child, lands, response);
+    const drawn = draw(doc, parent, child, lands, response);
     if (drawn === null) return null;
     if (alone && !same) removeRelation(doc, id);
-    else setResponse(doc, id, outcome, "ignore");
+    else answer(doc, id, outcome, "ignore");
     return drawn;
   });
 }
@@ -225,17 +259,21 @@ export function swapOrder(doc: Y.Doc, ids: readonly string[], one: number, other
 
 /** Puts an action into an arrow: it takes over what the arrow said, and its success leads on. */
 export function insertInto(doc: Y.Doc, id: string, key: Key): boolean {
-  return together(doc, () => {
-    const relation = relationOf(doc, id);
-    if (relation === undefined || relation.parent === key || relation.child === key) return false;
-    const onward = connect(doc, key, relation.child);
-    if (onward === null) return false;
-    put(doc, "relations", `${onward}|co`, relation.childOrder);
-    const into = moveRelation(doc, id, { child: key });
-    if (into === null) return removeRelation(doc, id);
-    put(doc, "relations", `${into}|po`, relation.parentOrder);
-    return true;
-  });
+  return together(doc, () => keepingEnds(doc, () => putBetween(doc, id, key)));
+}
+
+function putBetween(doc: Y.Doc, id: string, key: Key): boolean {
+  const relation = relationOf(doc, id);
+  if (relation === undefined || relation.parent === key || relation.child === key) return false;
+  const onward = draw(doc, key, relation.child, "on_true", "run");
+  if (onward === null) return false;
+  put(doc, "relations", `${onward}|co`, relation.childOrder);
+  if (!relation.required) put(doc, "relations", `${onward}|required`, false);
+  const into = move(doc, id, { child: key });
+  if (into === null) return removeRelation(doc, id);
+  put(doc, "relations", `${into}|po`, relation.parentOrder);
+  erase(doc, "relations", `${into}|required`);
+  return true;
 }
 
 /** The graph starts with this action. */

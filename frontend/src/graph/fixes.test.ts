@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { addAction, connect, setField, undoOf } from "./edit";
+import { addAction, addParameter, connect, setField, undoOf } from "./edit";
 import { ABOUT, applyFix, applySafe, FIXES, type Fix, fixOf, safeOnes } from "./fixes";
 import { mapsOf, rootOf } from "./layout";
 import { fullName, type Graph } from "./model";
@@ -34,6 +34,11 @@ const cases: Record<Fix, () => { doc: Y.Doc; where: { aid?: string; relation?: s
     const { doc, a, b } = broken();
     return { doc, where: { relation: connect(doc, b, a) ?? "" } };
   },
+  "outputs-optional": () => {
+    const { doc, a } = broken();
+    addParameter(doc, a, "out", "x", '{"pvf_type": "number"}');
+    return { doc, where: { aid: a } };
+  },
   "remove-relation": () => {
     const { doc, b, arrow } = broken();
     rootOf(doc, "actions").set(`${b}|missing`, true);
@@ -56,6 +61,10 @@ const cases: Record<Fix, () => { doc: Y.Doc; where: { aid?: string; relation?: s
 const found: Record<Fix, (graph: Graph) => boolean> = {
   "mirror-relation": (graph) => graph.relations.every(({ only }) => only === null),
   "not-required": (graph) => graph.relations.some(({ required }) => !required),
+  "outputs-optional": (graph) =>
+    graph.actions.every(({ outputs }) =>
+      outputs.every(({ text }) => text === '{"pvf_type": "number", "pvf_required": false}'),
+    ),
   "remove-relation": (graph) => graph.relations.length === 0 && graph.actions.length === 1,
   renumber: (graph) => new Set(graph.actions.map(fullName)).size === graph.actions.length,
   "type-sync": (graph) => graph.actions.every(({ type }) => type === "sync"),

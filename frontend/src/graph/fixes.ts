@@ -8,6 +8,7 @@
 import type * as Y from "yjs";
 import { removeActions, setField } from "./edit-actions";
 import { mirrorRelation, removeRelation, setRequired } from "./edit-relations";
+import { setOutputsOptional } from "./ends";
 import { endsOf } from "./layout";
 import type { Key } from "./model";
 import { graphOf, numbersOf, together } from "./pen";
@@ -15,6 +16,7 @@ import { graphOf, numbersOf, together } from "./pen";
 export const FIXES = [
   "mirror-relation",
   "not-required",
+  "outputs-optional",
   "remove-relation",
   "renumber",
   "type-sync",
@@ -37,6 +39,7 @@ interface About {
 export const ABOUT: Readonly<Record<Fix, About>> = {
   "mirror-relation": { words: "List the arrow on both sides", safe: true },
   "not-required": { words: "Do not wait for it", safe: true },
+  "outputs-optional": { words: "Let the end not wait for its outputs", safe: true },
   "remove-relation": { words: "Remove the arrow", safe: false },
   renumber: { words: "Give it a free number", safe: true },
   "type-sync": { words: "Make it “sync”", safe: true },
@@ -57,6 +60,7 @@ function placeOf(fix: Fix, where: Fixable["where"]): string | undefined {
     case "not-required":
     case "remove-relation":
       return where.relation;
+    case "outputs-optional":
     case "renumber":
     case "type-sync":
       return where.aid;
@@ -74,6 +78,8 @@ export function applyFix(doc: Y.Doc, problem: Fixable): boolean {
         return mirrorRelation(doc, place);
       case "not-required":
         return setRequired(doc, place, false);
+      case "outputs-optional":
+        return setOutputsOptional(doc, place);
       case "remove-relation":
         return removeWithGhosts(doc, place);
       case "renumber":

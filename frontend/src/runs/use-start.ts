@@ -3,11 +3,11 @@ import { notifications } from "@mantine/notifications";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { keys, publish, type Version, versionName } from "../api/graphs";
 import { place, sentence } from "../api/http";
-import { memberText } from "../api/member";
 import type { Script } from "../api/rehearsal";
 import { startRun } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { newAid } from "../graph/ids";
+import { memberText } from "../graph/member";
 
 export interface Order {
   /** The moment that shall run; awaited when the page has yet to hear its name. */

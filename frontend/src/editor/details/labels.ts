@@ -1,7 +1,7 @@
 /** What people sort a graph under: `labels` in its `gui_attributes`, which no engine reads. */
 import type * as Y from "yjs";
-import { memberText, withMember } from "../../api/member";
 import { rootOf } from "../../graph/layout";
+import { memberText, withMember } from "../../graph/member";
 import type { Graph } from "../../graph/model";
 import { together } from "../../graph/pen";
 import { asJsonText } from "../../graph/values";
