@@ -11,8 +11,17 @@ from pycrdt import Doc, Map
 
 from action_assistant.editor import document
 from action_assistant.umrf import codec
+from action_assistant.umrf.check import check
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.model import Action, Graph, Parameter, Position, Relation
+from action_assistant.umrf.semantics import (
+    Behaviour,
+    GraphState,
+    NotReady,
+    Script,
+    Trace,
+    simulate,
+)
 from support.page import Page, graph_of, open_page
 
 VECTORS = sorted((Path(__file__).parent / "vectors" / "document").glob("*.json"))
@@ -120,3 +129,84 @@ def test_every_real_file_looks_the_same_to_the_page(page: Page, shared: Path) ->
         seen = page.read(doc.get_update())
         assert seen == document.read(doc), path
         assert digest(seen) == digest(reading.graph), path
+
+
+TEXT = '{"pvf_type": "string"}'
+WORK = [
+    {"path": "delay", "text": '{"pvf_type": "number", "pvf_value": 0.2}'},
+    {"path": "result", "text": '{"pvf_type": "string", "pvf_value": "on_true"}'},
+]
+ECHO = [{"path": "text", "text": '{"pvf_type": "string", "pvf_value": "x"}'}]
+
+
+def drawn(page: Page, *edits: list[object]) -> Graph:
+    """A new graph after these edits on the page."""
+    doc = Doc()
+    document.fill(doc, Graph(name="drawn"))
+    edited = page("edit", update=doc.get_update().hex(), edits=list(edits))
+    doc.apply_update(bytes.fromhex(edited["update"]))
+    return document.read(doc)
+
+
+def decision(page: Page) -> Graph:
+    """One action decides between one without outputs and one that has some; either is led to the
+    end, with nothing else said."""
+    return drawn(
+        page,
+        ["addAction", {"name": "OxWork", "inputs": WORK}],
+        ["addAction", {"name": "OxWork", "inputs": WORK}],
+        ["addAction", {"name": "OxEcho", "inputs": ECHO}],
+        ["addParameter", "$2", "out", "text", TEXT],
+        ["setEntry", "$0"],
+        ["connect", "$0", "$1", "on_true"],
+        ["connect", "$0", "$2", "on_false"],
+        ["setExit", "$1"],
+        ["setExit", "$2"],
+    )
+
+
+@pytest.mark.parametrize("decided", ["on_true", "on_false"])
+def test_a_decision_that_is_drawn_into_the_end_ends_either_way(page: Page, decided: str) -> None:
+    graph = codec.read(codec.write(decision(page))).graph
+    assert check(graph) == []
+    script = Script({"OxWork_0": (Behaviour(result=decided),)})
+    states = [t.state for t in simulate(graph, script=script) if isinstance(t, GraphState)]
+    assert states[-1] == "FINISHED"
+
+
+arrows = st.lists(
+    st.tuples(
+        st.integers(0, 3), st.integers(1, 4), st.sampled_from(["on_true", "on_false", "on_error"])
+    ),
+    min_size=2, max_size=9, unique_by=lambda arrow: (arrow[0], arrow[2]),
+)  # fmt: skip
+
+
+@settings(deadline=None, max_examples=60)
+@given(arrows, st.sets(st.integers(0, 3)), st.lists(st.sampled_from(["on_true", "on_false", "on_error"]), max_size=4))  # fmt: skip
+def test_where_one_thing_follows_the_other_a_drawn_graph_never_waits_for_its_end(
+    page: Page, arrows: list[tuple[int, int, str]], giving: set[int], ends: list[str]
+) -> None:
+    forward = [(a, b, outcome) for a, b, outcome in arrows if a < b]
+    edits: list[list[object]] = [["addAction", {"name": name}] for name in "ABCD"]
+    edits += [["addParameter", f"${place}", "out", f"o{place}", TEXT] for place in sorted(giving)]
+    edits.append(["setEntry", "$0"])
+    for parent, child, outcome in forward:
+        to = ["setExit", f"${parent}"] if child == 4 else ["connect", f"${parent}", f"${child}"]
+        edits.append([*to, outcome])
+    graph = drawn(page, *edits)
+    calls = {
+        f"{name}_0": (Behaviour(result=end),) for name, end in zip("ABCD", ends, strict=False)
+    }
+    traces = list(simulate(graph, script=Script(calls)))
+    waiting = [t for t in traces if isinstance(t, NotReady) and t.node == "graph_exit_0"]
+    begun = {0}
+    for parent, child, _ in sorted(forward):
+        begun |= {child} & {1, 2, 3} if parent in begun else set()
+    leading = {parent for parent, child, _ in forward if child == 4}
+    if len(leading) > 1 and leading <= begun and not waiting_elsewhere(traces):
+        assert waiting == []
+
+
+def waiting_elsewhere(traces: list[Trace]) -> bool:
+    return any(isinstance(t, NotReady) and t.node != "graph_exit_0" for t in traces)
