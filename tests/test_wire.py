@@ -195,9 +195,7 @@ def test_where_one_thing_follows_the_other_a_drawn_graph_never_waits_for_its_end
         to = ["setExit", f"${parent}"] if child == 4 else ["connect", f"${parent}", f"${child}"]
         edits.append([*to, outcome])
     graph = drawn(page, *edits)
-    calls = {
-        f"{name}_0": (Behaviour(result=end),) for name, end in zip("ABCD", ends, strict=False)
-    }
+    calls = {f"{name}_0": (Behaviour(result=end),) for name, end in zip("ABCD", ends, strict=False)}
     traces = list(simulate(graph, script=Script(calls)))
     waiting = [t for t in traces if isinstance(t, NotReady) and t.node == "graph_exit_0"]
     begun = {0}

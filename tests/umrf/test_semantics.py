@@ -302,6 +302,21 @@ def test_a_graph_of_several_actors_is_refused_where_engines_do_not_synchronise()
     assert hazards(list(simulate(graph))) == ["refused"]
 
 
+def test_an_action_with_the_name_of_an_end_is_none() -> None:
+    graph = graph_of("entry>graph_entry", "graph_entry>A", "A>exit")
+    traces = list(simulate(graph))
+    assert hazards(traces) == ["H6", "refused"]
+    assert graph_states(traces) == ["UNINITIALIZED"]
+    third = tuple(
+        msgspec.structs.replace(a, instance_id=3 if a.name == "graph_entry" else 0)
+        for a in graph.actions
+    )
+    traces = list(simulate(msgspec.structs.replace(graph, actions=third)))
+    assert graph_states(traces) == ["UNINITIALIZED", "RUNNING"]
+    assert [t.node for t in traces if isinstance(t, NodeState)] == []
+    assert hazards(traces) == ["H8"]
+
+
 # Sub-graphs
 
 

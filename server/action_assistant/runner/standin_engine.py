@@ -51,6 +51,7 @@ _NEXT_MS: Final = 0.2  # between two messages that wait
 _TOLD_MS: Final = 10.0  # from the end of a stop to the line that says so
 _GETS: Final = 10  # requests that wait, by the depth of a service
 _TAIL_MS: Final = 1_500.0  # an idle engine that was told to quit takes so long
+_FORWARD: Final = "   fwd [in modifyGraph]: forwarding\n"
 _BUSY: Final = frozenset({"RUNNING", "PAUSED", "STOPPING", "CLEARING"})
 _Deed: TypeAlias = Callable[[str, float], list[Trace]]
 
@@ -289,32 +290,33 @@ class StandIn:
     def _start(self, message: Start) -> None:
         name = message.graph_name
         try:
-            plan = asked_for(message, self._index)
+            plan = asked_for(message, self._index, self._engine.graphs)
         except Refusal as refused:
             self._log(str(refused))
             return
         name, held = plan.graph.name, self._engine.graphs.get(plan.graph.name)
         if held is not None and held.state in _BUSY and not self.quirks.restart_stops:
-            self._log(refusal(active(name, held.state)))
+            self._log(refusal(active(name, held.state), message))
             return
         self._view.plans[name] = plan
         try:
-            self._take(self._engine.start(plan.graph, self._now, plan.states))
+            by_name = not message.graph_json
+            self._take(self._engine.start(plan.graph, self._now, plan.states, by_name=by_name))
         except EngineRefused as refused:
             self._view.taken = True
             self._take(self._engine.advance(self._now))
             why = refused.message
-            stops = "already active" in why
+            stops = "Cannot execute" in why
 
             def then() -> None:
                 self._view.taken = False
                 if stops:
                     self._snapshot(name)
-                self._log(refusal(why))
+                self._log(refusal(why, message))
 
             self._hold(then)
         else:
-            self._hold(_nothing)
+            self._hold(lambda: None)
 
     def _command(
         self, name: str, doing: str, verb: str, deed: _Deed, done: str, told_ms: float
@@ -350,13 +352,14 @@ class StandIn:
             if not why:
                 self._view.modified(name, plan)
             told = f"UMRF graph '{message.graph_name}' modified."
-            text = f"origin [in modifyGraph]: {why}\n" if why else told
+            text = f"origin [in modifyGraph]: {why}\n{_FORWARD}" if why else told
             self._linger(_TOLD_MS, lambda: self._log(text))
 
         self._hold(then)
 
     def _answer(self, ticket: int) -> None:
         view = self._view
+        self._take(self._engine.asked())
         self._say(Answer(self._now, ticket, self._index.texts, view.indexed, view.running()))
 
     # --- what its graphs do -------------------------------------------------------------------
@@ -405,7 +408,3 @@ class StandIn:
         if not self.gone:
             self._out.append(Gone(self._now, why))
             self.gone = why
-
-
-def _nothing() -> None:
-    """What follows a start: nothing."""

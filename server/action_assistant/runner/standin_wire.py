@@ -1,7 +1,7 @@
 """What goes into a stand-in robot and what comes out of it, and in which ways it is like a real one."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from typing import Any, ClassVar, Final, TypeAlias
 
 import msgspec
@@ -224,17 +224,18 @@ def index_of(actions: Iterable[str], graphs: Iterable[str]) -> Index:
     return Index(tuple(texts), found, plans)
 
 
-def asked_for(message: Start, index: Index) -> Plan:
-    """The graph that a start means. Raises Refusal."""
+def asked_for(message: Start, index: Index, held: Container[str]) -> Plan:
+    """The graph that a start means. `held`: the names that the engine holds, which it does not look
+    for in its index. Raises Refusal."""
     if not message.graph_json:
         plan = index.graphs.get(message.graph_name)
         if plan is None:
             raise Refusal(unknown("stop", message.graph_name))  # sic
         return plan
     plan = plan_of(message.graph_json)
-    if plan.graph.name in index.graphs:
+    if plan.graph.name in index.graphs and plan.graph.name not in held:
         raise Refusal(
-            f"origin [in startGraph]: Cannot execute UMRF graph '{plan.graph.name}' because it "
+            f"origin [in startGraphA]: Cannot execute UMRF graph '{plan.graph.name}' because it "
             "conflicts with an indexed graph (graph name not unique).\n"
             "   fwd [in startGraphA]: forwarding\n"
         )
@@ -251,11 +252,14 @@ def active(name: str, state: str) -> str:
     return f"Cannot execute UMRF graph '{name}' because it's already active ({state})"
 
 
-def refusal(why: str) -> str:
+def refusal(why: str, message: Start) -> str:
     """What the log says of a start that the engine throws out."""
-    if "already active" in why:
-        return (
-            f"origin [in startGraph]: {why}\n   fwd [in startGraph]: forwarding\n"
-            "   fwd [in startGraphA]: forwarding\n"
-        )
-    return f"origin [in startGraphA]: {why}\n   fwd [in startGraphA]: forwarding\n"
+    by_name = not message.graph_json
+    if why == "map::at":  # no error of its own
+        return why
+    if "Could not resolve" in why:
+        if by_name:  # it then stops what it does not hold, and says only that
+            return unknown("stop", message.graph_name)
+        return f"origin [in startGraphA]: {why}\n   fwd [in startGraphA]: forwarding\n"
+    told = f"origin [in startGraph]: {why}\n   fwd [in startGraph]: forwarding\n"
+    return told if by_name else f"{told}   fwd [in startGraphA]: forwarding\n"

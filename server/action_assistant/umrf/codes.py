@@ -140,7 +140,7 @@ CODES: Final[dict[str, Code]] = {
     "graph-name-empty": Code("other", _WARNING, "an empty `graph_name`", "nobody can tell the graph from others"),
     "instance-id-cut": Code("other", _WARNING, "a number with decimals", "the engine cuts them"),
     "name-class": Code("other", _WARNING, "a name that no C++ class can have", "no action package can have it; a sub-graph may"),
-    "name-reserved": Code("other", _WARNING, "`graph_entry` or `graph_exit` with another number than 0", "the engine leaves the action out of what it prints"),
+    "name-reserved": Code("other", _WARNING, "`graph_entry` or `graph_exit` with another number than 0", "the engine never runs the action, and leaves it out of what it prints"),
     "type-unknown": Code("other", _WARNING, "a type other than sync, async, spontaneous", "treated like sync"),
     "relation-repeated": Code("other", _WARNING, "the same pair listed more than once", "the engine looks at one of them", ("remove-relation",)),
     "wrong-side": Code("other", _WARNING, "`conditions` or `required` at the parent, `remap` at the child", "ignored"),

@@ -121,7 +121,9 @@ def _check_reserved(subject: Subject, action: Action) -> None:
         message = f"“{action.full_name}” is the engine's own name for an end of the graph: the start throws, and a broken graph stays in the engine."
         subject.report("H6", "error", message, action=action, member="/name", fix="renumber")
     else:
-        message = f"“{action.name}” is a name that the engine uses itself."
+        message = (
+            f"“{action.name}” is a name that the engine uses itself: it never runs the action."
+        )
         subject.report("name-reserved", "warning", message, action=action, member="/name")
 
 

@@ -94,9 +94,7 @@ def _problems_of(subject: Subject, graph: Graph) -> list[tuple[str, Severity, st
         return [("subgraph", "error", message)]
     for problem in inside.problems:
         if problem.code == "H8":
-            message = (
-                f"The sub-graph “{graph.name}” may never end, and the graph with it: {problem.message}"
-            )
+            message = f"The sub-graph “{graph.name}” may never end, and the graph with it: {problem.message}"
             return [("H8", "warning", message)]
     when = halted(inside)
     if when is None:

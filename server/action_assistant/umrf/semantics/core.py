@@ -9,6 +9,7 @@ from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics.clock import Clock, Task
 from action_assistant.umrf.semantics.parts import (
     HELD,
+    RESERVED,
     Edge,
     Execution,
     Link,
@@ -63,6 +64,9 @@ class Core(Clock):
     def _inform(self, graph: Running, node: Node, result: Outcome) -> None:
         """`startChildNodes`: asks every child what it does now that `node` ended."""
         if graph.state != "RUNNING":
+            return
+        if graph.deadly:
+            self._crash(graph, "H6", "What follows is not in the broken graph: the engine aborts.")
             return
         ignored = 0
         for edge in node.children:
@@ -158,7 +162,7 @@ class Core(Clock):
     # The life of an action
 
     def _run(self, graph: Running, node: Node) -> None:
-        if node.state == "RUNNING":
+        if node.state == "RUNNING" or node.name in RESERVED:
             return
         if node.subgraph is None and not node.loaded and node.state != "UNINITIALIZED":
             if not node.failed_to_load:

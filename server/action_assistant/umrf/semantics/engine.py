@@ -79,9 +79,15 @@ class Engine(Graphs):
         }
 
     def start(
-        self, graph: Graph, at_ms: float, states: Mapping[Key, str] | None = None
+        self,
+        graph: Graph,
+        at_ms: float,
+        states: Mapping[Key, str] | None = None,
+        *,
+        by_name: bool = False,
     ) -> list[Trace]:
-        """Starts a graph. `states`: run states that its file carries. Raises `EngineRefused`."""
+        """Starts a graph. `states`: run states that its file carries. `by_name`: the engine takes
+        it from its own index, and matches it each time. Raises `EngineRefused`."""
         self._run_until(at_ms)
         old = self.graphs.get(graph.name)
         if self.crashed or self.locked:
@@ -103,6 +109,7 @@ class Engine(Graphs):
         if old is None:
             if not self._resolves(running):
                 raise EngineRefused(f"Could not resolve graph '{graph.name}'")
+            self._refuse_broken(running, matched=True)
             self._begin_graph(running)
         elif any(node.busy_until == inf for node in old.nodes.values()):
             self._graph_state(old, "CLEARING")
@@ -110,12 +117,16 @@ class Engine(Graphs):
                 "A thread of the graph's last run never ended: the engine waits for it for ever."
             )
             self._lock(old, "H5", message)
-        elif any(node.holds_thread(self.now) for node in old.nodes.values()):
-            self._command(partial(self._replace, old, running))
         else:
-            self._clear(old)
-            self._refuse_unmatched(running)
-            self._begin_graph(running)
+            self._again(old, running, matched=by_name or self.facts.restart_matches)
+        return self._taken()
+
+    def asked(self) -> list[Trace]:
+        """Somebody asks for all graphs (`umrf_graph_get`): one that was built in part kills the
+        engine."""
+        deadly = next((graph for graph in self.graphs.values() if graph.deadly), None)
+        if deadly is not None and not self.crashed:
+            self._crash(deadly, "H6", "A broken graph is asked for: the engine aborts.")
         return self._taken()
 
     def stop(self, graph_name: str, at_ms: float) -> list[Trace]:

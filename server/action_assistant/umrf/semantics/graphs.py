@@ -10,6 +10,9 @@ from action_assistant.umrf.semantics.clock import Task
 from action_assistant.umrf.semantics.core import Core
 from action_assistant.umrf.semantics.matching import fits, has_action, unresolved
 from action_assistant.umrf.semantics.parts import (
+    ENTRY_NODE,
+    EXIT_NODE,
+    RESERVED,
     Node,
     Outcome,
     Running,
@@ -101,31 +104,61 @@ class Graphs(Core):
         return all(
             node.subgraph is not None
             or node.actor not in own
+            or node.name in RESERVED
             or has_action(node, self.signatures.get(node.name))
             for node in graph.nodes.values()
         )
 
-    def _refuse_unmatched(self, graph: Running) -> None:
-        """A graph that the engine holds already is not matched again: it loses its sub-graphs."""
-        lost = [node for node in graph.nodes.values() if node.subgraph is not None]
-        if self.facts.restart_matches or not lost:
+    def _not_built(self, graph: Running, *, matched: bool) -> tuple[Node, bool] | None:
+        """The first action that the engine cannot build, and whether it is the first of all. It
+        goes by full name through a graph that it has matched, else as the file does, and takes what
+        it has not matched for actions with a library of their own."""
+        nodes = list(graph.nodes.values())
+        if matched:
+            nodes.sort(key=lambda node: node.full_name.encode())
+        for place, node in enumerate(nodes):
+            unknown = self.signatures is not None and node.name not in self.signatures
+            own = node.actor in {"", self.actor or node.actor}
+            lost = node.subgraph is not None or unknown if not matched else False
+            if lost or (own and node.subgraph is None and node.behaviours[0].no_library):
+                return node, place == 0
+        return None
+
+    def _refuse_broken(self, graph: Running, *, matched: bool) -> None:
+        """A graph with an action that cannot be built stays in the engine, without that one and
+        those after it; when there are others before it, whoever asks for it kills the engine."""
+        found = self._not_built(graph, matched=matched)
+        if found is None:
             return
+        node, is_first = found
         self.graphs[graph.name] = graph
-        failed = [NodeState(self._t(), "", node.full_name, "ERROR") for node in lost]
-        self._out += failed
+        failed = NodeState(self._t(), "", node.full_name, "ERROR")
+        self._out.append(failed)
         self._graph_state(graph, "UNINITIALIZED")
-        self._out += failed
-        message = (
-            "Started again by its JSON, the graph loses its sub-graphs, and a broken one stays."
-        )
-        self._hazard(graph, "H6", "goes on", message, lost[0])
+        if is_first:
+            self._out.append(failed)
+        graph.broken, graph.deadly = True, not is_first
+        why = "its library is not there" if matched else "a graph that is held is not matched again"
+        message = f"{node.full_name} cannot be built ({why}): a broken graph stays in the engine."
+        self._hazard(graph, "H6", "goes on", message, node)
         raise EngineRefused("map::at")
 
     def _clear(self, old: Running) -> None:
+        if old.broken:
+            return
         self._graph_state(old, "CLEARING")
         self._graph_state(old, "UNINITIALIZED")
 
-    def _replace(self, old: Running, new: Running) -> None:
+    def _again(self, old: Running, new: Running, *, matched: bool) -> None:
+        """Starts a graph whose name the engine holds."""
+        if any(node.holds_thread(self.now) for node in old.nodes.values()):
+            self._command(partial(self._replace, old, new, matched))
+            return
+        self._clear(old)
+        self._refuse_broken(new, matched=matched)
+        self._begin_graph(new)
+
+    def _replace(self, old: Running, new: Running, matched: bool) -> None:
         """Starts a graph again although actions of the finished one still run."""
         self._graph_state(old, "CLEARING")
         stragglers = [node for node in old.nodes.values() if node.holds_thread(self.now)]
@@ -137,6 +170,7 @@ class Graphs(Core):
         def then() -> None:
             self._graph_state(old, "UNINITIALIZED")
             try:
+                self._refuse_broken(new, matched=matched)
                 self._begin_graph(new)
             except EngineRefused:
                 return
@@ -151,9 +185,14 @@ class Graphs(Core):
     def _begin_graph(self, graph: Running) -> None:
         self.graphs[graph.name] = graph
         self._graph_state(graph, "UNINITIALIZED")
-        if len(graph.nodes) < sum(not action.missing for action in graph.graph.actions):
-            message = "Two actions have one full name: the engine throws and keeps a broken graph."
+        doubled = len(graph.nodes) < sum(not action.missing for action in graph.graph.actions)
+        if doubled or not {ENTRY_NODE, EXIT_NODE}.isdisjoint(graph.nodes):
+            message = (
+                "Two actions have one full name, or one that of an end: the engine throws and keeps "
+                "a broken graph."
+            )
             self._hazard(graph, "H6", "goes on", message)
+            graph.broken = graph.deadly = True
             raise EngineRefused("map::at")
         named = {node.actor for node in graph.nodes.values() if node.actor}
         remote = named - {self.actor} if self.actor or len(named) > 1 else set()
@@ -269,12 +308,16 @@ class Graphs(Core):
                 f"Cannot modify graph '{old.name}' because it is not in PAUSED state. "
                 f"Current state: '{old.state}'"
             )
-        kept = {action.full_name for action in new.actions if not action.missing}
+        changed = self._built(old.name, new, None, None)
+        built = self._built_names(changed)
+        kept = built if built is not None else changed.nodes.keys()
         lost = next((n for n in old.nodes.values() if n.active and n.full_name not in kept), None)
 
         def then() -> None:
             if lost is None:
-                restructure(old, self._built(old.name, new, None, None))
+                if built is None:
+                    restructure(old, changed)
+                old.broken = old.deadly = built is not None
                 self._resume_graph(old, continue_from)
 
         if old.state == "RUNNING":
@@ -286,6 +329,15 @@ class Graphs(Core):
                 f"Cannot modify graph '{old.name}': Action '{lost.full_name}' cannot be deleted, "
                 f"because it is in an active state ({lost.state})"
             )
+
+    def _built_names(self, changed: Running) -> set[str] | None:
+        """The actions of a modified graph that the engine can build, up to the first that it cannot;
+        None if it can build all."""
+        if self.facts.restart_matches:
+            return None
+        found = self._not_built(changed, matched=False)
+        names = list(changed.nodes)
+        return None if found is None else set(names[: names.index(found[0].full_name)])
 
     # Sub-graphs
 

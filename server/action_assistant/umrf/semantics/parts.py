@@ -22,6 +22,8 @@ from action_assistant.umrf.writing import name_order
 
 ENTRY_NODE = "graph_entry_0"
 EXIT_NODE = "graph_exit_0"
+#: Names of actions that the engine takes for ends whatever their number: it never runs them.
+RESERVED = frozenset({"graph_entry", "graph_exit"})
 
 #: How a call of an action can end.
 Outcome: TypeAlias = Precondition
@@ -169,6 +171,9 @@ class Running:
         self.bypassed_ms = -1.0
         self.stop_failed = False
         self.has_ghost_ends = False
+        #: It was built in part only; `deadly`: a get of it kills the engine.
+        self.broken = False
+        self.deadly = False
         self.linked: dict[Node, list[Node] | None] = {}
 
     def own_names(self) -> set[str]:

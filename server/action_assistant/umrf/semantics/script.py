@@ -24,6 +24,7 @@ class Behaviour(msgspec.Struct, frozen=True, kw_only=True):
     ignores_stop: bool = False
     stop_error: bool = False
     init_error: bool = False
+    no_library: bool = False
     outputs: dict[str, Any] | None = None
     message: str | None = None
 
