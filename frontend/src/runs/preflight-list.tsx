@@ -12,6 +12,7 @@ const WAITING: Readonly<Record<string, string>> = {
   answers: "An answer to a question asked now",
   proof: "A stop can be proven",
   actions: "Its actions, with the same parameters",
+  again: "It survives a start of this name",
   quiet: "Nothing else runs",
   others: "Nobody else starts things",
   actors: "Whose actions these are",

@@ -30,7 +30,6 @@ from action_assistant.runner.robots import Ground, Robots
 from action_assistant.runner.runs import Run
 from action_assistant.runner.starting import Cleared, Grouped, GroupRequest, Started, Starting
 from action_assistant.runner.stragglers import Stragglers
-from action_assistant.umrf.facts import SIMULATED
 
 log: Final = logging.getLogger(__name__)
 
@@ -298,8 +297,7 @@ class Control:
         Unavailable."""
         opened = await self._movable(run)
         engine = self.robots.link(opened.run.engine)
-        facts = SIMULATED if engine is None else engine.facts
-        return await steering.modify(opened, body, author, facts=facts, aside=self._aside)
+        return await steering.modify(opened, body, author, engine=engine, aside=self._aside)
 
     async def confirm_rest(self, run: str, asked: steering.RestRequest, author: Author) -> Run:
         """Take somebody's word that a run is at rest, where its engine's is none. Raises NotFound,

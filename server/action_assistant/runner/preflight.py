@@ -139,6 +139,7 @@ def of_robot(sight: Sight, graph: Graph) -> tuple[Item, ...]:
         of_answer(sight),
         _proof(sight),
         _actions(sight, graph),
+        _again(sight, graph),
         _quiet(sight, graph),
         _rest(sight),
         _others(sight),
@@ -219,6 +220,53 @@ def _actions(sight: Sight, graph: Graph) -> Item:
         overridable=True,
         problems=problems[:_SHOWN],
     )
+
+
+def _again(sight: Sight, graph: Graph) -> Item:
+    """The engine does not hold a graph of this name already, or survives that it is started again.
+
+    Whoever started that one, and however it ended: the name is held until the engine is restarted.
+    """
+    held = {each.graph for each in sight.answer.graphs}
+    if graph.name not in held:
+        text = f"{sight.name} holds no graph called {graph.name} from an earlier start."
+        return Item(code="again", verdict="passed", text=text)
+    lost = not_matched(graph, sight.facts, sight.index, held)
+    if not lost:
+        text = f"{sight.name} can start {graph.name} again: nothing in it has to be looked up."
+        return Item(code="again", verdict="passed", text=text)
+    text = (
+        f"{sight.name} holds a graph called {graph.name} from an earlier start. Its engine does not "
+        f"look up {_listed(lost)} when a name is started again: it aborts with every running graph, or "
+        "does nothing. Restart the engine, or give the graph another name."
+    )
+    return Item(code="again", verdict="blocked", text=text)
+
+
+def not_matched(
+    graph: Graph, facts: EngineFacts, index: Index, held: Collection[str]
+) -> tuple[str, ...]:
+    """The full names of what an engine cannot build when it takes a graph without looking anything up
+    in its index (a start of a name that it holds, a modify): sub-graphs, and what it does not know.
+    Of one that names nothing, those sub-graphs that it `held`. Empty where it looks them up."""
+    if facts.restart_matches:
+        return ()
+    silent = not index.actions and not index.graphs
+    return tuple(
+        action.full_name
+        for action in graph.actions
+        if not action.missing
+        and (
+            f"{graph.name}__{action.name}__{action.instance_id}" in held
+            if silent
+            else action.name not in index.actions
+        )
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:3])
+    return shown if len(names) <= 3 else f"{shown} and {len(names) - 3} more"
 
 
 def _quiet(sight: Sight, graph: Graph) -> Item:

@@ -7,12 +7,15 @@ import msgspec
 from action_assistant.errors import BadInput, Conflict, Unavailable
 from action_assistant.runner.admission import SIMULATOR, StartRequest, admit, decoded
 from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.events import Author, Override
 from action_assistant.runner.history import Aside
 from action_assistant.runner.links.port import EngineRefused, NotSent, Order
+from action_assistant.runner.preflight import not_matched
 from action_assistant.runner.runs import Run
 from action_assistant.umrf import codec
-from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.model import Graph
 
 _MOVING: Final = frozenset({"running", "paused"})
 
@@ -54,10 +57,10 @@ async def resume(opened: OpenRun, author: Author) -> Run:
 
 
 async def modify(
-    opened: OpenRun, body: bytes, author: Author, *, facts: EngineFacts, aside: Aside
+    opened: OpenRun, body: bytes, author: Author, *, engine: KnownEngine | None, aside: Aside
 ) -> Run:
-    """Give a running graph another structure; `body` is a ModifyRequest. Raises BadInput, Conflict,
-    Unavailable."""
+    """Give a running graph another structure; `body` is a ModifyRequest, `engine` None that of a
+    simulated run. Raises BadInput, Conflict, Unavailable."""
     run = opened.run
     _require_moving(run)
     if not opened.pauses:
@@ -75,7 +78,10 @@ async def modify(
         graph=run.graph,
         override=asked.override,
     )
+    facts = SIMULATED if engine is None else engine.facts
     admitted = await aside(lambda: admit(start, facts))
+    if engine is not None:
+        await _require_matched(engine, admitted.graph, aside)
     _require_moving(opened.run)  # somebody may have stopped it meanwhile
     graph = admitted.graph
     if graph.name != run.graph_name:
@@ -93,6 +99,18 @@ async def modify(
     except EngineRefused as why:
         raise Conflict(f"The engine refuses the change: {why}") from why
     return opened.run
+
+
+async def _require_matched(engine: KnownEngine, graph: Graph, aside: Aside) -> None:
+    """A change is taken without looking anything up. Raises Conflict."""
+    held = {each.graph for each in engine.answer.graphs} if engine.answer is not None else set()
+    lost = not_matched(graph, engine.facts, await engine.index(aside), held)
+    if lost:
+        raise Conflict(
+            f"{engine.registration.name} does not look up {', '.join(lost[:3])} in a change, and would "
+            "abort with every running graph. Stop the run and start the new version under another name.",
+            where={"path": "/umrf/actions"},
+        )
 
 
 class RestRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
