@@ -234,6 +234,15 @@ def test_a_finished_graph_starts_again_from_scratch() -> None:
     assert states(traces, "A") == ["INITIALIZED", "RUNNING", "FINISHED"]
 
 
+def test_a_halted_graph_is_stopped_before_it_starts_again() -> None:
+    halts = graph_of("entry>A", "A>exit", Aexit=Conditions())
+    engine = Engine()
+    traces = engine.start(halts, 0) + engine.advance(2_000)
+    assert graph_states(traces) == ["UNINITIALIZED", "RUNNING", "HALTED"]
+    again = engine.start(halts, 2_000)
+    assert graph_states(again) == ["STOPPING", "STOPPED", "CLEARING"] + ["UNINITIALIZED"] * 2 + ["RUNNING"]  # fmt: skip
+
+
 def test_due_tells_when_something_happens_next() -> None:
     engine = Engine()
     engine.start(graph_of("entry>A", "A>exit"), 100)
@@ -293,6 +302,21 @@ def test_an_action_whose_file_said_it_was_finished_kills_the_engine() -> None:
     assert hazards(traces) == ["H1"]
 
 
+@pytest.mark.parametrize(
+    ("state", "shown"),
+    [
+        ("INITIALIZED", ["RUNNING"]), ("FINISHED", ["RUNNING"]), ("ERROR", ["RUNNING"]),
+        ("BYPASSED", []), ("PAUSED", []), ("STOPPING", []), ("PAUSE_REQUESTED", []),
+    ],
+)  # fmt: skip
+def test_an_action_whose_file_says_a_state_that_cannot_run_dies_before_it_runs(
+    state: str, shown: list[str]
+) -> None:
+    traces = list(simulate(graph_of("entry>A", "A>B", "B>exit"), states={"B": state}))
+    assert states(traces, "B") == shown
+    assert (hazards(traces)[-1], traces[-1].effect) == ("H1", "crash")  # type: ignore[union-attr]
+
+
 def test_a_graph_of_several_actors_is_refused_where_engines_do_not_synchronise() -> None:
     graph = graph_of("entry>A", "A>B", "B>exit")
     actions = tuple(msgspec.structs.replace(a, actor=a.name) for a in graph.actions)
@@ -326,6 +350,17 @@ def test_a_sub_graph_runs_under_the_name_of_its_place() -> None:
     assert graph_states(traces, "g__B__0") == ["UNINITIALIZED", "RUNNING", "FINISHED"]
     assert states(traces, "B") == ["RUNNING", "FINISHED"]
     assert results(traces) == ["on_true", "on_true"]
+
+
+def test_in_a_sub_graph_whose_pause_hangs_the_last_action_never_ends() -> None:
+    """Whoever asks the engine meanwhile waits for the pause, and holds what the end would need."""
+    inner = msgspec.structs.replace(graph_of("entry>X", "X>exit"), name="B")
+    outer = graph_of("entry>B", "B>exit")
+    traces = list(simulate(outer, library={"B": inner}, commands=[(500, "pause", None)]))
+    assert graph_states(traces, "g__B__0")[-1] == "FINISHED"
+    assert results(traces) == ["on_true"]
+    assert states(traces, "X") == ["INITIALIZED", "RUNNING"]
+    assert states(traces, "B") == ["RUNNING", "PAUSE_REQUESTED"]
 
 
 def test_scripts_reach_into_sub_graphs_and_the_closest_key_wins() -> None:

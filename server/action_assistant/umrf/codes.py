@@ -93,7 +93,7 @@ CODES: Final[dict[str, Code]] = {
     ),
     "H3": Code(
         "hazard", _WARNING, "`bypass` to an action, also the default of `on_error`",
-        "this build reads freed memory and may abort with every running graph",
+        "this build reads freed memory and may abort with every running graph, or answer nothing any more",
     ),
     "H4": Code(
         "hazard", _WARNING, "`run` may reach an action that is being paused or stopped",

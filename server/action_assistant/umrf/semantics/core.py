@@ -49,6 +49,8 @@ class Core(Clock):
         self.script = script
         self.library = library
         self.actor = actor
+        #: Whether commands wait for each other.
+        self.serial = True
         #: How long an action takes from its trigger to RUNNING the first time (dlopen, onInit).
         #: Meanwhile nothing counts it as active: a stop passes it by (recording engine_frozen.2).
         self.loading_ms = 0.0
@@ -139,7 +141,9 @@ class Core(Clock):
 
     def _bypass(self, graph: Running, child: Node, result: Outcome) -> None:
         if not self.facts.bypass_fixed or self.facts.simulated:
-            message = "A bypass to an action reads freed memory: the engine may abort here."
+            message = (
+                "A bypass to an action reads freed memory: the engine may abort here, or hang."
+            )
             self._hazard(graph, "H3", "goes on", message, child)
         graph.bypasses = graph.bypasses + 1 if graph.bypassed_ms == self.now else 0
         graph.bypassed_ms = self.now
@@ -157,6 +161,9 @@ class Core(Clock):
         if graph.active - last.active > 0:
             message = "The graph is FINISHED while actions still run; a stop does not reach them."
             self._hazard(graph, "H12", "goes on", message)
+        if self.locked and not self.serial and graph.above is not None:
+            graph.blocked = last  # commands that wait for the pause hold what it would tell it by
+            return
         self._soon(partial(self._sub_ended, graph, result))
 
     # The life of an action
@@ -200,7 +207,7 @@ class Core(Clock):
             self._begin(graph, node)
 
     def _run_unloaded(self, graph: Running, node: Node) -> None:
-        if not node.active:
+        if node.state in ("INITIALIZED", "FINISHED", "ERROR"):  # from others it is not begun at all
             self._state(graph, node, "RUNNING")
         message = "The file carried a state, so the action was never loaded: the engine aborts."
         self._crash(graph, "H1", message, node)
@@ -265,7 +272,7 @@ class Core(Clock):
 
     def _after(self, graph: Running, node: Node, result: Outcome, failed: bool) -> None:
         self._inform(graph, node, result)
-        if self.crashed:
+        if self.crashed or graph.blocked is node:
             return
         again = node.type == "spontaneous" and node.state == "RUNNING"
         if not failed:

@@ -44,8 +44,6 @@ class Graphs(Core):
     ) -> None:
         super().__init__(facts, script, library, actor)
         self.signatures = signatures
-        #: Whether commands wait for each other.
-        self.serial = True
         self._busy = False
         self._waiting: deque[Task] = deque()
 
@@ -146,6 +144,9 @@ class Graphs(Core):
     def _clear(self, old: Running) -> None:
         if old.broken:
             return
+        if old.state == "HALTED":  # it is stopped first, as what runs is
+            self._graph_state(old, "STOPPING")
+            self._graph_state(old, "STOPPED")
         self._graph_state(old, "CLEARING")
         self._graph_state(old, "UNINITIALIZED")
 

@@ -174,6 +174,7 @@ class Running:
         #: It was built in part only; `deadly`: a get of it kills the engine.
         self.broken = False
         self.deadly = False
+        self.blocked: Node | None = None  # its thread hangs while it ends the graph
         self.linked: dict[Node, list[Node] | None] = {}
 
     def own_names(self) -> set[str]:
