@@ -128,6 +128,20 @@ async def test_nothing_of_a_group_starts_when_one_of_its_engines_would_not_survi
 
 
 @virtual
+async def test_one_sub_graph_twice_is_refused_before_anything_is_sent() -> None:
+    air, graph = scene(), nested()
+    doubled = msgspec.structs.replace(graph.actions[2], name="Inner", instance_id=1)
+    twice = msgspec.structs.replace(graph, actions=(*graph.actions[:2], doubled))
+    async with air.played() as control:
+        (look,) = await control.look(group(twice, "David"))
+        assert [each.code for each in look.items if each.verdict == "blocked"] == ["actions"]
+        assert look.never
+        with pytest.raises(Conflict, match="“Inner” comes a second time"):
+            await run(control, twice)
+        assert air.starts() == []
+
+
+@virtual
 async def test_an_action_that_nobody_knows_is_never_overridden_under_a_name_that_is_held() -> None:
     """The first time an engine only refuses it."""
     david, graph = Open(), sequence("patrol", 2)

@@ -25,6 +25,8 @@ Verdict: TypeAlias = Literal["passed", "warned", "blocked"]
 _OF_INDEX: Final = frozenset(
     {"unknown-action", "signature", "parameter-type", "recursion", "subgraph-twice"}
 )
+#: Those that no index makes better: the engine refuses the graph whatever a person says.
+_REFUSED: Final = frozenset({"recursion", "subgraph-twice"})
 _SHOWN: Final = 20
 
 
@@ -212,12 +214,13 @@ def _actions(sight: Sight, graph: Graph) -> Item:
         text = f"{sight.name} knows all {_count(len(own), 'action')}, with the same parameters."
         return Item(code="actions", verdict="passed", text=text)
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    codes = {each.code for each in problems}
     return Item(
         code="actions",
         verdict="blocked",
         text=f"{sight.name} would refuse the graph: {problems[0].message}{more}",
-        codes=tuple(sorted({each.code for each in problems})),
-        overridable=True,
+        codes=tuple(sorted(codes)),
+        overridable=not codes & _REFUSED,
         problems=problems[:_SHOWN],
     )
 

@@ -13,7 +13,8 @@ class Behaviour(msgspec.Struct, frozen=True, kw_only=True):
 
     `never`: does not end by itself. `ignores_stop`: goes on until its own end. `stop_error`: throws
     in onStop, which the engine calls ERROR at once, whatever its code does. `pauses`: has an onPause.
-    `init_error`: throws when it is loaded. `outputs`: values by flat name.
+    `init_error`: throws when it is loaded. `no_library`: indexed, but its library is not there, so
+    that no graph with it can be built (said of its first call). `outputs`: values by flat name.
     """
 
     after_s: float = 1.0
