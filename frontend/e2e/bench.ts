@@ -163,6 +163,7 @@ interface Reference {
   readonly name: string;
   readonly instance_id: number;
   readonly conditions?: readonly string[];
+  readonly required?: boolean;
 }
 
 /** What of an exported file tests look at. */

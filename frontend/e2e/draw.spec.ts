@@ -279,6 +279,50 @@ test("things are put in their place: aligned, spread, tidied, nudged, framed, no
   await context.close();
 });
 
+test("a decision that is led to the end ends either way, and what runs beside it is waited for", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.getByRole("button", { name: "New graph" }).first().click();
+  await page.waitForURL(/\/graphs\/.+/);
+  const id = page.url().split("/").at(-1) ?? "";
+  await add(page, "Ask");
+  await enter(page, "Ask");
+  for (const [outcome, next, dx] of [
+    ["true", "Bring", -170],
+    ["false", "Answer", 170],
+  ] as const) {
+    const from = await boxOf(card(page, "Ask").getByLabel(`When ${outcome}`, { exact: true }));
+    await page.mouse.move(from.x + from.width / 2, from.y + from.height / 2);
+    await page.mouse.down();
+    await page.mouse.move(from.x + dx, from.y + 150, { steps: 6 });
+    await page.mouse.up();
+    const search = page.getByRole("combobox", { name: "Name of an action" });
+    await search.fill(next);
+    await search.press("Enter");
+    await expect(card(page, next)).toBeVisible();
+  }
+  await pick(page, ["Answer", 0]);
+  await page.getByRole("button", { name: "Add", exact: true }).nth(1).click();
+  const field = page.getByRole("textbox", { name: "Name of the parameter" });
+  await field.fill("said");
+  await field.press("Enter");
+  await page.getByRole("button", { name: "Tidy", exact: true }).click();
+  await connect(page, "Bring", "true", "exit");
+  await connect(page, "Answer", "true", "exit");
+  const waited = async () => (await umrfOf(product, id)).graph_exit.map((end) => end.required);
+  await expect.poll(waited).toEqual([false, false]);
+  const found = () => product.ask<{ code: string }[]>(`/api/graphs/${id}/problems`);
+  expect(JSON.stringify(await found())).not.toContain('"H8"');
+
+  await connect(page, "Ask", "true", "Answer");
+  await expect.poll(waited).toEqual([true, true]);
+  await page.keyboard.press("ControlOrMeta+z");
+  await expect.poll(waited).toEqual([false, false]);
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
 test("a graph with a loop and a renamed output is built from nothing", async ({ browser }) => {
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.getByRole("button", { name: "New graph" }).first().click();
