@@ -137,7 +137,7 @@ class AirLink:
                         sender=sound.sender,
                     )
                 )
-            case LogLine(text=text):
+            case LogLine(text=text) if len(self._air.publishers("feedback")) <= 1:
                 self._ears.tell(EngineLog(at=wall(), text=text))
             case _:
                 pass

@@ -9,7 +9,9 @@ from collections.abc import Awaitable, Callable
 from typing import Final
 
 import anyio
+import msgspec
 
+from action_assistant.errors import Refused
 from action_assistant.runner.doubts import Doubts
 from action_assistant.runner.events import (
     AlarmRaised,
@@ -30,7 +32,7 @@ from action_assistant.runner.events import (
     Unconfirmed,
 )
 from action_assistant.runner.flight import alarm_of
-from action_assistant.runner.history import Aside
+from action_assistant.runner.history import Aside, graph_of
 from action_assistant.runner.links.port import (
     EngineChanged,
     EngineLog,
@@ -82,6 +84,7 @@ class OpenRun:
         self.run = run
         self.revision = 0
         self.published = anyio.Event()
+        self._store = store
         self.recorder = Recorder(store, run.id, seq, self._touch)
         self._link = link
         self._owns_link = owns_link
@@ -163,6 +166,8 @@ class OpenRun:
             self._doubts.reach()
         if command.command in SET_GOING and command.graph == self.run.graph_name:
             self.watch.disturbed()
+        if command.command == "start":
+            self.watch.started_by_others()
         alarm = alarm_of(command, self.run.engine, self.run.graph_name)
         if alarm is not None:
             self.alarm(*alarm)
@@ -189,6 +194,8 @@ class OpenRun:
         exactly once; without one it is taken up where it stands."""
         async with anyio.create_task_group() as outer:
             outer.start_soon(self.recorder.run)
+            if order is None:
+                outer.start_soon(self._recall)
             try:
                 with self._link.listen(self._hear):
                     if order is not None:
@@ -206,11 +213,19 @@ class OpenRun:
                 raise
             outer.cancel_scope.cancel()
 
+    async def _recall(self) -> None:
+        """What an earlier process sent. Nothing waits for it: it only says what the run waits for."""
+        try:
+            self.watch.graph = await graph_of(self._store, self.run, self._aside)
+        except (Refused, msgspec.DecodeError):
+            log.warning("the graph of run %s cannot be read", self.run.id)
+
     def moves_again(self, event: MovesAgain) -> bool:
         """It had ended and moves: it is open again. False when it is stored and left already."""
         if self._is_left or self.run.end is None:
             return not self._is_left
-        self.watch = self._watched()
+        graph, self.watch = self.watch.graph, self._watched()
+        self.watch.graph = graph
         self._over = anyio.Event()
         self.tell(event)
         self._again.set()
@@ -308,10 +323,8 @@ class OpenRun:
                 self.observe(changes)
             case Feedback(snapshots=snapshots):
                 self.watch.feed(tuple(each for each in snapshots if each.run == self.run.id))
-            case EngineLog(at=at, text=text, graph=graph) if self._is_ours(graph):
-                if self._lines < _LINES:
-                    self._lines += 1
-                    self.tell(EngineSaid(at, text[:_LONGEST_LINE]))
+            case EngineLog():
+                self._hear_line(report)
             case EngineChanged(state="gone", why=why) if self._owns_link:
                 self.alarm("engine_gone", why)  # a simulated engine does not come back
                 self.end("lost", why)
@@ -320,6 +333,12 @@ class OpenRun:
             case _:
                 return
         self.watch.look()
+
+    def _hear_line(self, line: EngineLog) -> None:
+        if self._is_ours(line.graph) and self._lines < _LINES:
+            self._lines += 1
+            self.tell(EngineSaid(line.at, line.text[:_LONGEST_LINE]))
+        self.watch.hear(line.text)
 
     def _is_ours(self, graph: str | None) -> bool:
         name = self.run.graph_name

@@ -1,15 +1,18 @@
 """Runs as the journal tells them: what is over, and what an earlier process left."""
 
 from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from sqlalchemy import Row, Select
 
 from action_assistant.errors import NotFound
 from action_assistant.journal.events import Event
-from action_assistant.runner.events import Requested, decode
+from action_assistant.runner.events import ModifyRequested, Requested, decode
 from action_assistant.runner.recorder import Store, stream_of
 from action_assistant.runner.runs import Run, replay
+from action_assistant.umrf import codec
+from action_assistant.umrf.model import Graph
 
 T = TypeVar("T")
 
@@ -65,3 +68,22 @@ class History:
     async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
         """Rows of the tables."""
         return await self._ledger.query(statement)
+
+
+async def graph_of(store: Store, run: Run, aside: Aside) -> Graph | None:
+    """The graph that a run has now: as it was sent, or changed since. None when it cannot be read.
+    Raises Unavailable."""
+    stored = await store.read(stream_of(run.id))
+    sent = {Requested.kind, ModifyRequested.kind}
+    for each in reversed(stored):
+        event = decode(each.kind, each.body) if each.kind in sent else None
+        if isinstance(event, Requested | ModifyRequested) and event.digest == run.digest:
+            return await aside(partial(_read, event.umrf.encode()))
+    return None
+
+
+def _read(text: bytes) -> Graph | None:
+    try:
+        return codec.read(text).graph
+    except codec.Unreadable:
+        return None

@@ -16,7 +16,8 @@ log: Final = logging.getLogger(__name__)
 _LOADING_S: Final = 1.0  # an action that is triggered for the first time has begun within this time
 _STARTING_S: Final = 0.3  # and one that has run before within this
 _AGAIN_S: Final = 2.0  # one that begins again by itself is FINISHED for a moment in between
-_NEVER_BEGAN: Final = frozenset({"UNINITIALIZED", "INITIALIZED"})
+#: States in which an engine keeps a graph or an action that nothing has begun.
+NEVER_BEGAN: Final = frozenset({"UNINITIALIZED", "INITIALIZED"})
 _SEND_S: Final = 1.0
 #: Commands after which a graph may move that was at rest.
 SET_GOING: Final = frozenset({"start", "resume", "modify"})
@@ -87,7 +88,7 @@ class Rest:
         """After one more look, asked for at `asked`, at a graph and then its sub-graphs."""
         state = shown[0].state
         moving = any(each.active for each in shown)
-        if moving or state not in TERMINAL | _NEVER_BEGAN:
+        if moving or state not in TERMINAL | NEVER_BEGAN:
             self._since = None
             return False
         if self._exact and state in TERMINAL:
@@ -109,5 +110,5 @@ def _long_enough(shown: Sequence[Snapshot]) -> float:
     """For how long a graph like this must be seen at rest, in seconds."""
     if any(each.spontaneous for each in shown):
         return _AGAIN_S
-    idle = any(each in _NEVER_BEGAN for graph in shown for each in graph.nodes.values())
+    idle = any(each in NEVER_BEGAN for graph in shown for each in graph.nodes.values())
     return _LOADING_S if idle else _STARTING_S

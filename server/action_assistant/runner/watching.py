@@ -7,13 +7,14 @@ from typing import Final, Protocol
 import anyio
 from msgspec.structs import replace
 
+from action_assistant.runner import refusals, stall
 from action_assistant.runner.doubts import Doubts
 from action_assistant.runner.engine_process import has_ended
 from action_assistant.runner.events import Answered, End, Proof, Published, RunEvent, Silent
 from action_assistant.runner.history import Aside
 from action_assistant.runner.lateness import fresh
 from action_assistant.runner.links.port import Answer, Link, NoAnswer
-from action_assistant.runner.proof import Rest, hash_of
+from action_assistant.runner.proof import NEVER_BEGAN, Rest, hash_of
 from action_assistant.runner.runs import Run, is_news
 from action_assistant.runner.sameness import difference
 from action_assistant.runner.seen import TERMINAL, Seen, Snapshot
@@ -24,6 +25,8 @@ _STOP_POLL_S: Final = 0.1
 _GET_S: Final = 1.0  # an engine that is not busy answers within milliseconds
 _SILENT_S: Final = 3.0
 _APPEAR_S: Final = 3.0  # until a started graph must show in answers
+_ABSENT_S: Final = 1.0  # for which answers must lack what the engine has said it refused
+_LACKING: Final = 3  # inputs without a value that are named
 _GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun
 _SEVERAL: Final = (
     "{servers} engines are seen on the path of its answers, so that none proves anything"
@@ -66,7 +69,8 @@ class Watched(Protocol):
 
 class Watch:
     """Evidence of one run. `trouble`: why its stop is not proven yet; `seen_at`: when its engine last
-    showed it. `rested_at`: when it was last seen to be over, for one that moves again."""
+    showed it; `graph`: what that has been given last, where it is known. `rested_at`: when it was last
+    seen to be over, for one that moves again."""
 
     def __init__(
         self,
@@ -81,6 +85,7 @@ class Watch:
     ) -> None:
         self.trouble = ""
         self.seen_at: int | None = None
+        self.graph: Graph | None = None
         self._it = it
         self._link = link
         self._wall = wall
@@ -91,6 +96,9 @@ class Watch:
         self._disturbed = 0
         self._begun = 0  # when feedback was the first to show it
         self._sent: Graph | None = None  # until it was compared with what the engine shows
+        self._start = refusals.StartLog(it.run)
+        self._absent: float | None = None  # since when answers lack a start that was refused
+        self._standstill = stall.Standstill()
         self._answered = False  # by a get, since the last feedback
         self._exact = exact
         self._rest = Rest(exact=exact)
@@ -105,7 +113,17 @@ class Watch:
 
     def sends(self, graph: Graph) -> None:
         """This graph is being started: what the engine shows is compared with it, once."""
-        self._sent = graph
+        self._sent = self.graph = graph
+
+    def hear(self, line: str) -> None:
+        """A line of the engine's own log, about whatever."""
+        if self._start.hear(line):
+            said = refusals.in_words(self._it.run.engine, self._start.words)
+            self._it.alarm(refusals.REFUSED, said)
+
+    def started_by_others(self) -> None:
+        """What the engine's log says of a start may be about that one."""
+        self._start.doubt()
 
     def stop_left(self) -> None:
         """A stop message has left: whatever is asked from now on may prove it."""
@@ -226,6 +244,9 @@ class Watch:
             )
             return
         waited = anyio.current_time() - self._began_at
+        if self._refused_and_absent():
+            self._it.end("refused", f"{self._it.run.engine} refused the start: {self._start.words}")
+            return
         if waited < _APPEAR_S:
             return
         if self._it.run.incarnation is None:
@@ -237,6 +258,15 @@ class Watch:
             self._it.tell(
                 Silent(answer.at, since, "The engine answers but does not show this run.")
             )
+
+    def _refused_and_absent(self) -> bool:
+        """Whether the engine has taken the start in, has refused it, and has not held it for a while
+        since: then nothing of it has begun, and nothing of it is left that could begin."""
+        if not self._start.words or self._link.standing.servers != 1:
+            self._absent = None
+            return False
+        self._absent = self._absent if self._absent is not None else anyio.current_time()
+        return anyio.current_time() - self._absent >= _ABSENT_S
 
     def _conclude(self, shown: list[Snapshot], answer: Answer, order: int, asked: float) -> None:
         if order < self._disturbed:
@@ -255,6 +285,10 @@ class Watch:
             end = self._it.run.apparent_end
             if end is not None and own.state in TERMINAL and at_rest:
                 self._it.end(end, "")
+            elif at_rest and _never_began(own):
+                self._it.end("refused", self._why_unbegun())
+            else:
+                self._look_for_trouble(shown, asked)
             return
         if self._stop_sent is None or order <= self._stop_sent:
             return
@@ -270,3 +304,33 @@ class Watch:
             )
         else:
             self.trouble = f"{', '.join(self._it.run.active) or own.graph} has not stopped yet"
+
+    def _why_unbegun(self) -> str:
+        """An engine calls a graph running before the first answer after its start. One that it holds
+        and does not call so was not begun, and only another start would begin it."""
+        engine, words = self._it.run.engine, self._start.words
+        if words:
+            return (
+                f"{engine} refused the start: {words}. It holds the graph, and begins none of it."
+            )
+        lacking = stall.unbegun(self.graph) if self.graph is not None else ()
+        why = " ".join(stall.in_words(each) for each in lacking[:_LACKING])
+        return f"{engine} holds the graph and has not begun it, without a word why. {why}".rstrip()
+
+    def _look_for_trouble(self, shown: list[Snapshot], asked: float) -> None:
+        """It goes on, as far as the engine says."""
+        run, own = self._it.run, shown[0]
+        if self._start.words and not _never_began(own):
+            text = (
+                f"{run.engine} refused the start ({self._start.words}) and yet shows the graph "
+                f"{own.state}: some of it may have begun. Stop it, and restart its engine."
+            )
+            self._it.alarm(refusals.HALF_BEGUN, text)
+        if self._standstill.seen(shown, asked) and not self._exact:
+            self._it.alarm(stall.STALLED, stall.told(run, self.graph))
+
+
+def _never_began(own: Snapshot) -> bool:
+    """Whether an engine holds a graph of which it has begun nothing. Unlike a graph that has ended it
+    was not even tried: no state of an action can hide that one ran."""
+    return NEVER_BEGAN.issuperset({own.state, *own.nodes.values()})

@@ -10,6 +10,7 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
+from action_assistant.runner import refusals, stall
 from action_assistant.runner.events import Overridden
 from action_assistant.runner.runs import Alarm, Run
 from action_assistant.runner.visits import ActionRun, Message, Visit
@@ -59,6 +60,10 @@ class Unended(_Evidence, frozen=True, tag="unended", tag_field="kind"):
     """`action` goes on since `at`, and no end of it was seen before somebody stopped the run."""
 
 
+class Stalled(_Evidence, frozen=True, tag="stalled", tag_field="kind"):
+    """The graph ran and nothing in it did; `quote` says what `action` waited for."""
+
+
 class EngineRestarted(_Evidence, frozen=True, tag="engine_restarted", tag_field="kind"):
     """Another engine stands where the one before was."""
 
@@ -97,6 +102,7 @@ Cause: TypeAlias = (
     | UnknownAction
     | Waiting
     | Unended
+    | Stalled
     | EngineRestarted
     | Foreign
     | ActionFailed
@@ -129,11 +135,14 @@ def _found(run: Run, graph: Graph | None) -> Iterator[Cause]:
     yield from wrong
     named = {each.action for each in wrong}
     yield from (each for each in _failures(run) if each.action not in named)
-    if graph is not None:
+    stalls = tuple(_stalls(run, graph))
+    yield from stalls
+    if graph is not None and not stalls:
         yield from _waits(run, graph)
     if not refused:
         yield from _silence(run)
-    yield from _alarms(run)
+    told = {each.code for each in run.alarms if stalls and each.code == stall.STALLED}
+    yield from _alarms(run, told | ({refusals.REFUSED} if refused else set()))
 
 
 def _restarts(run: Run) -> Iterator[Cause]:
@@ -169,15 +178,14 @@ def _ended_by(run: Run, command: str, alarm: Alarm) -> bool:
 
 def _refusals(run: Run, graph: Graph | None) -> Iterator[Cause]:
     """What the engine's own log says of the start, together with what it was known to lack."""
-    if run.end == "refused":
-        yield Refused(at=run.ended_at or run.requested_at, quote=run.detail)
-        return
-    line = next((each for each in run.log if each.text.startswith(_REFUSAL)), None)
-    if line is None or _shown(run):
-        return
+    said = (each for each in run.log if each.text.startswith(_REFUSAL))
+    line = next(said, None) if run.end == "refused" or not _shown(run) else None
     lacking = [each for each in run.despite if each.code in _PROBLEMS]
-    if _UNRESOLVED not in line.text or not lacking:
-        yield Refused(at=line.at, quote=_first_line(line))
+    if line is None or _UNRESOLVED not in line.text or not lacking:
+        if run.end == "refused":
+            yield Refused(at=run.ended_at or run.requested_at, quote=run.detail)
+        elif line is not None:
+            yield Refused(at=line.at, quote=_first_line(line))
         return
     for each in lacking:
         name = _name_of(run, each.aid)
@@ -244,6 +252,19 @@ def _failures(run: Run) -> Iterator[Cause]:
             inferred=visit.how == "inferred",
             quote=_said(run.actions[name], visit),
         )
+
+
+def _stalls(run: Run, graph: Graph | None) -> Iterator[Stalled]:
+    """What it waited for when nothing moved in it any more, if that was so to its end."""
+    alarm = next((each for each in reversed(run.alarms) if each.code == stall.STALLED), None)
+    visits = (visit for action in run.actions.values() for visit in action.visits)
+    if alarm is None or any(visit.start > alarm.at for visit in visits):
+        return
+    found = stall.waits(run, graph) if graph is not None else ()
+    for wait in found:
+        yield Stalled(at=alarm.at, action=wait.action, quote=stall.in_words(wait))
+    if not found:
+        yield Stalled(at=alarm.at, quote=alarm.text)
 
 
 def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
@@ -343,8 +364,10 @@ def _silence(run: Run) -> Iterator[Cause]:
         yield Silence(at=run.ended_at or run.requested_at, quote=run.detail)
 
 
-def _alarms(run: Run) -> Iterator[Cause]:
+def _alarms(run: Run, told: set[str]) -> Iterator[Cause]:
     for alarm in run.alarms:
+        if alarm.code in told:
+            continue
         if alarm.code != "engine_restarted" and not alarm.code.startswith("foreign_"):
             yield Warned(at=alarm.at, quote=alarm.text)
 

@@ -9,6 +9,7 @@ from action_assistant.runner.review.cause import (
     Foreign,
     Refused,
     Silence,
+    Stalled,
     Unended,
     UnknownAction,
     Waiting,
@@ -44,14 +45,20 @@ def words(cause: Cause, run: Run) -> str:
             seen = " (inferred)" if cause.inferred else ""
             return f"{who} ended {how}{seen}" + (f": “{quote}”" if quote else ".")
         case Refused(quote=quote):
-            return f"{run.engine} refused the start: {quote or 'it did not say why.'}"
+            return _refusal_in_words(run.engine, quote)
         case Silence(quote=quote):
             told = f" {quote}" if quote else ""
             return f"What happened after this moment is unknown.{told}"
-        case Warned(quote=quote):
+        case Stalled(quote=quote) | Warned(quote=quote):
             return quote
         case _:
             assert_never(cause)
+
+
+def _refusal_in_words(engine: str, quote: str) -> str:
+    if quote.startswith((f"{engine} refused the start", f"{engine} holds the graph")):
+        return quote
+    return f"{engine} refused the start: {quote or 'it did not say why.'}"
 
 
 def _waits_in_words(cause: Waiting, run: Run, child: str) -> str:
