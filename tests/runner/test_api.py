@@ -55,6 +55,20 @@ def test_the_list_can_be_filtered_and_leafed_through(process: RunnerProcess) -> 
         assert client.get("/api/runs", params=lost).json() == []
 
 
+def test_what_a_start_has_become_is_told_by_its_request(process: RunnerProcess) -> None:
+    """Whoever did not get the answer looks it up, and sends no second start."""
+    with process.client() as client:
+        asked = order(sequence(actions=1), script=FAST, request_id="quitelost123")
+        before = client.get("/api/starts/quitelost123").json()
+        assert before == {"request_id": "quitelost123", "under_way": False, "runs": []}
+        run = started(client, asked)
+        found = client.get("/api/starts/quitelost123").json()
+        assert [each["id"] for each in found["runs"]] == [run["id"]]
+        assert found["runs"][0]["engine"] == "simulator"
+        other = client.get("/api/starts/quitelost12").json()
+        assert other["runs"] == []
+
+
 def problem(answer: httpx.Response, status: int) -> dict[str, Any]:
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"

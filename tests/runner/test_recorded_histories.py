@@ -29,6 +29,8 @@ _MOVES = set("RSPQ")
 _TAKEN = ("engine_restart", "start_again", "pause_stop")
 #: It was frozen, and the recording ends before it was seen at rest for long enough.
 _SHORT = ("engine_frozen",)
+#: The engine said no, or held the graph without beginning it, and was seen to for long enough.
+_REFUSED = ("param_missing", "unknown_action")
 
 
 def check(run: Run, told: Index, name: str) -> None:
@@ -51,6 +53,9 @@ def check_end(run: Run, told: Index, name: str) -> None:
     if name.startswith(_TAKEN):
         assert run.state in {"lost", "finished", "error", "stopping", "unknown"}
         assert run.proof_at is None or run.end == "finished"
+    elif name.startswith(_REFUSED):
+        assert run.end == "refused"
+        assert all(action.visits == () for action in run.actions.values())
     elif not told.polled or last not in _ENDS:
         assert run.state not in ENDED - {"lost"}  # no answer has ever proven an end
     elif last == "ERROR":

@@ -9,7 +9,7 @@ import pytest
 
 from action_assistant.runner.control import Control
 from action_assistant.runner.events import Override
-from action_assistant.runner.refusals import StartLog
+from action_assistant.runner.refusals import StartLog, why_refused
 from action_assistant.runner.runs import Run
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Index, Quirks, Start
@@ -176,6 +176,12 @@ async def test_the_words_of_a_refusal_outlive_the_runner() -> None:
 
 
 # --- the lines themselves -----------------------------------------------------------------------------
+
+
+def test_what_map_at_means_is_said_with_it() -> None:
+    assert "library of an action is not there" in why_refused("David", "map::at")
+    assert why_refused("David", "No") == "David refused the start: No."
+
 
 RECEIVED = "Received request to start UMRF graph: patrol"
 REFUSAL = (

@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
+from action_assistant.runner import archive
 from action_assistant.runner.control import Control
 from action_assistant.runner.events import EngineSaid, Override
 from action_assistant.runner.flight import Commanded, EngineBecame, StopWasProven
@@ -407,6 +408,27 @@ async def test_a_group_starts_together_and_is_stopped_together() -> None:
     for run in started.runs:
         told = world.ledger.history(run.id)
         assert (told.state, told.group) == ("stopped", started.group)
+
+
+@virtual
+async def test_a_start_that_is_under_way_says_so_until_its_runs_are_there() -> None:
+    world = World()
+    async with fleet(world, David=Open(NEVER), Eve=Open(NEVER)) as control:
+        asked = group(sequence(), "David", "Eve")
+        world.ledger.slow = 1.0
+
+        async def found() -> list[str]:
+            rows = await control.history.rows(archive.of_start(asked.request_id))
+            return sorted([(await control.find(row.id)).engine for row in rows])
+
+        async with anyio.create_task_group() as tasks:
+            assert not control.under_way(asked.request_id)
+            tasks.start_soon(control.start_group, asked, ANN)
+            await anyio.sleep(0.5)
+            assert (control.under_way(asked.request_id), await found()) == (True, [])
+        assert (control.under_way(asked.request_id), await found()) == (False, ["David", "Eve"])
+        control.stop_all(BEN)
+        await until(lambda: not control.open)
 
 
 @virtual

@@ -97,7 +97,15 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
             headers={"location": f"/api/runs/{started.run.id}"},
         )
 
-    return [start]
+    @get("/api/starts/{request_id:str}", summary="What has become of a start, by its request_id")
+    async def started(request_id: str) -> shapes.StartShown:
+        under_way = house.control.under_way(request_id)  # before: what it becomes is stored by then
+        rows = await house.control.history.rows(archive.of_start(request_id))
+        runs = [await house.control.find(row.id) for row in rows]
+        found = [_shown(house, run.id) or shapes.shown(run) for run in runs]
+        return shapes.StartShown(request_id=request_id, under_way=under_way, runs=found)
+
+    return [start, started]
 
 
 def _moves(house: House) -> list[ControllerRouterHandler]:

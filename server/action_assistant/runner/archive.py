@@ -162,6 +162,13 @@ def by_request(request_id: str) -> Select[Any]:
     return select(run.c.id, run.c.digest, run.c.engine).where(run.c.request_id == request_id)
 
 
+def of_start(request_id: str) -> Select[Any]:
+    """Ids of the runs that a start has become, also one on several robots: those have a request each,
+    which begins with that of their group."""
+    group = and_(run.c.request_id > f"{request_id}/", run.c.request_id < f"{request_id}0")
+    return select(run.c.id).where(or_(run.c.request_id == request_id, group)).order_by(run.c.number)
+
+
 class Filter(msgspec.Struct, frozen=True, kw_only=True):
     """Which runs are asked for; None asks for all. `failed`: refused, lost, halted, or ended in
     error; the other ones are over as well. `graph` is an id or a name, `person` an id or a

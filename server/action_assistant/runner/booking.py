@@ -99,6 +99,10 @@ class Book:
         async with lock:
             yield
 
+    def under_way(self, request: str) -> bool:
+        """Whether a start, or one of several robots, is being carried out at this moment."""
+        return request in self._asking
+
     async def run_of(self, asked: StartRequest) -> str | None:
         """The run that a request has become. Raises Conflict when it was another start."""
         rows = await self._ledger.query(archive.by_request(asked.request_id))

@@ -56,6 +56,7 @@ class Control:
         self._news = anyio.Event()
         self._places: dict[str, anyio.Lock] = {}
         self._book = Book(ledger, tasks, wall)
+        self.under_way: Final = self._book.under_way
         self._starting = Starting(
             robots,
             wall=wall,
@@ -195,8 +196,7 @@ class Control:
         stops: int,
         group: str | None = None,
     ) -> Run:
-        number = self.next_number()
-        at = self._wall()
+        number, at = self.next_number(), self._wall()
         requested, order = await self._aside(
             lambda: booked(asked, cleared, author, at=at, number=number, group=group)
         )

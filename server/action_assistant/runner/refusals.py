@@ -20,6 +20,10 @@ _RECEIVED: Final = "Received request to "
 _ANOTHER_LIFE: Final = "The Action Engine is initialized."
 _OF_OTHERS: Final = re.compile(r"Graph '.*' finished\.")
 _ORIGIN: Final = re.compile(r"origin \[in \w+\]: ")
+_MEANT: Final = (
+    " It says so when the library of an action is not there, or when a graph with a sub-graph is "
+    "started again: look at the packages on the robot, or restart its engine."
+)
 _LONGEST: Final = 300  # characters of the engine's words in a sentence
 
 
@@ -56,12 +60,18 @@ class StartLog:
 def words_of(line: str) -> str:
     """What an error of the engine says, without where in its sources it arose."""
     first = line.strip().partition("\n")[0]
-    return _ORIGIN.sub("", first)[:_LONGEST]
+    return _ORIGIN.sub("", first)[:_LONGEST].removesuffix(".")
 
 
 def in_words(engine: str, words: str) -> str:
     """The alarm of a refusal. What follows from it is not known yet."""
     return f"{engine} says of this start: “{words}”"
+
+
+def why_refused(engine: str, words: str) -> str:
+    """Why a run is over that never began; what `map::at` means is known from real engines."""
+    hint = _MEANT if words == "map::at" else ""
+    return f"{engine} refused the start: {words}.{hint}"
 
 
 def _between_quotes(text: str) -> str:

@@ -135,6 +135,15 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
     archived: ArchivedShown | None
 
 
+class StartShown(msgspec.Struct, frozen=True, kw_only=True):
+    """What has become of a start. `under_way`: it is being carried out at this moment. Without that
+    and without runs nothing of it has arrived here so far."""
+
+    request_id: str
+    under_way: bool
+    runs: list[RunShown]
+
+
 def time(us: int) -> datetime:
     """Microseconds UTC as a moment."""
     return _EPOCH + timedelta(microseconds=us)

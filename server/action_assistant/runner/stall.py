@@ -293,5 +293,6 @@ def told(run: Run, graph: Graph | None) -> str:
     unknown = "What it waits for cannot be told from what was seen."
     return (
         f"NOTHING MOVES: {run.engine} calls {run.graph_name} running, and none of its actions runs. "
-        f"{why or unknown}{more} It does not end by itself: stop it."
+        f"{why or unknown}{more} Unless one is still being loaded it will not go on: stop "
+        "it."
     )

@@ -245,7 +245,8 @@ class Watch:
             return
         waited = anyio.current_time() - self._began_at
         if self._refused_and_absent():
-            self._it.end("refused", f"{self._it.run.engine} refused the start: {self._start.words}")
+            why = refusals.why_refused(self._it.run.engine, self._start.words)
+            self._it.end("refused", why)
             return
         if waited < _APPEAR_S:
             return
