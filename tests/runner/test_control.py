@@ -4,6 +4,7 @@ import anyio
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
+from action_assistant.runner import shapes
 from action_assistant.runner.events import Published, Requested
 from action_assistant.runner.links.port import Order
 from action_assistant.runner.runs import ENDED
@@ -328,3 +329,30 @@ async def test_numbers_go_on_after_a_restart() -> None:
             assert run.number == number
             assert await ended(control, run.id) in ENDED
             assert Published in [type(each) for each in world.ledger.told(run.id)]
+
+
+@virtual
+async def test_a_simulated_run_that_is_paused_can_be_stopped() -> None:
+    world = World()
+    async with world.runner() as control:
+        run = (await control.start(order(sequence(), script={"*": [{"after_s": 20}]}), ANN)).run.id
+        await anyio.sleep(1)
+        await control.pause(run, ANN)
+        await until(lambda: control.open[run].run.state == "paused")
+        await control.stop(run, BEN)
+        assert await ended(control, run) == "stopped"
+    assert world.ledger.history(run).alarms == ()
+
+
+@virtual
+async def test_where_the_simulator_plays_a_robot_it_pauses_only_as_safely_as_that() -> None:
+    world = World({"David": Robot(engine())})
+    async with world.runner() as control:
+        asked = order(sequence(), like="David", script={"*": [{"after_s": 20}]})
+        run = (await control.start(asked, ANN)).run.id
+        await anyio.sleep(1)
+        with pytest.raises(Conflict, match="not safe"):
+            await control.pause(run, ANN)
+        assert shapes.shown(control.open[run].run).like == "David"
+        control.stop_all(BEN)
+        assert await ended(control, run) == "stopped"

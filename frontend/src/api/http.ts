@@ -29,6 +29,16 @@ export class Unreachable extends Error {
   }
 }
 
+/** Whether an error leaves open what became of a request: nobody said no to it. */
+export function leavesOpen(error: unknown): boolean {
+  if (!(error instanceof Refusal)) return true;
+  const { status, type } = error.details;
+  return status >= 500 && (status !== 503 || type === UNKNOWN_TYPE);
+}
+
+/** The `type` of an answer that none of ours gave, as a proxy's. */
+const UNKNOWN_TYPE = "refused";
+
 export interface Ask {
   method?: "GET" | "POST" | "PATCH" | "DELETE";
   /** An object is sent as JSON, a string as it is (also JSON). */
@@ -42,7 +52,7 @@ const PATIENCE = 20_000; // ms
 
 async function problemOf(response: Response): Promise<ProblemDetails> {
   const fallback = {
-    type: "refused",
+    type: UNKNOWN_TYPE,
     title: response.statusText || "Refused",
     status: response.status,
     detail: `The server answered ${response.status}.`,

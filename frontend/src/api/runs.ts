@@ -177,6 +177,23 @@ export async function startRun(order: StartOrder): Promise<Started> {
   return { runs: [run], failed: {} };
 }
 
+/** What the runner knows of a start. Without runs and not `under_way`: nothing so far. */
+export interface StartFound {
+  request_id: string;
+  under_way: boolean;
+  runs: Run[];
+}
+
+export function findStart(
+  runner: string,
+  request: string,
+  patience: number,
+  signal?: AbortSignal,
+): Promise<StartFound> {
+  const path = `${runner}/api/starts/${encodeURIComponent(request)}`;
+  return ask(path, { patience, ...(signal ? { signal } : {}) });
+}
+
 /** Asks to stop one run, or all of them. */
 export function postStop(runner: string, run: string | "all", stop: string): Promise<unknown> {
   const path = run === "all" ? "/api/stop" : `/api/runs/${encodeURIComponent(run)}/stop`;

@@ -10,6 +10,7 @@ import { Refusal } from "../api/http";
 import { usePerson } from "../api/person";
 import { LiveProvider } from "../api/use-live";
 import { StopNotice } from "../runs/stop-notice";
+import { UnsureStartNotice } from "../runs/unsure-start";
 import { LiveRegion } from "../ui/announcer";
 import { actionCarrier } from "../ui/carry";
 import { CarriedGhost } from "../ui/placing";
@@ -67,6 +68,7 @@ export function App() {
               <AskName />
               <ReviewDialog />
               <StopNotice />
+              <UnsureStartNotice />
               <CarriedGhost carrier={actionCarrier} />
               <LiveRegion />
             </DropFiles>

@@ -2,12 +2,13 @@
 import { notifications } from "@mantine/notifications";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { keys, publish, type Version, versionName } from "../api/graphs";
-import { place, sentence } from "../api/http";
+import { leavesOpen, place, sentence } from "../api/http";
 import type { Script } from "../api/rehearsal";
-import { startRun } from "../api/runs";
+import { type Started, type StartOrder, startRun } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { newAid } from "../graph/ids";
 import { memberText } from "../graph/member";
+import { unsureStarts } from "./unsure-starts";
 
 export interface Order {
   /** The moment that shall run; awaited when the page has yet to hear its name. */
@@ -52,7 +53,9 @@ export function useStart(graph: string) {
       if (digest !== null && digest !== version.digest) {
         throw new Error("The graph is not the one that was looked at. Nothing was sent.");
       }
-      const started = await startRun({
+      const versions = client.getQueryData<Version[]>(keys.versions(graph)) ?? [];
+      const what = `${nextLabel(versions, version.seq)} of ${nameIn(version)}`;
+      const started = await surely(what, {
         runner,
         version: version.id,
         digest: version.digest,
@@ -74,6 +77,31 @@ export function useStart(graph: string) {
       complain("Not started", where === "" ? sentence(error) : `${sentence(error)} (${where})`);
     },
   });
+}
+
+const NOTHING_KNOWN: Started = { runs: [], failed: {} };
+
+/** Sends a start. Where nobody says what became of it, that is looked for, and no failure is told. */
+async function surely(what: string, order: StartOrder): Promise<Started> {
+  const { request, graph, engines } = order;
+  unsureStarts.sends({ request, graph, what, engines, at: Date.now() });
+  try {
+    const started = await startRun(order);
+    unsureStarts.settle(request);
+    return started;
+  } catch (error) {
+    if (leavesOpen(error)) {
+      unsureStarts.doubt(request);
+      return NOTHING_KNOWN;
+    }
+    unsureStarts.settle(request);
+    throw error;
+  }
+}
+
+function nameIn(version: Version): string {
+  const { graph_name: name } = version.umrf as { graph_name?: unknown };
+  return typeof name === "string" && name !== "" ? name : "untitled";
 }
 
 const CHOICE = "aa.engines";

@@ -118,8 +118,10 @@ class Listed(Summary, frozen=True, kw_only=True):
 
 
 class RunShown(Summary, frozen=True, kw_only=True):
-    """A run with its actions, by full name, and the newest lines of its engine's log."""
+    """A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
+    robot whose engine the simulator plays."""
 
+    like: str | None
     actions: dict[str, ActionShown]
     log: list[MessageShown]
 
@@ -157,7 +159,8 @@ def summary(run: Run, *, recorded: bool = True) -> Summary:
 def shown(run: Run, *, recorded: bool = True) -> RunShown:
     """A run with its actions and their newest visits."""
     actions = _actions(run, _LIVE)
-    return RunShown(**_fields(run, recorded), actions=actions, log=_log(run, _LINES))
+    fields = _fields(run, recorded)
+    return RunShown(**fields, like=run.like, actions=actions, log=_log(run, _LINES))
 
 
 def whole(run: Run, umrf: str, *, recorded: bool = True, place: Row[Any] | None = None) -> RunWhole:
@@ -166,6 +169,7 @@ def whole(run: Run, umrf: str, *, recorded: bool = True, place: Row[Any] | None 
     raw = msgspec.Raw(umrf.encode())
     return RunWhole(
         **_fields(run, recorded),
+        like=run.like,
         actions=actions,
         log=_log(run, len(run.log)),
         umrf=raw,

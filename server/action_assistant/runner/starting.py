@@ -21,6 +21,8 @@ from action_assistant.runner.runs import Run
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.umrf.semantics import Engine
 
+#: The simulator as itself: a paused run can be stopped there.
+_ITSELF: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
 _PREFLIGHT_S: Final = 2.0
 _MOST: Final = 20  # engines of one group
 _TOLD: Final = 40  # overridden problems that are kept with a run
@@ -247,7 +249,7 @@ class Starting:
     def _simulated(self, asked: StartRequest) -> EngineFacts:
         """What is true of the simulator, as itself or playing a robot. Raises NotFound."""
         if asked.like is None:
-            return SIMULATED
+            return _ITSELF
         facts = facts_of(self._robots.registration(asked.like).profile)
         return msgspec.structs.replace(facts, simulated=True)
 

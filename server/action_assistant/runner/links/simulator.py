@@ -45,7 +45,6 @@ class SimulatorLink:
     """A simulated engine in this process. `wall` gives microseconds UTC."""
 
     simulated: Final = True
-    pauses: Final = True
 
     def __init__(self, engine: semantics.Engine, *, wall: Callable[[], int]) -> None:
         self._engine = engine
@@ -57,6 +56,11 @@ class SimulatorLink:
         self._ears = Ears[Report]()
         self._wake = anyio.Event()
         self._dead: str | None = None
+
+    @property
+    def pauses(self) -> bool:
+        """What is true of the engine that it plays."""
+        return self._engine.facts.pauses_safely
 
     @property
     def standing(self) -> Standing:

@@ -1,0 +1,97 @@
+/** What has become of starts that nobody answered: unknown until the runner tells, never sent again. */
+import { CloseButton, Loader } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { useEffect, useSyncExternalStore } from "react";
+import { Link } from "wouter";
+import { runWord } from "../api/progress";
+import { findStart, type Run, type StartFound } from "../api/runs";
+import { useLive } from "../api/use-live";
+import { robotColor } from "../ui/robot";
+import style from "./unsure-start.module.css";
+import { type SentStart, unsureStarts } from "./unsure-starts";
+
+const AGAIN = 2_000; // ms between two looks
+const PATIENCE = 5_000; // ms that one look waits
+
+/** The engines of a start that the runner has no run for. */
+export function missing(sent: SentStart, found: StartFound | undefined): string[] {
+  const there = new Set((found?.runs ?? []).map((run) => run.engine));
+  return sent.engines.filter((engine) => !there.has(engine));
+}
+
+/** What is known of those without a run, and what is not. */
+export function unknownWords(
+  sent: SentStart,
+  found: StartFound | undefined,
+  silent: boolean,
+): string | null {
+  const left = missing(sent, found);
+  if (left.length === 0) return null;
+  const head = `NOT KNOWN whether ${sent.what} started on ${left.join(", ")}.`;
+  const after = "It is looked for, and not sent again. Stop works.";
+  if (silent || found === undefined) return `${head} The runner has not answered. ${after}`;
+  if (found.under_way) return `${head} The runner is still carrying it out. ${after}`;
+  return `${head} The runner has nothing of it so far. ${after}`;
+}
+
+function Found({ run }: { run: Run }) {
+  return (
+    <p className={style.found}>
+      <i style={{ background: robotColor(run.engine) }} aria-hidden />
+      <span>
+        Started after all: <Link to={`/runs/${run.id}`}>run {run.number}</Link> on {run.engine},{" "}
+        {runWord(run).word}.
+      </span>
+    </p>
+  );
+}
+
+function Start({ sent }: { sent: SentStart }) {
+  const { live, runner, now } = useLive();
+  const look = useQuery({
+    queryKey: ["starts", sent.request],
+    queryFn: ({ signal }) => findStart(runner ?? "", sent.request, PATIENCE, signal),
+    enabled: runner !== undefined,
+    refetchInterval: ({ state }) => (missing(sent, state.data).length > 0 ? AGAIN : false),
+    retry: false,
+    staleTime: 0,
+  });
+  const found = look.data;
+  useEffect(() => {
+    for (const run of found?.runs ?? []) live?.learn(run);
+  }, [found, live]);
+  const runs = (found?.runs ?? []).map((run) => now.runs.get(run.id) ?? run);
+  const unknown = unknownWords(sent, found, look.isError || now.link === "down");
+  const told = unknown === null || (found !== undefined && !found.under_way && !look.isError);
+  return (
+    <div className={style.start} data-unknown={unknown !== null || undefined}>
+      <div>
+        {unknown !== null && <p role="alert">{unknown}</p>}
+        {runs.map((run) => (
+          <Found key={run.id} run={run} />
+        ))}
+      </div>
+      {told ? (
+        <CloseButton
+          size="sm"
+          aria-label="Hide"
+          onClick={() => unsureStarts.settle(sent.request)}
+        />
+      ) : (
+        <Loader size="xs" color="currentColor" aria-label="Looking" />
+      )}
+    </div>
+  );
+}
+
+export function UnsureStartNotice() {
+  const starts = useSyncExternalStore(unsureStarts.subscribe, unsureStarts.list);
+  if (starts.length === 0) return null;
+  return (
+    <section className={style.notice} aria-label="Starts that are not sure">
+      {starts.map((sent) => (
+        <Start key={sent.request} sent={sent} />
+      ))}
+    </section>
+  );
+}
