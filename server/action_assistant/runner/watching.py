@@ -14,6 +14,7 @@ from action_assistant.runner.events import Answered, End, Proof, Published, RunE
 from action_assistant.runner.history import Aside
 from action_assistant.runner.lateness import fresh
 from action_assistant.runner.links.port import Answer, Link, NoAnswer
+from action_assistant.runner.parts import Parts
 from action_assistant.runner.proof import NEVER_BEGAN, Rest, hash_of
 from action_assistant.runner.runs import Run, is_news
 from action_assistant.runner.sameness import difference
@@ -99,6 +100,7 @@ class Watch:
         self._start = refusals.StartLog(it.run)
         self._absent: float | None = None  # since when answers lack a start that was refused
         self._standstill = stall.Standstill()
+        self._parts = Parts()
         self._answered = False  # by a get, since the last feedback
         self._exact = exact
         self._rest = Rest(exact=exact)
@@ -204,7 +206,7 @@ class Watch:
             self._it.tell(Answered(answer.at))
         parts = [each for each in answer.graphs if each.graph.startswith(f"{name}__")]
         shown = [own, *(part for part in parts if part.run in {None, self._it.run.id})]
-        self._note(shown)
+        self._note([own, *self._parts.ours(own, shown[1:])])
         if servers == 1:
             self._conclude(shown, answer, order, asked)
         else:
