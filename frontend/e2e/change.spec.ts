@@ -1,7 +1,7 @@
 /** A running graph is changed from the page, where that is safe: the simulator says that it is. */
 
 import { expect, test } from "@playwright/test";
-import { saved, start } from "./bench";
+import { give, saved, start } from "./bench";
 import { Product } from "./product";
 
 const product = new Product();
@@ -26,6 +26,7 @@ test("what is on screen is sent to the running robot, after what becomes differe
   const before = (await newest())?.version;
   await page.getByRole("textbox", { name: "Description" }).fill("Waits for an hour");
   await page.keyboard.press("Tab");
+  await give(page, "Wait", "delay", "0.9");
   await saved(page);
   await page.getByRole("button", { name: "Send to the running robot …" }).click();
   const dialog = page.getByRole("dialog");

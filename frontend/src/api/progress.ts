@@ -4,6 +4,8 @@ import type { ActionRun, Run, Visit } from "./runs";
 export type Tone = "idle" | "run" | "true" | "false" | "error" | "stopped" | "done" | "unknown";
 
 export interface Progress {
+  /** The action's full name in the run, where it is one of a run. */
+  name?: string;
   tone: Tone;
   word: string;
   /** When the present visit began, ms; null when none goes on. */
@@ -109,8 +111,8 @@ export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progre
 export function progressByAid(run: Run | null, unsure: boolean): Map<string, Progress> {
   const found = new Map<string, Progress>();
   if (run === null) return found;
-  for (const action of Object.values(run.actions ?? {})) {
-    if (action.aid) found.set(action.aid, progressOf(action, run, unsure));
+  for (const [name, action] of Object.entries(run.actions ?? {})) {
+    if (action.aid) found.set(action.aid, { name, ...progressOf(action, run, unsure) });
   }
   return found;
 }

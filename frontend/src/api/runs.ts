@@ -97,6 +97,8 @@ export interface Run {
   group: string | null;
   /** Whether the journal has all of it. */
   recorded: boolean;
+  /** The robot whose engine the simulator plays. */
+  like?: string | null;
   actions?: Record<string, ActionRun>;
   /** The newest lines of the engine's own log. */
   log?: { at: string; text: string }[];
@@ -114,6 +116,18 @@ export interface Run {
 export function placeOf(run: Run): string {
   if (!run.simulated) return run.engine;
   return run.engine === "simulator" ? "simulator" : `${run.engine} (simulated)`;
+}
+
+/** The engine whose abilities count: the simulator has those of the robot that it plays. */
+export function playedBy(run: Run): string {
+  return run.like ?? run.engine;
+}
+
+/** The newest alarm that still holds: that nothing moves is over once something has begun. */
+export function alarmNow(run: Run): Run["alarms"][number] | undefined {
+  const begun = Object.values(run.actions ?? {}).map(({ visits }) => visits.at(-1)?.from ?? "");
+  const newest = Math.max(0, ...begun.map((at) => Date.parse(at) || 0));
+  return run.alarms.findLast(({ code, at }) => code !== "stalled" || Date.parse(at) >= newest);
 }
 
 /** A lost run has not: nobody has seen it at rest yet. */

@@ -1,13 +1,13 @@
 /** The editor of a graph with the list on its left and its runs below. */
 import { Button } from "@mantine/core";
 import { IconMapOff } from "@tabler/icons-react";
-import { type ReactNode, useEffect, useMemo, useRef } from "react";
+import { type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 import { Link } from "wouter";
 import { useVersions, versionName } from "../api/graphs";
 import { useMay, usePerson } from "../api/person";
 import { progressByAid } from "../api/progress";
 import { type Run, useLastRun } from "../api/runs";
-import { newestRun, useLive } from "../api/use-live";
+import { newestRun, openRuns, useLive } from "../api/use-live";
 import { Editor, type Shown } from "../editor/editor";
 import { useKnownActions } from "../library/known";
 import { Sidebar } from "../library/sidebar";
@@ -31,6 +31,10 @@ function unnamed(): never {
 }
 
 interface RunHere {
+  /** All that go on with this graph, on whatever robot. */
+  going: readonly Run[];
+  /** Shows another one of them, until a newer one begins. */
+  choose: (run: string) => void;
   /** What goes on, or has ended while this page was open: shown on the canvas. */
   live: Run | null;
   /** The newest run, also of last week: shown in the strip. Undefined until that is known. */
@@ -41,12 +45,23 @@ interface RunHere {
 
 function useRunHere(id: string): RunHere {
   const { now, runner } = useLive();
-  const live = newestRun(now, id);
+  const [chosen, setChosen] = useState({ run: "", before: 0 });
+  const newest = newestRun(now, id);
+  const going = openRuns(now).filter((run) => run.graph === id);
+  const wanted = chosen.before === newest?.number ? now.runs.get(chosen.run) : undefined;
+  const live = wanted ?? going[0] ?? newest;
   const last = useLastRun(runner, id).data;
   const run = live ?? last;
   const versions = useVersions(id, run?.version ?? null).data;
   const label = versionName(versions, run?.version ?? null) || run?.digest.slice(0, 7) || "";
-  return { live, run, label, unsure: now.link === "down" && live?.ended_at === null };
+  return {
+    going,
+    choose: (chosen) => setChosen({ run: chosen, before: newest?.number ?? 0 }),
+    live,
+    run,
+    label,
+    unsure: now.link === "down" && live?.ended_at === null,
+  };
 }
 
 function Inside({ id }: { id: string }) {
@@ -54,7 +69,7 @@ function Inside({ id }: { id: string }) {
   const { create, choose } = useNewGraphs();
   const { actions } = useKnownActions();
   const known = useMemo(() => actions.map((action) => action.template), [actions]);
-  const { live, run, label, unsure } = useRunHere(id);
+  const { going, choose: chooseRun, live, run, label, unsure } = useRunHere(id);
   const progress = useMemo(() => progressByAid(live, unsure), [live, unsure]);
   const mayStart = useMay("simulate");
   const gone = useLinkPart(
@@ -115,6 +130,8 @@ function Inside({ id }: { id: string }) {
       strip={(shown: Shown) => (
         <RunStrip
           run={run}
+          going={going}
+          onChoose={chooseRun}
           graph={shown.graph}
           versionLabel={label}
           selected={shown.selected}
@@ -123,7 +140,7 @@ function Inside({ id }: { id: string }) {
           onFold={shown.fold}
         />
       )}
-      corner={<LiveWord run={live} />}
+      corner={<LiveWord run={live} whose={going.length > 1} />}
     />
   );
 }

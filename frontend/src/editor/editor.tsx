@@ -188,8 +188,8 @@ export function Editor(props: Props) {
       corner={phone ? null : props.corner}
     />
   );
-  // A dry-run is told apart from runs: while it is open none of them is shown below it.
-  const strip = bench.dryRun ? null : props.strip(shown);
+  // A dry-run is told apart from runs that are over; one that goes on is never out of sight.
+  const strip = bench.dryRun && props.run === null ? null : props.strip(shown);
   const details = (
     <Details id={id} seq={link.seq} panel={panel} problems={problems} threads={threads} />
   );

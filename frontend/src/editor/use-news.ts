@@ -50,14 +50,20 @@ export function useRemoteNews(graph: Graph, begun: boolean): void {
   }, [doc, presence, begun]);
 }
 
+/** An action of a run may be in no draft any more, or the draft not here yet: it has its name then. */
+export function runNews(graph: Graph, key: Key, { name, word }: Progress): string {
+  const isDrawn = graph.actions.some((action) => action.key === key);
+  return `${isDrawn || name === undefined ? endName(graph, key) : name}: ${word}`;
+}
+
 export function useRunNews(graph: Graph, progress: ReadonlyMap<Key, Progress>): void {
   const before = useRef(progress);
   useEffect(() => {
     const old = before.current;
     before.current = progress;
     if (old === progress) return;
-    for (const [key, { word }] of progress) {
-      if (old.get(key)?.word !== word) announcer.say(`${endName(graph, key)}: ${word}`);
+    for (const [key, now] of progress) {
+      if (old.get(key)?.word !== now.word) announcer.say(runNews(graph, key, now));
     }
   }, [graph, progress]);
 }

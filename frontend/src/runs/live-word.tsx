@@ -7,8 +7,8 @@ import style from "./live-word.module.css";
 
 const OLD = 2_500; // ms; a run is looked at each second
 
-/** "proof 0.4 s ago": when the engine itself last showed this run. */
-export function Proof({ run }: { run: Run }) {
+/** "proof 0.4 s ago": when the engine itself last showed this run. `whose`: its name stands before. */
+export function Proof({ run, whose = false }: { run: Run; whose?: boolean }) {
   const seen = useSeen(run.id);
   const goes = run.ended_at === null;
   const present = useNow(500, goes);
@@ -21,17 +21,17 @@ export function Proof({ run }: { run: Run }) {
       data-old={old > OLD || undefined}
       title="When the engine itself last showed this run"
     >
-      <IconEye size={13} aria-hidden /> proof {duration(old)} ago
+      <IconEye size={13} aria-hidden /> {whose && <b>{run.engine}</b>} proof {duration(old)} ago
     </span>
   );
 }
 
-export function LiveWord({ run }: { run?: Run | null }) {
+export function LiveWord({ run, whose = false }: { run?: Run | null; whose?: boolean }) {
   const { now } = useLive();
   if (now.link === "live") {
     return (
       <span className={style.both}>
-        {run && run.ended_at === null && !run.simulated && <Proof run={run} />}
+        {run && run.ended_at === null && !run.simulated && <Proof run={run} whose={whose} />}
         <span className={style.word} data-link="live">
           <i aria-hidden /> Live
         </span>

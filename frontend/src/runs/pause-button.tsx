@@ -5,13 +5,13 @@ import { IconPlayerPause, IconPlayerPlay } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { sentence } from "../api/http";
 import { useMay } from "../api/person";
-import { type Run, steerRun } from "../api/runs";
+import { playedBy, type Run, steerRun } from "../api/runs";
 import { useLive } from "../api/use-live";
 
 export function PauseButton({ run }: { run: Run }) {
   const { runner, now } = useLive();
   const may = useMay(run.simulated ? "simulate" : "operate");
-  const engine = now.engines.find((each) => each.name === run.engine);
+  const engine = now.engines.find((each) => each.name === playedBy(run));
   const paused = run.desired === "paused";
   const steer = useMutation({
     mutationFn: () => steerRun(runner ?? "", run.id, paused ? "resume" : "pause"),

@@ -5,10 +5,11 @@ import { useMemo } from "react";
 import { Link } from "wouter";
 import { authorName } from "../api/graphs";
 import { endWords, runWord } from "../api/progress";
-import type { Run } from "../api/runs";
+import { alarmNow, type Run } from "../api/runs";
 import { useLive } from "../api/use-live";
 import type { Graph } from "../graph/model";
 import { lanesOf } from "../ui/lanes";
+import { robotColor } from "../ui/robot";
 import { StateWord } from "../ui/state-word";
 import { Timeline } from "../ui/timeline";
 import { spanWords } from "../ui/took";
@@ -20,6 +21,9 @@ import style from "./run-strip.module.css";
 interface Props {
   /** Undefined until it is known. */
   run: Run | null | undefined;
+  /** All runs of this graph that go on; where there are several, one is chosen. */
+  going: readonly Run[];
+  onChoose: (run: string) => void;
   graph: Graph;
   versionLabel: string;
   selected: string | null;
@@ -43,7 +47,47 @@ function FoldButton({ folded, onFold }: { folded: boolean; onFold: (folded: bool
   );
 }
 
-export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, onFold }: Props) {
+/** Whose run it is; where several go on, which of them is shown. */
+function Whose({ run, going, onChoose }: Pick<Props, "going" | "onChoose"> & { run: Run }) {
+  const others = going.some((each) => each.id !== run.id);
+  if (!others) return run.simulated ? null : <Robot name={run.engine} />;
+  const all = going.some((each) => each.id === run.id) ? going : [run, ...going];
+  return (
+    <fieldset className={style.whose}>
+      <legend className="visually-hidden">Runs of this graph that go on</legend>
+      {all.map((each) => (
+        <button
+          key={each.id}
+          type="button"
+          aria-pressed={each.id === run.id}
+          aria-label={`Run ${each.number} on ${each.engine}, ${runWord(each).word}`}
+          onClick={() => onChoose(each.id)}
+        >
+          <Robot name={each.engine} />
+        </button>
+      ))}
+    </fieldset>
+  );
+}
+
+function Robot({ name }: { name: string }) {
+  return (
+    <span className={style.robot}>
+      <i style={{ background: robotColor(name) }} aria-hidden /> {name}
+    </span>
+  );
+}
+
+const SHORT = 60; // characters that fit beside the rest
+
+/** What a person must know of it now, or why it ended so. */
+function toldOf(run: Run): string {
+  const alarm = alarmNow(run)?.text ?? "";
+  return run.ended_at === null ? alarm : run.detail || alarm;
+}
+
+export function RunStrip(props: Props) {
+  const { run, going, graph, versionLabel, selected, onPick, onChoose, folded, onFold } = props;
   const { now } = useLive();
   const goes = run?.ended_at === null;
   const present = useNow(250, goes);
@@ -68,7 +112,8 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, o
   const when = day(start, present);
   const started = when === "today" ? `at ${clock(start)}` : `${when} ${clock(start)}`;
   const { tone, word } = runWord(run);
-  const alarm = run.alarms.at(-1);
+  const told = toldOf(run);
+  const inLine = folded === true || told.length < SHORT;
   const unsure = down && goes;
   const silent = goes ? instant(run.unknown_since) : null;
   return (
@@ -80,6 +125,7 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, o
     >
       <header className={style.head}>
         <b>Run {run.number}</b>
+        <Whose run={run} going={going} onChoose={onChoose} />
         <span className={style.version}>{versionLabel}</span>
         <StateWord
           pill
@@ -92,14 +138,13 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, o
           {(!goes && spanWords(run.took)) || stopwatch((instant(run.ended_at) ?? until) - start)}
         </Text>
         <span className={style.gap} />
-        {alarm && <span className={style.alarm}>{alarm.text}</span>}
-        {!run.recorded && <span className={style.alarm}>not recorded</span>}
-        {run.ended_at !== null && run.detail !== "" && (
-          <Text span size="xs" truncate title={run.detail}>
-            {run.detail}
-          </Text>
+        {inLine && told !== "" && (
+          <span className={style.alarm} role={goes ? "alert" : undefined} title={told}>
+            {told}
+          </span>
         )}
         {goes && <RestButton run={run} />}
+        {!run.recorded && <span className={style.alarm}>not recorded</span>}
         {goes && <PauseButton run={run} />}
         <Button
           component={Link}
@@ -112,6 +157,11 @@ export function RunStrip({ run, graph, versionLabel, selected, onPick, folded, o
         </Button>
         {folded !== null && <FoldButton folded={folded} onFold={onFold} />}
       </header>
+      {!inLine && (
+        <p className={style.told} role={goes ? "alert" : undefined} data-alarm={goes || undefined}>
+          {told}
+        </p>
+      )}
       {folded !== true && (
         <Timeline
           run={run}

@@ -7,7 +7,7 @@ import { keys, useVersions } from "../api/graphs";
 import { sentence } from "../api/http";
 import { useMay } from "../api/person";
 import type { Robot } from "../api/robots";
-import { modifyRun, type Run } from "../api/runs";
+import { modifyRun, playedBy, type Run } from "../api/runs";
 import { useLive } from "../api/use-live";
 import type { Difference } from "../ui/canvas/meaning";
 import { HoldButton } from "../ui/hold-button";
@@ -43,11 +43,19 @@ function List({ found }: { found: readonly Difference[] }) {
   return (
     <>
       <ul className={style.list} aria-label="What becomes different">
-        {found.slice(0, MOST).map(({ kind, what }) => {
+        {found.slice(0, MOST).map(({ kind, what, details }) => {
           const Sign = SIGNS[kind];
           return (
             <li key={`${kind} ${what}`} data-kind={kind}>
-              <Sign size={14} aria-hidden /> {what} <i>{kind}</i>
+              <Sign size={14} aria-hidden />
+              <span>
+                {what} <i>{kind}</i>
+                {details.map((detail) => (
+                  <span key={detail} className={style.detail}>
+                    {detail}
+                  </span>
+                ))}
+              </span>
             </li>
           );
         })}
@@ -65,7 +73,7 @@ export function SendChange({ run, label, found, seq, settle, obstacle }: Props) 
   const versions = useVersions(run.graph ?? "").data ?? [];
   const why = whyNot(
     run,
-    now.engines.find((each) => each.name === run.engine),
+    now.engines.find((each) => each.name === playedBy(run)),
     now.link === "down" ? "The runner does not answer" : obstacle,
   );
   const where = run.simulated ? "the simulator" : run.engine;

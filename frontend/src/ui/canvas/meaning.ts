@@ -1,5 +1,6 @@
 /** What a graph says, apart from how it is drawn: equal texts for equal tasks. */
 import {
+  type Action,
   ENTRY,
   EXIT,
   fullName,
@@ -8,6 +9,7 @@ import {
   type Parameter,
   PRECONDITIONS,
 } from "../../graph/model";
+import { pathWords, valueText } from "./value-text";
 
 function value(text: string): unknown {
   try {
@@ -73,6 +75,8 @@ export function meaning(graph: Graph): string {
 export interface Difference {
   readonly kind: "added" | "removed" | "changed";
   readonly what: string;
+  /** What of it changes, from what to what: "delay: 0.5 → 0.9". */
+  readonly details: readonly string[];
 }
 
 /** What another graph does otherwise, thing by thing; how it is drawn is no difference. */
@@ -81,14 +85,78 @@ export function differences(before: Graph, after: Graph): Difference[] {
   const ends = (name: string) => (name === ">" ? "Start" : name === "<" ? "End" : name);
   const head =
     before.name !== after.name || before.description !== after.description
-      ? [{ kind: "changed", what: "Name or description of the graph" } as const]
+      ? [{ kind: "changed", what: "Name or description of the graph", details: [] } as const]
       : [];
+  const arrow = ([parent, child]: Said) => `Arrow ${ends(parent)} → ${ends(String(child))}`;
   return [
     ...head,
-    ...compared(old.actions, now.actions, ([name]) => `Action ${name}`),
-    ...compared(old.arrows, now.arrows, ([parent, child]) => {
-      return `Arrow ${ends(parent)} → ${ends(String(child))}`;
-    }),
+    ...compared(
+      old.actions,
+      now.actions,
+      ([name]) => `Action ${name}`,
+      (name) => {
+        const found = (graph: Graph) => graph.actions.find((each) => fullName(each) === name);
+        return inAction(found(before), found(after));
+      },
+    ),
+    ...compared(old.arrows, now.arrows, arrow, (_, was, is) => inArrow(was, is)),
+  ];
+}
+
+const LONGEST = 60; // characters of a value
+
+function short(text: string): string {
+  return text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text;
+}
+
+function becomes(what: string, was: string, is: string): string[] {
+  return was === is ? [] : [`${what}: ${short(was)} → ${short(is)}`];
+}
+
+/** What of an action is not as it was. */
+function inAction(was: Action | undefined, is: Action | undefined): string[] {
+  if (was === undefined || is === undefined) return [];
+  return [
+    ...becomes("type", was.type, is.type),
+    ...becomes("robot", was.actor || "any", is.actor || "any"),
+    ...inParameters(was.inputs, is.inputs),
+    ...inParameters(was.outputs, is.outputs, "output "),
+    ...(was.description === is.description ? [] : ["its description"]),
+  ];
+}
+
+function inParameters(was: readonly Parameter[], is: readonly Parameter[], side = ""): string[] {
+  const said = (list: readonly Parameter[]) => new Map(list.map((each) => [each.path, each]));
+  const [old, now] = [said(was), said(is)];
+  return [...new Set([...old.keys(), ...now.keys()])].flatMap((path) => {
+    const what = `${side}${pathWords(path)}`;
+    const [before, after] = [old.get(path), now.get(path)];
+    if (before === undefined || after === undefined) {
+      return [`${what} ${before === undefined ? "is new" : "is gone"}`];
+    }
+    if (
+      JSON.stringify(ordered(value(before.text))) === JSON.stringify(ordered(value(after.text)))
+    ) {
+      return [];
+    }
+    const values = [before, after].map((each) => valueText(each) ?? "no value");
+    const changed = becomes(what, values[0] ?? "", values[1] ?? "");
+    return changed.length > 0 ? changed : [`${what}: what is said of it`];
+  });
+}
+
+/** What of an arrow is not as it was: responses, whether it is waited for, what it renames. */
+function inArrow(was: Said, is: Said): string[] {
+  const responses = (said: Said) => said[2] as readonly string[];
+  const answers = PRECONDITIONS.flatMap((outcome, i) =>
+    becomes(outcome.replace("_", " "), responses(was)[i] ?? "", responses(is)[i] ?? ""),
+  );
+  const waited = (said: Said) => (said[3] ? "yes" : "no");
+  const renamed = (said: Said) => (said[4] as readonly string[]).join(", ") || "nothing";
+  return [
+    ...answers,
+    ...becomes("is waited for", waited(was), waited(is)),
+    ...becomes("renames", renamed(was), renamed(is)),
   ];
 }
 
@@ -96,16 +164,20 @@ function compared(
   before: readonly Said[],
   after: readonly Said[],
   named: (said: Said) => string,
+  detailed: (name: string, was: Said, is: Said) => string[],
 ): Difference[] {
-  const texts = (list: readonly Said[]) =>
-    new Map(list.map((item) => [named(item), JSON.stringify(item)]));
-  const [old, now] = [texts(before), texts(after)];
+  const byName = (list: readonly Said[]) => new Map(list.map((item) => [named(item), item]));
+  const [old, now] = [byName(before), byName(after)];
   const found: Difference[] = [];
-  for (const [what, text] of now) {
+  for (const [what, is] of now) {
     const was = old.get(what);
-    if (was === undefined) found.push({ kind: "added", what });
-    else if (was !== text) found.push({ kind: "changed", what });
+    if (was === undefined) found.push({ kind: "added", what, details: [] });
+    else if (JSON.stringify(was) !== JSON.stringify(is)) {
+      found.push({ kind: "changed", what, details: detailed(is[0], was, is) });
+    }
   }
-  for (const what of old.keys()) if (!now.has(what)) found.push({ kind: "removed", what });
+  for (const what of old.keys()) {
+    if (!now.has(what)) found.push({ kind: "removed", what, details: [] });
+  }
   return found;
 }

@@ -1,0 +1,27 @@
+import { expect, test } from "vitest";
+import type { Progress } from "../api/progress";
+import { progressByAid } from "../api/progress";
+import type { Run } from "../api/runs";
+import { fromUmrf } from "../ui/canvas/from-umrf";
+import { runNews } from "./use-news";
+
+const graph = fromUmrf({
+  graph_name: "g",
+  graph_entry: [{ name: "Wait" }],
+  graph_exit: [{ name: "Wait" }],
+  actions: [{ name: "Wait", instance_id: 0, type: "sync" }],
+});
+const empty = fromUmrf({ graph_name: "g", graph_entry: [], graph_exit: [], actions: [] });
+const [wait] = graph.actions;
+
+test("an action of a run that is not drawn, or not yet, is called by its own name", () => {
+  const run = {
+    state: "running",
+    ended_at: null,
+    actions: { Wait_0: { aid: "gone", state: "FINISHED", visits: [], older: 0, messages: [] } },
+  } as unknown as Run;
+  const progress = progressByAid(run, false).get("gone") as Progress;
+  expect(runNews(graph, "gone", progress)).toBe("Wait_0: finished");
+  expect(runNews(empty, "gone", progress)).toBe("Wait_0: finished");
+  expect(runNews(graph, wait?.key ?? "", progress)).toBe("Wait: finished");
+});
