@@ -1,0 +1,56 @@
+"""A start that an engine refuses, over real rclpy: its words arrive, and the run is over."""
+
+import time
+
+import anyio
+import msgspec
+import pytest
+
+pytest.importorskip(
+    "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
+)
+
+from action_assistant.runner.control import Control
+from action_assistant.runner.events import Override
+from action_assistant.runner.links import ros2_reach
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.robots import Robots
+from ros.robots import robot
+from runner.world import ANN, MemoryLedger, at_once, order, sequence
+
+
+def wall() -> int:
+    return time.time_ns() // 1000
+
+
+async def refused(domain: int) -> MemoryLedger:
+    reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(domain)})
+    assert not isinstance(reach, str), reach
+    ledger, robots = MemoryLedger(), Robots(reach=reach)
+    graph = sequence()
+    carols = msgspec.structs.replace(graph.actions[0], actor="Carol")
+    graph = msgspec.structs.replace(graph, actions=(carols, *graph.actions[1:]))
+    override = Override(codes=("actors", "others", "actions"), reason="it is a test")
+    try:
+        async with Control.opened(ledger, robots, wall=wall, aside=at_once) as control:
+            await robots.register(Registration(name="David", domain=domain), ANN)
+            with anyio.fail_after(30):
+                while robots.robot("David").state != "answering":  # noqa: ASYNC110
+                    await anyio.sleep(0.05)
+                await control.start(order(graph, engine="David", override=override), ANN)
+                while control.open:  # noqa: ASYNC110
+                    await anyio.sleep(0.05)
+    finally:
+        with anyio.CancelScope(shield=True):
+            await reach.aclose()
+    return ledger
+
+
+def test_the_words_of_a_refusal_reach_the_run_and_end_it(domain: int) -> None:
+    with robot(domain):
+        ledger = anyio.run(refused, domain)
+    (stream,) = [each for each in ledger.streams if each.startswith("run/")]
+    run = ledger.history(stream.removeprefix("run/"))
+    assert run.end == "refused"
+    assert "actor synchronizer not initialized" in run.detail
+    assert [each.code for each in run.alarms] == ["start_refused"]
