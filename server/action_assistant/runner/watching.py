@@ -288,7 +288,7 @@ class Watch:
             end = self._it.run.apparent_end
             if end is not None and own.state in TERMINAL and at_rest:
                 self._it.end(end, "")
-            elif at_rest and _never_began(own):
+            elif at_rest and _never_began(own) and not self._has_begun():
                 self._it.end("refused", self._why_unbegun())
             else:
                 self._look_for_trouble(shown, asked)
@@ -307,6 +307,10 @@ class Watch:
             )
         else:
             self.trouble = f"{', '.join(self._it.run.active) or own.graph} has not stopped yet"
+
+    def _has_begun(self) -> bool:
+        """Whether it was ever seen otherwise: somebody may have played its start again."""
+        return any(action.visits for action in self._it.run.actions.values())
 
     def _why_unbegun(self) -> str:
         """An engine calls a graph running before the first answer after its start. One that it holds
