@@ -152,6 +152,39 @@ test("a start that the robot holds and never begins is refused, with the reason,
   await stopAll(page);
 });
 
+test("the answer to a start on two robots gets lost: both runs are found, and nothing is sent again", async () => {
+  const { page } = ada;
+  const sent: string[] = [];
+  await page.route(`${product.runnerUrl}/api/groups`, async (route) => {
+    sent.push(route.request().postData() ?? "");
+    await route.fetch();
+    await route.abort("connectionreset");
+  });
+  await page.goto(`${product.url}/graphs/${await product.chain(3)}`);
+  await saved(page);
+  await page.getByRole("button", { name: "Choose where to start" }).click();
+  for (const robot of ["David", "Eve"]) {
+    const box = page.getByRole("checkbox", { name: new RegExp(`^${robot}`) });
+    if (!(await box.isChecked())) await box.check();
+  }
+  const hold = page.getByRole("button", { name: /^Start v\d+ on David, Eve/ });
+  await expect(hold).toBeEnabled({ timeout: 15_000 });
+  await hold.focus();
+  await page.keyboard.down("Enter");
+  await expect(page.getByRole("dialog")).toBeHidden();
+  await page.keyboard.up("Enter");
+  const notice = page.getByRole("region", { name: "Starts that are not sure" });
+  for (const robot of ["David", "Eve"]) {
+    await expect(notice).toContainText(new RegExp(`Started after all: run \\d+ on ${robot}`));
+  }
+  await page.screenshot({ path: test.info().outputPath("unsure-group.png") });
+  expect(sent).toHaveLength(1);
+  await expect(page.getByText("Not started")).toHaveCount(0);
+  await page.unrouteAll();
+  await stopAll(page);
+  await notice.getByRole("button", { name: "Hide" }).click();
+});
+
 test("a dry-run does not hide a run that goes on", async () => {
   const { page } = ada;
   const graph = await product.chain(4);

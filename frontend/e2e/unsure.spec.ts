@@ -98,6 +98,7 @@ test("it never arrives: that is not known, and so it is said, for as long as it 
   await expect(notice(page)).toContainText("NOT KNOWN whether v1 of chain_60 started");
   await expect(notice(page)).toContainText("has nothing of it so far");
   await expect(notice(page)).toContainText("not sent again");
+  await page.screenshot({ path: test.info().outputPath("unsure.png") });
   expect(sent).toHaveLength(1);
   expect(await runs()).toHaveLength(before);
   await page.unrouteAll();

@@ -40,7 +40,7 @@ KNOWN = (3378,)
 FIRST = int(os.environ.get("TEST_HISTORIES_FROM", "0"))
 NAME = "David"
 #: Ends that say that nothing moves any more.
-STILL: frozenset[State] = ENDED - {"lost", "refused"}
+STILL: frozenset[State] = ENDED - {"lost"}
 
 GRAPHS: dict[str, Graph] = {
     "one": sequence("one"),

@@ -175,6 +175,25 @@ async def test_the_words_of_a_refusal_outlive_the_runner() -> None:
     assert "Could not resolve" in scene.world.ledger.history(run.id).detail
 
 
+@virtual
+async def test_words_that_somebody_else_may_have_caused_end_nothing_after_a_restart_either() -> None:
+    scene = Knowing(10)
+    text = codec.write(sequence("other"))
+    async with scene.played() as control:
+        run = (await control.start(asked(), ANN)).run
+        scene.air.loss = {"get": 1.0}
+        await anyio.sleep(0.5)
+        scene.air.carry(Start(graph_name="other", targets=("David",), graph_json=text), "cli")
+        await anyio.sleep(5)
+        codes = [each.code for each in control.open[run.id].run.alarms]
+        assert codes == ["start_refused", "foreign_other"]
+    scene.air.loss = {}
+    for _ in range(2):
+        async with scene.played() as control:
+            await anyio.sleep(15)
+            assert control.open[run.id].run.state == "unknown"
+
+
 # --- the lines themselves -----------------------------------------------------------------------------
 
 

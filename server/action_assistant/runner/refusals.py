@@ -15,6 +15,7 @@ REFUSED: Final = "start_refused"
 #: The alarm of an engine that refused a start and yet shows some of it going on.
 HALF_BEGUN: Final = "half_begun"
 
+_STARTED_BY_OTHERS: Final = frozenset({"foreign_start", "foreign_other"})
 _START: Final = "Received request to start UMRF graph: "
 _RECEIVED: Final = "Received request to "
 _ANOTHER_LIFE: Final = "The Action Engine is initialized."
@@ -38,7 +39,8 @@ class StartLog:
         self._next = False  # the next line tells what became of it
         told = next((each for each in run.alarms if each.code == REFUSED), None)
         self._over = run.graph_state is not None or told is not None
-        self.words = "" if told is None else _between_quotes(told.text)
+        others = any(each.code in _STARTED_BY_OTHERS for each in run.alarms)
+        self.words = "" if told is None or others else _between_quotes(told.text)
 
     def hear(self, text: str) -> bool:
         """One more line. Whether it says that the start was refused."""
