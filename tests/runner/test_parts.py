@@ -1,5 +1,7 @@
 """Sub-graphs carry no mark and stay in the engine after their run: which of them are a run's own."""
 
+from typing import Any
+
 import anyio
 import msgspec
 import pytest
@@ -25,11 +27,15 @@ SCRIPT = {"Work_0": [{"after_s": 4}], "*": [{"after_s": 1}]}
 class WithSub(Scene):
     """Robots whose engines have indexed a graph called Sub."""
 
+    def __init__(self, seed: int, *, script: dict[str, Any], sub: Graph = SUB) -> None:
+        self.sub = sub
+        super().__init__(seed, script=script)
+
     def robot(self, name: str) -> Node:
         """An engine comes up."""
         stand_in = StandIn(
             name,
-            index=index_of([], [codec.write(SUB)]),
+            index=index_of([], [codec.write(self.sub)]),
             script=script_from({"behaviours": self.script}),
             quirks=self.quirks,
             facts=FACTS,

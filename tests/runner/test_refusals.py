@@ -176,7 +176,9 @@ async def test_the_words_of_a_refusal_outlive_the_runner() -> None:
 
 
 @virtual
-async def test_words_that_somebody_else_may_have_caused_end_nothing_after_a_restart_either() -> None:
+async def test_words_that_somebody_else_may_have_caused_end_nothing_after_a_restart_either() -> (
+    None
+):
     scene = Knowing(10)
     text = codec.write(sequence("other"))
     async with scene.played() as control:

@@ -14,9 +14,10 @@ from action_assistant.runner.review.cause_words import words
 from action_assistant.runner.runs import Run
 from action_assistant.umrf.model import ENTRY, Conditions, Graph, Parameter, Relation
 from runner.scene import Scene
+from runner.test_parts import WithSub, named
 from runner.world import ANN, BEN, GO_ON, ended, order, sequence, two_ends, virtual
 
-CODES = ("quiet", "others", "actions", "actors", "H2b", "H7", "H8", "H12")
+CODES = ("quiet", "others", "actions", "actors", "H2b", "H5", "H7", "unknown-action", "H8", "H12")
 QUICK: dict[str, Any] = {"*": [{"after_s": 0.5}]}
 
 
@@ -55,6 +56,8 @@ LACKS = with_input(sequence("patrol", 2), 1)
 JOIN = join()
 IDLE = answering(sequence("patrol", 2), 0, 1, Conditions(on_true="stop", on_false="stop"))
 MAYBE = answering(sequence("patrol", 2), 0, 1, Conditions(on_true="run", on_false="stop"))
+#: Its first action leads nowhere.
+HALTS = answering(sequence("Sub", 2), 0, 1, Conditions())
 
 
 async def stalled(control: Control, graph: Graph, seconds: float = 25.0) -> str:
@@ -139,6 +142,25 @@ async def test_a_runner_that_takes_the_run_up_again_can_say_it_too() -> None:
         await anyio.sleep(15)
         (alarm,) = control.open[run].run.alarms
     assert "“speed”" in alarm.text
+
+
+@virtual
+async def test_a_sub_graph_in_which_nothing_moves_is_named_and_stays_the_cause_after_a_stop() -> (
+    None
+):
+    """A halted sub-graph is never told to its parent, which then runs for ever (SPEC 2.6)."""
+    scene = WithSub(7, script=QUICK, sub=HALTS)
+    graph = named("Sub")
+    async with scene.played() as control:
+        run = await stalled(control, graph, 40)
+        (alarm,) = control.open[run].run.alarms
+        told = "Sub_0 waits for its sub-graph, in which nothing moves"
+        assert f"{told}: it is HALTED." in alarm.text
+        await control.stop(run, BEN)
+        assert await ended(control, run) == "stopped"
+    found = scene.world.ledger.history(run)
+    first, *_ = causes(found, graph)
+    assert (first.action, words(first, found)) == ("Sub_0", f"{told}.")
 
 
 def test_an_entry_that_lacks_a_value_is_named_before_anything_ran() -> None:

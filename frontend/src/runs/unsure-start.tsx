@@ -4,6 +4,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useEffect, useSyncExternalStore } from "react";
 import { Link } from "wouter";
 import { runWord } from "../api/progress";
+import { SIMULATOR } from "../api/robots";
 import { findStart, type Run, type StartFound } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { robotColor } from "../ui/robot";
@@ -27,7 +28,8 @@ export function unknownWords(
 ): string | null {
   const left = missing(sent, found);
   if (left.length === 0) return null;
-  const head = `NOT KNOWN whether ${sent.what} started on ${left.join(", ")}.`;
+  const where = left.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
+  const head = `NOT KNOWN whether ${sent.what} started on ${where.join(", ")}.`;
   const after = "It is looked for, and not sent again. Stop works.";
   if (silent || found === undefined) return `${head} The runner has not answered. ${after}`;
   if (found.under_way) return `${head} The runner is still carrying it out. ${after}`;
@@ -39,8 +41,8 @@ function Found({ run }: { run: Run }) {
     <p className={style.found}>
       <i style={{ background: robotColor(run.engine) }} aria-hidden />
       <span>
-        Started after all: <Link to={`/runs/${run.id}`}>run {run.number}</Link> on {run.engine},{" "}
-        {runWord(run).word}.
+        Started after all: <Link to={`/runs/${run.id}`}>run {run.number}</Link> on{" "}
+        {run.simulated ? "the simulator" : run.engine}, {runWord(run).word}.
       </span>
     </p>
   );

@@ -66,7 +66,7 @@ class ForOutcome(msgspec.Struct, frozen=True, tag="outcome", tag_field="for"):
 
 
 class ForPart(msgspec.Struct, frozen=True, tag="part", tag_field="for"):
-    """`action` is a sub-graph in which nothing moves; it is in this state."""
+    """`action` is a sub-graph in which nothing moves; it is in this state, "" for what has been."""
 
     action: str
     state: str
@@ -124,10 +124,11 @@ def unbegun(graph: Graph) -> tuple[ForInput, ...]:
     )
 
 
-def waits(run: Run, graph: Graph) -> tuple[Wait, ...]:
+def waits(run: Run, graph: Graph, moment: int | None = None) -> tuple[Wait, ...]:
     """What the actions of a graph in which nothing moves wait for, as far as what was seen says it.
-    Those that nothing has reached yet are left out: they wait for one that is named."""
-    it = _Stalled(run, graph)
+    Those that nothing has reached yet are left out: they wait for one that is named. `moment`: what
+    they waited for then, microseconds UTC; nothing may have begun since."""
+    it = _Stalled(run, graph, moment)
     found: list[Wait] = [*it.parts()]
     for action in graph.actions:
         if not action.missing and not it.moves(action.full_name):
@@ -137,19 +138,24 @@ def waits(run: Run, graph: Graph) -> tuple[Wait, ...]:
 
 
 class _Stalled:
-    def __init__(self, run: Run, graph: Graph) -> None:
+    def __init__(self, run: Run, graph: Graph, moment: int | None) -> None:
         self._run = run
+        self._moment = moment
         self._graph = graph
         self._actions = {each.key: each for each in graph.actions if not each.missing}
 
     def moves(self, name: str) -> bool:
-        return self._seen(name).state in ACTIVE
+        if self._moment is None:
+            return self._seen(name).state in ACTIVE
+        visits = self._seen(name).visits
+        ended = (visits[-1].not_after or visits[-1].until) if visits else self._moment
+        return ended is None or ended > self._moment
 
     def parts(self) -> Iterator[ForPart]:
         for name in self._run.actions:
             part = self._run.parts.get(_part(self._run.graph_name, name))
             if part is not None and self.moves(name):
-                yield ForPart(name, part)
+                yield ForPart(name, part if self._moment is None else "")
 
     def waits_of(self, action: Action | None) -> list[Wait]:
         key = EXIT if action is None else action.key
@@ -183,7 +189,7 @@ class _Stalled:
         if key not in self._actions:
             return False
         visits = self._seen(self._name(key)).visits
-        return bool(visits) and visits[-1].until is not None
+        return bool(visits) and visits[-1].until is not None and not self.moves(self._name(key))
 
     def _answers(self, arrow: Relation) -> set[Response]:
         """What the arrow may have said, by all that its parent may have ended with."""
@@ -280,7 +286,8 @@ def in_words(wait: Wait) -> str:
                 f"{response}, and the engine does not tell results."
             )
         case ForPart(state=state):
-            return f"{who} waits for its sub-graph, in which nothing moves: it is {state}."
+            what = f": it is {state}." if state else "."
+            return f"{who} waits for its sub-graph, in which nothing moves{what}"
         case _:
             assert_never(wait)
 

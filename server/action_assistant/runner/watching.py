@@ -317,9 +317,7 @@ class Watch:
         and does not call so was not begun, and only another start would begin it."""
         engine, words = self._it.run.engine, self._start.words
         if words:
-            return (
-                f"{engine} refused the start: {words}. It holds the graph, and begins none of it."
-            )
+            return f"{refusals.why_refused(engine, words)} It has begun none of it."
         lacking = stall.unbegun(self.graph) if self.graph is not None else ()
         why = " ".join(stall.in_words(each) for each in lacking[:_LACKING])
         return f"{engine} holds the graph and has not begun it, without a word why. {why}".rstrip()

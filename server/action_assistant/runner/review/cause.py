@@ -260,7 +260,7 @@ def _stalls(run: Run, graph: Graph | None) -> Iterator[Stalled]:
     visits = (visit for action in run.actions.values() for visit in action.visits)
     if alarm is None or any(visit.start > alarm.at for visit in visits):
         return
-    found = stall.waits(run, graph) if graph is not None else ()
+    found = stall.waits(run, graph, alarm.at) if graph is not None else ()
     for wait in found:
         yield Stalled(at=alarm.at, action=wait.action, quote=stall.in_words(wait))
     if not found:
