@@ -140,8 +140,7 @@ function Found({ found }: { found: Statistics }) {
           <h3>Success</h3>
           <p className={style.big}>{rate === null ? "—" : `${rate} %`}</p>
           <p className={style.quiet}>
-            {found.judged > 0 &&
-              `${found.succeeded} of ${found.judged} runs finished true. `}
+            {found.judged > 0 && `${found.succeeded} of ${found.judged} runs finished true. `}
             {found.unknown > 0 &&
               `Of ${found.unknown} that finished the result is not known, since robots do not tell it; they are not counted. `}
             Stopped, refused and lost ones say nothing about the graph and are not counted.
