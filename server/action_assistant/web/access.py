@@ -5,7 +5,6 @@ import getpass
 import logging
 import re
 from collections.abc import Callable
-from http.cookies import CookieError, SimpleCookie
 from typing import Any, Final, NamedTuple
 
 import anyio
@@ -22,6 +21,7 @@ from action_assistant.errors import (
     WrongHost,
     WrongOrigin,
 )
+from action_assistant.web import cookies
 from action_assistant.web.addresses import Addresses
 from action_assistant.web.keys import Keys, Person, Session
 from action_assistant.web.problems import problem_of
@@ -235,11 +235,10 @@ class Access:
             raise state["ended"]
 
     def _session(self, headers: dict[str, str]) -> Session | None:
-        try:
-            morsel = SimpleCookie(headers.get("cookie", "")).get(self._cookie)
-        except CookieError:
-            return None
-        return self._keys.session(morsel.value) if morsel else None
+        """The first one that lasts of those whose seal is ours, else the first of these."""
+        tried = map(self._keys.session, cookies.values(headers.get("cookie", ""), self._cookie))
+        genuine = [each for each in tried if each is not None]
+        return next((each for each in genuine if not each.expired), genuine[0] if genuine else None)
 
     def _dressed(self, headers: dict[str, str], send: Send) -> Send:
         """Add the headers that every answer carries, also refusals."""
