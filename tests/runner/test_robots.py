@@ -354,10 +354,10 @@ def test_a_change_that_was_not_made_leaves_the_version_that_runs(why: Exception)
 
 @virtual
 async def test_a_change_that_was_read_while_the_run_was_stopped_is_not_sent() -> None:
-    async def slowly(work: Callable[[], Any]) -> Any:
+    async def slowly(work: Callable[..., Any], *args: Any) -> Any:
         """A large graph."""
         await anyio.sleep(1)
-        return work()
+        return work(*args)
 
     world = World()
     async with Control.opened(world.ledger, Robots(), wall=wall, aside=slowly) as control:

@@ -108,9 +108,9 @@ def wall() -> int:
     return EPOCH + round(asyncio.get_running_loop().time() * 1e6)
 
 
-async def at_once(work: Callable[[], Any]) -> Any:
+async def at_once(work: Callable[..., Any], *args: Any) -> Any:
     """Threads know nothing of virtual time."""
-    return work()
+    return work(*args)
 
 
 class MemoryLedger:

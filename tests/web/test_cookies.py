@@ -28,7 +28,11 @@ def ours(port: int, name: str = "Ada", expires: float = 1e12) -> bytes:
 
 def asked(port: int, *cookies: bytes, method: bytes = b"GET", path: bytes = b"/api/me") -> bytes:
     """The answer to a request with these Cookie lines, byte by byte as given."""
-    lines = [method + b" " + path + b" HTTP/1.1", b"host: localhost:%d" % port, b"connection: close"]
+    lines = [
+        method + b" " + path + b" HTTP/1.1",
+        b"host: localhost:%d" % port,
+        b"connection: close",
+    ]
     lines += [b"origin: http://localhost:%d" % port, b"content-length: 0"]
     lines += [b"cookie: " + each for each in cookies]
     with socket.create_connection(("127.0.0.1", port), timeout=10) as wire:

@@ -2,23 +2,23 @@
 
 import asyncio
 import contextlib
-import hashlib
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from functools import partial
 from typing import Any, Final, TypeVar
 
 import msgspec
-from sqlalchemy import Connection, Row, Select, delete, func, insert, select
+from sqlalchemy import Connection, delete, insert, select
 
 from action_assistant.errors import Conflict, Unavailable
-from action_assistant.journal.chain import NOTHING, Damage, Head, Inspector
+from action_assistant.journal.chain import Damage, Head, Inspector
 from action_assistant.journal.database import Branch, Database, Session, cause_of, database_of
-from action_assistant.journal.events import Addition, Draft, Event, Fold, Snapshot
+from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.follower import Follower
 from action_assistant.journal.migrate import BRANCHES
+from action_assistant.journal.reader import Reader, body_of, following, seal_of
 from action_assistant.journal.removal import STREAM, Removed, delete_some
-from action_assistant.journal.tables import LOG, editor_event, editor_head, editor_snapshot
+from action_assistant.journal.tables import LOG, editor_head, editor_snapshot
 from action_assistant.journal.writer import Job, Outcome, Pen, Writer
 
 T = TypeVar("T")
@@ -26,11 +26,10 @@ T = TypeVar("T")
 _PAGE: Final = 500  # events that a follower reads at once
 
 # The tables of the log are the same for both branches.
-_event, _head, _snapshot = editor_event.c, editor_head.c, editor_snapshot.c
-_EVENTS: Final = select(*(_event[name] for name in Event.__struct_fields__))
+_head, _snapshot = editor_head.c, editor_snapshot.c
 
 
-class Journal:
+class Journal(Reader):
     """The log of one process. The only writer of its database; readers never wait for it."""
 
     def __init__(self, database: Database, session: Session, branch: Branch, fold: Fold) -> None:
@@ -82,66 +81,20 @@ class Journal:
         """Add events to several streams at once, all or none; the newest seq of each."""
         return await self._write(lambda pen: [pen.add(addition) for addition in additions])
 
-    async def read(
-        self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
-    ) -> list[Event]:
-        """The events of a stream with `after < seq <= upto`, in order."""
-        chosen = _EVENTS.where(_event.stream == stream, _event.seq > after)
-        if upto is not None:
-            chosen = chosen.where(_event.seq <= upto)
-        return await self._events(chosen.order_by(_event.seq).limit(limit))
-
-    async def read_all(self, *, after: int = 0, limit: int = _PAGE) -> list[Event]:
-        """The events of all streams with `position > after`, in order."""
-        return await self._events(_after(after, limit))
-
-    async def newest(self, stream: str) -> int:
-        """The seq of a stream's last event; 0 when there is none."""
-        return await self._number(select(_head.seq).where(_head.stream == stream))
-
-    async def position(self) -> int:
-        """The position of the last event of all."""
-        return await self._number(select(func.max(_event.position)))
-
-    async def query(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Ask the tables."""
-        return await self._ask(lambda connection: list(connection.execute(statement).all()))
-
     def follow(self) -> AbstractAsyncContextManager[AsyncIterator[Event]]:
         """What is committed from now on, in order. Memory is bounded: who is slow reads later."""
         return self._following()
-
-    async def snapshot(self, stream: str) -> Snapshot | None:
-        """The cached sum of a stream; None when there is none, or when it does not fit the log."""
-        chosen = select(_snapshot.seq, _snapshot.proof, _snapshot.state).where(
-            _snapshot.stream == stream
-        )
-
-        def find(connection: Connection) -> Snapshot | None:
-            row = connection.execute(chosen).first()
-            if row is None:
-                return None
-            proof = _proof(_body(connection, stream, row.seq), row.state)
-            return Snapshot(stream, row.seq, row.state) if proof == row.proof else None
-
-        return await self._ask(find)
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
         """Cache what a stream adds up to at `seq`. Raises Unavailable."""
 
         def keep(pen: Pen) -> None:
-            proof = _proof(_body(pen.connection, stream, seq), state)
-            row = {"stream": stream, "seq": seq, "proof": proof, "state": state}
+            seal = seal_of(body_of(pen.connection, stream, seq), state)
+            row = {"stream": stream, "seq": seq, "proof": seal, "state": state}
             pen.connection.execute(delete(editor_snapshot).where(_snapshot.stream == stream))
             pen.connection.execute(insert(editor_snapshot).values(row))
 
         await self._write(keep)
-
-    async def end(self, stream: str) -> Head:
-        """The last event of a stream, and the chain up to it."""
-        chosen = select(_head.seq, _head.chain).where(_head.stream == stream)
-        row = await self._ask(lambda connection: connection.execute(chosen).first())
-        return Head(*row) if row is not None else NOTHING
 
     async def take_out(self, removed: Removed, also: Callable[[int], Addition]) -> int:
         """Say in the log that a stream is kept elsewhere from now on; the number of that, by which
@@ -171,7 +124,7 @@ class Journal:
             for table in reversed(folds):
                 pen.connection.execute(table.delete())
             done = position = 0
-            while rows := pen.connection.execute(_after(position, _PAGE)).all():
+            while rows := pen.connection.execute(following(position, _PAGE)).all():
                 for row in rows:
                     for statement in pen.fold(Event(*row)):
                         pen.connection.execute(statement)
@@ -260,13 +213,6 @@ class Journal:
         except self._database.faults as error:
             raise Unavailable(f"The journal cannot be read: {cause_of(error)}.") from error
 
-    async def _events(self, chosen: Select[Any]) -> list[Event]:
-        return await self._ask(lambda c: [Event(*row) for row in c.execute(chosen)])
-
-    async def _number(self, chosen: Select[Any]) -> int:
-        found: int | None = await self._ask(lambda c: c.execute(chosen).scalar())
-        return found or 0
-
     @contextlib.asynccontextmanager
     async def _following(self) -> AsyncIterator[AsyncIterator[Event]]:
         follower = Follower()
@@ -297,17 +243,3 @@ def _taken_out(event: Event) -> tuple[str, Head] | None:
         return None
     removed = msgspec.json.decode(event.body, type=Removed)
     return removed.stream, removed.end
-
-
-def _after(position: int, limit: int) -> Select[Any]:
-    return _EVENTS.where(_event.position > position).order_by(_event.position).limit(limit)
-
-
-def _body(connection: Connection, stream: str, seq: int) -> bytes:
-    chosen = select(_event.body).where(_event.stream == stream, _event.seq == seq)
-    return connection.execute(chosen).scalar() or b""
-
-
-def _proof(body: bytes, state: bytes) -> bytes:
-    """Ties a snapshot to its own bytes and to the event it was made at."""
-    return hashlib.sha256(hashlib.sha256(body).digest() + state).digest()

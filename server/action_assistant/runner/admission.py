@@ -12,6 +12,7 @@ from action_assistant.umrf import codec
 from action_assistant.umrf.check import STRUCTURAL, blocking, check
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.laps import Laps, laps
 from action_assistant.umrf.model import Graph, Problem
 from action_assistant.umrf.semantics import Script, script_from
 
@@ -26,6 +27,7 @@ _PLAIN_NAME: Final = re.compile(r"[^%\x00-\x1f\x7f\u2028\u2029]{1,200}")
 #: No simulated action is quicker: a loop of instant actions would never let go of the processor.
 _QUICKEST_S: Final = 0.01
 _SHOWN: Final = 20  # problems in an answer
+_KEPT: Final = 40  # problems of a kind that somebody could be shown
 
 
 class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -55,6 +57,22 @@ class Admitted(msgspec.Struct, frozen=True, kw_only=True):
     script: Script
     script_text: str
     digest: str
+    problems: tuple[Problem, ...] = ()
+
+
+class Prepared(msgspec.Struct, frozen=True, kw_only=True):
+    """An admitted start without its graph, which only workers read: its name, the aid of each action
+    by full name, and the text that will be sent, with the identity of the run in it. `problems`: as
+    many as anybody is shown."""
+
+    run: str
+    name: str
+    actions: dict[str, str]
+    umrf: str
+    graph_id: str | None
+    script: str
+    digest: str
+    laps: Laps
     problems: tuple[Problem, ...] = ()
 
 
@@ -99,6 +117,27 @@ def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> 
         script_text=script_text,
         digest=found,
         problems=tuple(problems),
+    )
+
+
+def prepared(
+    asked: StartRequest, facts: EngineFacts, run: str, *, approved: bool = True
+) -> Prepared:
+    """As `admit`, for a start that becomes this run. For workers: takes its time with large graphs."""
+    admitted = admit(asked, facts, approved=approved)
+    graph = admitted.graph
+    errors = [each for each in admitted.problems if each.severity == "error"]
+    warnings = [each for each in admitted.problems if each.severity != "error"]
+    return Prepared(
+        run=run,
+        name=graph.name,
+        actions={each.full_name: each.key for each in graph.actions if not each.missing},
+        umrf=codec.write(graph, codec.Stamp(admitted.graph_id, asked.version, run)),
+        graph_id=admitted.graph_id,
+        script=admitted.script_text,
+        digest=admitted.digest,
+        laps=laps(graph),
+        problems=(*errors[:_KEPT], *warnings[:_KEPT]),
     )
 
 
@@ -154,10 +193,11 @@ def _script(asked: StartRequest) -> tuple[Script, str]:
         script = script_from(msgspec.json.decode(raw))
     except ValueError as error:
         raise BadInput(f"The script: {error}", where={"path": "/script"}) from error
-    return _slowed(script), raw.decode()
+    return slowed(script), raw.decode()
 
 
-def _slowed(script: Script) -> Script:
+def slowed(script: Script) -> Script:
+    """The script without what is quicker than any simulated action may be."""
     behaviours = {
         key: tuple(
             msgspec.structs.replace(each, after_s=max(each.after_s, _QUICKEST_S)) for each in calls

@@ -1,8 +1,9 @@
 """The routes of the runner."""
 
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator
 from datetime import UTC, datetime
 from typing import Annotated, Any, Final, get_args
+from weakref import WeakKeyDictionary
 
 import anyio
 import msgspec
@@ -11,9 +12,8 @@ from litestar.exceptions import HTTPException
 from litestar.params import Parameter
 from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
-from sqlalchemy import Row
 
-from action_assistant.errors import BadInput, TooMany
+from action_assistant.errors import BadInput, NotFound, TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive, robots_api, shapes
 from action_assistant.runner.admission import SIMULATOR, decoded, read_request
@@ -27,9 +27,11 @@ from action_assistant.runner.described import (
 )
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.live import Hub, Stopping, attend
+from action_assistant.runner.review import listing
 from action_assistant.runner.review import routes as review
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.review.retention import Retention
+from action_assistant.runner.review.stored import Asked, json_of
 from action_assistant.runner.runs import State
 from action_assistant.runner.steering import RestRequest
 from action_assistant.web.access import Needs, person_of, refuse, require
@@ -48,23 +50,18 @@ class House:
     crowd: Crowd
     journal: Journal
     desk: Desk
+    asked: Asked
     retention: Retention
+    sent: WeakKeyDictionary[OpenRun, shapes.Sent]
+
+    def __init__(self) -> None:
+        self.sent = WeakKeyDictionary()
 
 
 class StopAsked(msgspec.Struct, frozen=True):
     """`stop_id` is made by the page, once per press; the same press may come by several ways."""
 
     stop_id: str = ""
-
-
-class HistoryEvent(msgspec.Struct, frozen=True):
-    """One stored event, as programs that follow a run read it."""
-
-    seq: int
-    kind: str
-    author: str
-    at: datetime
-    body: msgspec.Raw
 
 
 def routes(house: House) -> list[ControllerRouterHandler]:
@@ -74,7 +71,7 @@ def routes(house: House) -> list[ControllerRouterHandler]:
         *_moves(house),
         *_reads(house),
         *robots_api.routes(house),
-        *review.routes(lambda: house.desk, lambda: house.retention),
+        *review.routes(house),
         _live(house),
     ]
 
@@ -193,7 +190,7 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
         until: datetime | None = None,
         before: str | None = None,
         limit: Annotated[int, Parameter(ge=1, le=1000)] = 200,
-    ) -> list[shapes.Listed]:
+    ) -> Response[list[shapes.Listed]]:
         states = _states(run_state)
         wanted = archive.Filter(
             graph=graph,
@@ -209,12 +206,12 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
             until=_us(until),
             before=before,
         )
-        was_open = dict(house.control.open)  # a run may end between its row and its labels
-        rows = await house.control.history.rows(archive.listed(wanted, limit))
-        labels = await _labels(house, rows)
-        opened = was_open | house.control.open
-        found = [_listed(opened.get(row.id), row, labels.get(row.id, [])) for row in rows]
-        return [each for each in found if not states or each.state in states]
+        going = {
+            run: shapes.summary(opened.run, recorded=opened.recorder.recorded)
+            for run, opened in house.control.open.items()
+        }
+        found = await house.asked.text(listing.listed, wanted, limit, going)
+        return json_of(found, list[shapes.Listed])
 
     @get("/api/labels", summary="Labels of runs, the most used first")
     async def every_label() -> list[str]:
@@ -222,22 +219,33 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
         return [row.label for row in rows]
 
     @get("/api/runs/{run:str}", summary="A run, and the graph as it was sent")
-    async def one(run: str) -> shapes.RunWhole:
-        umrf = await house.control.history.umrf(run)
-        found = await house.desk.known(run)
+    async def one(run: str) -> Response[shapes.RunWhole]:
         opened = house.control.open.get(run)
-        recorded = opened is None or opened.recorder.recorded
-        place = await house.desk.place(run)
-        return shapes.whole(found, umrf, recorded=recorded, place=place)
+        if opened is None:
+            return json_of(await house.asked.text(Desk.whole, run), shapes.RunWhole)
+        if opened not in house.sent:
+            house.sent[opened] = await house.asked.value(Desk.sent, run)
+        opened = house.control.open.get(run, opened)
+        await house.hub.work_out(opened)
+        whole = shapes.whole(
+            opened.run,
+            house.sent[opened],
+            recorded=opened.recorder.recorded,
+            memo=house.hub.memo(opened),
+        )
+        return json_of(msgspec.json.encode(whole), shapes.RunWhole)
 
     @get("/api/runs/{run:str}/events", summary="A run's events as they are stored (SSE)")
     async def events(run: str, request: _Asking) -> Stream | Response[None]:
         after = _last_event_id(request)
-        found = await house.desk.known(run)
-        if found.end is not None and not await house.control.history.events(run, after, 1):
+        opened = house.control.open.get(run)
+        newest = await house.asked.newest(run)
+        if not newest:
+            raise NotFound("There is no such run.")
+        if newest <= after and (opened is None or opened.run.end is not None):
             return Response(None, status_code=204)  # tells an EventSource not to come again
         return Stream(
-            _tail(house.control, run, after),
+            _tail(house, run, after),
             media_type="text/event-stream",
             headers={"cache-control": "no-store"},
         )
@@ -274,25 +282,7 @@ async def _stop_id(request: _Asking) -> str:
 
 def _shown(house: House, run: str) -> shapes.RunShown | None:
     opened = house.control.open.get(run)
-    if opened is None:
-        return None
-    return shapes.shown(opened.run, recorded=opened.recorder.recorded)
-
-
-def _listed(opened: OpenRun | None, row: Row[Any], labels: list[str]) -> shapes.Listed:
-    if opened is None:
-        found = shapes.summary_of_row(row)
-    else:
-        found = shapes.summary(opened.run, recorded=opened.recorder.recorded)
-    return shapes.listed(found, row, labels)
-
-
-async def _labels(house: House, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
-    if rows:
-        for row in await house.control.history.rows(archive.labels_of([row.id for row in rows])):
-            found.setdefault(row.run, []).append(row.label)
-    return found
+    return None if opened is None else house.hub.shown(opened)
 
 
 def _states(asked: str | None) -> tuple[str, ...]:
@@ -317,29 +307,18 @@ def _last_event_id(request: _Asking) -> int:
     return int(asked)
 
 
-async def _tail(control: Control, run: str, after: int) -> AsyncIterator[bytes]:
+async def _tail(house: House, run: str, after: int) -> AsyncIterator[bytes]:
     """Stored events, then those that come, until the run is over."""
     while True:
-        opened = control.open.get(run)
+        opened = house.control.open.get(run)
         revision = opened.revision if opened is not None else 0
-        found = await control.history.events(run, after, _PAGE)
-        for event in found:
-            after = event.seq
-            body = msgspec.json.encode(
-                HistoryEvent(
-                    event.seq,
-                    event.kind,
-                    event.author,
-                    shapes.time(event.at),
-                    msgspec.Raw(event.body),
-                )
-            )
-            yield b"id: %d\nevent: %b\ndata: %b\n\n" % (after, event.kind.encode(), body)
-        if found:
+        if await house.asked.newest(run) > after:
+            after, page = await house.asked.value(listing.streamed, run, after)
+            yield page
             continue
         if opened is None:
             return
         with anyio.move_on_after(_ALIVE_S) as waited:
-            await control.change(run, revision)
+            await house.control.change(run, revision)
         if waited.cancelled_caught:
             yield b": alive\n\n"

@@ -3,6 +3,7 @@
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import anyio
 from litestar import Litestar
@@ -15,12 +16,15 @@ from action_assistant.runner.api import House, routes
 from action_assistant.runner.control import Control
 from action_assistant.runner.links import ros2_reach
 from action_assistant.runner.links.port import Reach
+from action_assistant.runner.links.simulated import Simulators
 from action_assistant.runner.live import Hub
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.review.shelf import Shelf
+from action_assistant.runner.review.stored import Asked, Place
 from action_assistant.runner.robots import Robots
+from action_assistant.runner.workers import Workers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.addresses import addresses_of
 from action_assistant.web.asgi import Readiness, application
@@ -41,33 +45,44 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
     house = house or House()
     journal = await Journal.open(_database(settings), branch="runner", fold=archive.fold)
     try:
-        reach = ros2_reach(wall_clock)
-        keep, aside = (
-            settings.keep or Keep(folder=settings.data / ARCHIVE),
-            anyio.to_thread.run_sync,
-        )
+        keep = settings.keep or Keep(folder=settings.data / ARCHIVE)
+        on_disk = anyio.to_thread.run_sync  # threads wait for disks; what computes goes to workers
         folder, prunes = settings.data / "recordings", keep.raw is None
-        recordings = Recordings(folder, aside, prunes=prunes)
-        robots = Robots(reach=reach, recordings=recordings)
-        shelf = Shelf(journal, keep.folder, aside)
-        async with _kept(reach), Control.opened(shelf, robots, wall=wall_clock) as control:
-            house.control, house.hub = control, Hub(control, wall_clock)
-            house.crowd = Crowd(limits=settings.limits, keeps_one=True)
-            house.journal = journal
-            house.desk = Desk(control, shelf, aside, wall_clock)
-            house.retention = Retention(
-                journal,
-                recordings,
-                keep,
-                is_open=control.open.__contains__,
-                wall=wall_clock,
-                aside=aside,
-            )
-            async with anyio.create_task_group() as tasks:
-                tasks.start_soon(house.desk.run)
-                tasks.start_soon(house.retention.run)
-                yield house
-                tasks.cancel_scope.cancel()
+        recordings = Recordings(folder, on_disk, prunes=prunes)
+        shelf = Shelf(journal, keep.folder, on_disk)
+        async with Workers.opened() as workers:
+            house.asked = Asked(workers.looks, Place(_file(settings), keep.folder), shelf)
+            reach = ros2_reach(wall_clock)
+            robots = Robots(reach=reach, recordings=recordings)
+            async with (
+                _kept(reach),
+                Control.opened(
+                    shelf,
+                    robots,
+                    wall=wall_clock,
+                    aside=workers.starts,
+                    simulator=Simulators(),
+                    past=house.asked.past,
+                ) as control,
+            ):
+                house.asked.opened = control.open
+                house.control, house.hub = control, Hub(control, wall_clock)
+                house.crowd = Crowd(limits=settings.limits, keeps_one=True)
+                house.journal = journal
+                house.desk = Desk(control, shelf, on_disk, wall_clock, house.asked)
+                house.retention = Retention(
+                    journal,
+                    recordings,
+                    keep,
+                    is_open=control.open.__contains__,
+                    wall=wall_clock,
+                    aside=on_disk,
+                )
+                async with anyio.create_task_group() as tasks:
+                    tasks.start_soon(house.desk.run)
+                    tasks.start_soon(house.retention.run)
+                    yield house
+                    tasks.cancel_scope.cancel()
     finally:
         await journal.close()
 
@@ -82,8 +97,12 @@ async def _kept(reach: Reach | str) -> AsyncIterator[None]:
             await reach.aclose()
 
 
+def _file(settings: RunnerSettings) -> Path:
+    return settings.data / "runner.db"
+
+
 def _database(settings: RunnerSettings) -> str:
-    return f"sqlite:///{settings.data / 'runner.db'}"
+    return f"sqlite:///{_file(settings)}"
 
 
 def create_app(settings: RunnerSettings) -> ASGIApp:

@@ -1,6 +1,5 @@
 """A start becomes a run: stored before anything is sent, once for each request."""
 
-import secrets
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from weakref import WeakValueDictionary
@@ -15,12 +14,10 @@ from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.driving import Clock
 from action_assistant.runner.events import Author, Ended, Requested, encode
 from action_assistant.runner.history import Ledger
-from action_assistant.runner.links.port import Order
+from action_assistant.runner.links.port import Order, Outline
 from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.runs import Run, begin
 from action_assistant.runner.starting import Cleared
-from action_assistant.umrf import codec
-from action_assistant.umrf.laps import laps
 
 
 def booked(
@@ -33,32 +30,31 @@ def booked(
     group: str | None,
 ) -> tuple[Requested, Order]:
     """What will be stored of a start, and what will be sent."""
-    admitted = cleared.admitted
-    run, graph = secrets.token_urlsafe(9), admitted.graph
-    umrf = codec.write(graph, codec.Stamp(admitted.graph_id, asked.version, run))
+    ready = cleared.ready
     requested = Requested(
         at=at,
-        run=run,
+        run=ready.run,
         number=number,
         request_id=asked.request_id,
         author=author,
-        graph=admitted.graph_id,
-        graph_name=graph.name,
+        graph=ready.graph_id,
+        graph_name=ready.name,
         version=asked.version,
-        digest=admitted.digest,
+        digest=ready.digest,
         engine=asked.engine,
         simulated=cleared.own,
-        actions={each.full_name: each.key for each in graph.actions if not each.missing},
-        umrf=umrf,
-        script=admitted.script_text,
+        actions=ready.actions,
+        umrf=ready.umrf,
+        script=ready.script,
         override=asked.override,
         despite=cleared.despite,
         group=group,
         like=asked.like,
-        laps=laps(graph),
+        laps=ready.laps,
     )
     targets = () if cleared.own else (asked.engine,)
-    return requested, Order(run=run, graph=graph, umrf=umrf, targets=targets)
+    graph = Outline(ready.name, ready.actions)
+    return requested, Order(run=ready.run, graph=graph, umrf=ready.umrf, targets=targets)
 
 
 class Stops:

@@ -21,15 +21,17 @@ from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.events import Author, Ended, MovesAgain
 from action_assistant.runner.flight import Commanded
-from action_assistant.runner.history import Aside, History, Ledger
+from action_assistant.runner.history import Aside, History, Ledger, Past
 from action_assistant.runner.links.absent import AbsentLink
 from action_assistant.runner.links.port import ForeignCommand, Link, Order, Registration
+from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.registered import Robot
 from action_assistant.runner.robots import Ground, Robots
 from action_assistant.runner.runs import Run
 from action_assistant.runner.starting import Cleared, Grouped, GroupRequest, Started, Starting
 from action_assistant.runner.stragglers import Stragglers
+from action_assistant.web.access import done_for_nobody
 
 log: Final = logging.getLogger(__name__)
 
@@ -43,10 +45,18 @@ class Control:
     """Everything that goes on. `opened` gives it, with its tasks running."""
 
     def __init__(
-        self, ledger: Ledger, robots: Robots, *, wall: Clock, tasks: TaskGroup, aside: Aside
+        self,
+        ledger: Ledger,
+        robots: Robots,
+        *,
+        wall: Clock,
+        tasks: TaskGroup,
+        aside: Aside,
+        simulator: Simulator,
+        past: Past | None = None,
     ) -> None:
         self.robots = robots
-        self.history = History(ledger, aside)
+        self.history = History(ledger, past)
         self.open: dict[str, OpenRun] = {}
         self._ledger = ledger
         self._wall = wall
@@ -64,6 +74,7 @@ class Control:
             taken=self._taken,
             going=self._going,
             is_settled=self._is_settled,
+            simulator=simulator,
         )
         self._stragglers = Stragglers(
             self.open, self.history, robots, self._tasks, wall=wall, reopen=self._reopen
@@ -81,10 +92,21 @@ class Control:
         *,
         wall: Clock,
         aside: Aside = anyio.to_thread.run_sync,
+        simulator: Simulator = in_this_process,
+        past: Past | None = None,
     ) -> "AsyncIterator[Control]":
-        """The service, after it has taken up what an earlier process left."""
+        """The service, after it has taken up what an earlier process left. `past` reads runs that
+        are over, `simulator` makes what simulated ones run on."""
         async with anyio.create_task_group() as tasks:
-            control = cls(ledger, robots, wall=wall, tasks=tasks, aside=aside)
+            control = cls(
+                ledger,
+                robots,
+                wall=wall,
+                tasks=tasks,
+                aside=aside,
+                simulator=simulator,
+                past=past,
+            )
             await control._take_up()
             try:
                 yield control
@@ -197,9 +219,7 @@ class Control:
         group: str | None = None,
     ) -> Run:
         number, at = self.next_number(), self._wall()
-        requested, order = await self._aside(
-            lambda: booked(asked, cleared, author, at=at, number=number, group=group)
-        )
+        requested, order = booked(asked, cleared, author, at=at, number=number, group=group)
         with anyio.CancelScope(shield=True):
             run = await self._book.store(requested)
             opened = self._opened(run, cleared.link, own=cleared.own, seq=1)
@@ -230,6 +250,7 @@ class Control:
         return opened
 
     async def _drive(self, opened: OpenRun, order: Order | None, incarnation: str = "") -> None:
+        done_for_nobody()  # a run goes on without whoever started it
         await opened.drive(order, incarnation)
         self.open.pop(opened.run.id, None)
         self._stragglers.ended(opened.run, opened.recorder.seq)

@@ -32,7 +32,7 @@ from action_assistant.runner.events import (
     Unconfirmed,
 )
 from action_assistant.runner.flight import alarm_of
-from action_assistant.runner.history import Aside, graph_of
+from action_assistant.runner.history import Aside, sent_of
 from action_assistant.runner.links.port import (
     EngineChanged,
     EngineLog,
@@ -45,6 +45,7 @@ from action_assistant.runner.links.port import (
     Order,
     Report,
     Transitions,
+    outline,
 )
 from action_assistant.runner.proof import SET_GOING
 from action_assistant.runner.recorder import Recorder, Store
@@ -126,13 +127,12 @@ class OpenRun:
         self, author: Author, order: Order, version: str, digest: str, continue_from: str
     ) -> None:
         """Want the run to go on with another graph. Raises NotSent, EngineRefused."""
-        graph = order.graph
         asked = ModifyRequested(
             at=self._wall(),
             author=author,
             version=version,
             digest=digest,
-            actions={each.full_name: each.key for each in graph.actions if not each.missing},
+            actions=outline(order.graph).actions,
             umrf=order.umrf,
             continue_from=continue_from,
         )
@@ -152,7 +152,7 @@ class OpenRun:
                 )
             )
             raise
-        self.watch.sends(graph)
+        self.watch.sends(order.umrf)
         self.watch.look()
 
     @property
@@ -216,7 +216,7 @@ class OpenRun:
     async def _recall(self) -> None:
         """What an earlier process sent. Nothing waits for it: it only says what the run waits for."""
         try:
-            self.watch.graph = await graph_of(self._store, self.run, self._aside)
+            self.watch.umrf = await sent_of(self._store, self.run)
         except (Refused, msgspec.DecodeError):
             log.warning("the graph of run %s cannot be read", self.run.id)
 
@@ -224,8 +224,8 @@ class OpenRun:
         """It had ended and moves: it is open again. False when it is stored and left already."""
         if self._is_left or self.run.end is None:
             return not self._is_left
-        graph, self.watch = self.watch.graph, self._watched()
-        self.watch.graph = graph
+        umrf, self.watch = self.watch.umrf, self._watched()
+        self.watch.umrf = umrf
         self._over = anyio.Event()
         self.tell(event)
         self._again.set()
@@ -284,7 +284,7 @@ class OpenRun:
     async def _publish(self, order: Order, incarnation: str) -> None:
         """Send the one start message. Whatever happens, it is never sent again."""
         at = self._wall()
-        self.watch.sends(order.graph)
+        self.watch.sends(order.umrf)
         if self.run.desired == "stopped":
             self.end("stopped", "Stopped before anything was sent.")
             return

@@ -43,7 +43,7 @@ _SHARE: Final = 20  # at most one part in so many of the time goes into asking a
 _FRESH_S: Final = 60.0  # for so long an engine that came back is called restarted
 
 T = TypeVar("T")
-Aside = Callable[[Callable[[], T]], Awaitable[T]]
+Aside = Callable[..., Awaitable[T]]
 
 
 class Index(msgspec.Struct, frozen=True, kw_only=True):
@@ -283,7 +283,7 @@ class KnownEngine:
             return Index()
         texts = answer.known_actions, answer.known_graphs
         if texts != self._index[0]:
-            self._index = texts, await aside(lambda: read_index(*texts))
+            self._index = texts, await aside(read_index, *texts)
         return self._index[1]
 
 

@@ -1,8 +1,7 @@
 """Runs as the journal tells them: what is over, and what an earlier process left."""
 
 from collections.abc import Awaitable, Callable, Sequence
-from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 from sqlalchemy import Row, Select
 
@@ -11,8 +10,6 @@ from action_assistant.journal.events import Event
 from action_assistant.runner.events import ModifyRequested, Requested, decode
 from action_assistant.runner.recorder import Store, stream_of
 from action_assistant.runner.runs import Run, replay
-from action_assistant.umrf import codec
-from action_assistant.umrf.model import Graph
 
 T = TypeVar("T")
 
@@ -26,28 +23,43 @@ class Ledger(Store, Protocol):
 
 
 class Aside(Protocol):
-    """A way to do work that takes long without holding up a Stop."""
+    """A way to do work that takes long without holding up a Stop: in another process, so that it is
+    a function of a module, and what it is given and returns are values."""
 
-    def __call__(self, work: Callable[[], T], /) -> Awaitable[T]:
-        """The outcome of the work."""
+    def __call__(self, work: Callable[..., T], /, *args: Any) -> Awaitable[T]:
+        """The outcome of `work(*args)`."""
         ...
 
 
-class History:
-    """Reads runs. Raises Unavailable while the journal cannot be read."""
+#: Reads a run that is over, and the seq of its last event: all of it, or only what people are
+#: shown. Raises NotFound.
+Past: TypeAlias = Callable[[str, bool], Awaitable[tuple[Run, int]]]
 
-    def __init__(self, ledger: Ledger, aside: Aside) -> None:
+
+class History:
+    """Reads runs. Raises Unavailable while the journal cannot be read. `past` reads those that are
+    over; without it they are folded here."""
+
+    def __init__(self, ledger: Ledger, past: Past | None = None) -> None:
         self._ledger = ledger
-        self._aside = aside
+        self._past = past
+
+    async def followed(self, run: str) -> tuple[Run | None, int]:
+        """A run to go on with, and the seq of its last event. Raises msgspec.DecodeError."""
+        if self._past is not None:
+            return await self._past(run, True)
+        return await self.replayed(run)
 
     async def replayed(self, run: str) -> tuple[Run | None, int]:
-        """A run and the seq of its last event. Raises msgspec.DecodeError."""
+        """The same, folded here and now: for the time before anybody can ask for anything."""
         events = await self._ledger.read(stream_of(run))
-        found = await self._aside(lambda: replay(decode(each.kind, each.body) for each in events))
+        found = replay(decode(each.kind, each.body) for each in events)
         return found, events[-1].seq if events else 0
 
     async def run(self, run: str) -> Run:
         """A run. Raises NotFound."""
+        if self._past is not None:
+            return (await self._past(run, False))[0]
         found, _ = await self.replayed(run)
         if found is None:
             raise NotFound("There is no such run.")
@@ -70,20 +82,13 @@ class History:
         return await self._ledger.query(statement)
 
 
-async def graph_of(store: Store, run: Run, aside: Aside) -> Graph | None:
-    """The graph that a run has now: as it was sent, or changed since. None when it cannot be read.
+async def sent_of(store: Store, run: Run) -> str | None:
+    """The graph that a run has now: as it was sent, or changed since. None when it cannot be told.
     Raises Unavailable."""
     stored = await store.read(stream_of(run.id))
     sent = {Requested.kind, ModifyRequested.kind}
     for each in reversed(stored):
         event = decode(each.kind, each.body) if each.kind in sent else None
         if isinstance(event, Requested | ModifyRequested) and event.digest == run.digest:
-            return await aside(partial(_read, event.umrf.encode()))
+            return event.umrf
     return None
-
-
-def _read(text: bytes) -> Graph | None:
-    try:
-        return codec.read(text).graph
-    except codec.Unreadable:
-        return None

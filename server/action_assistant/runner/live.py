@@ -13,6 +13,7 @@ from typing import Any, Final
 from weakref import WeakKeyDictionary
 
 import anyio
+import anyio.lowlevel
 import msgspec
 from litestar import WebSocket
 from litestar.exceptions import WebSocketDisconnect, WebSocketException
@@ -32,6 +33,7 @@ _GAP_S: Final = 0.05  # between two states of one run
 _SHARE: Final = 20  # at most one part in so many of the time goes into encoding one run
 _BEAT_S: Final = 1.0
 _SEND_S: Final = 15.0
+_AT_ONCE: Final = 250  # actions that are put together without letting go
 _ENGINES_GAP_S: Final = 0.25  # between two lists of engines
 _LETTERS: Final = 64
 _TOO_SLOW: Final = 1013
@@ -88,11 +90,12 @@ class Beat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
 
 
 class Frame(msgspec.Struct, frozen=True):
-    """An encoded run, and what encoding it took (seconds)."""
+    """An encoded run, what encoding it took (seconds), and when it may be encoded again."""
 
     revision: int
     text: str
     cost: float
+    next: float
 
 
 class Hub:
@@ -103,6 +106,7 @@ class Hub:
         self.wall = wall
         self.boxes: set[Outbox] = set()
         self._frames: WeakKeyDictionary[OpenRun, Frame] = WeakKeyDictionary()
+        self._memos: WeakKeyDictionary[OpenRun, shapes.Memo] = WeakKeyDictionary()
         self._engines: str | None = None
         control.watch(self._changed)
         control.watch_robots(self._robots_changed)
@@ -138,18 +142,37 @@ class Hub:
         frame = self._frames.get(opened)
         if frame is None or frame.revision != opened.revision:
             began = anyio.current_time()
-            text = msgspec.json.encode(RunMessage(self._shown(opened))).decode()
-            frame = Frame(opened.revision, text, anyio.current_time() - began)
+            text = msgspec.json.encode(RunMessage(self.shown(opened))).decode()
+            now = anyio.current_time()
+            frame = Frame(opened.revision, text, now - began, now + _SHARE * (now - began))
             self._frames[opened] = frame
         return frame
 
-    def hello(self) -> str:
-        """All that goes on now."""
-        runs = [self._shown(opened) for opened in self.control.open.values()]
+    def due(self, opened: OpenRun) -> float:
+        """When a run may be encoded again: however many watch, it takes a share of the time."""
+        frame = self._frames.get(opened)
+        return 0.0 if frame is None or frame.revision == opened.revision else frame.next
+
+    async def hello(self) -> str:
+        """All that goes on now. Nobody waits while many large runs are put together."""
+        for opened in tuple(self.control.open.values()):
+            await self.work_out(opened)
+        runs = [self.shown(opened) for opened in self.control.open.values()]
         return msgspec.json.encode(Hello(list(self.control.robots.all()), runs)).decode()
 
-    def _shown(self, opened: OpenRun) -> shapes.RunShown:
-        return shapes.shown(opened.run, recorded=opened.recorder.recorded)
+    async def work_out(self, opened: OpenRun) -> None:
+        """Make sure that showing a run takes little time now."""
+        for _ in self.memo(opened).work_out(opened.run, _AT_ONCE):
+            await anyio.lowlevel.checkpoint()
+
+    def memo(self, opened: OpenRun) -> shapes.Memo:
+        """What was shown of a run so far."""
+        return self._memos.setdefault(opened, shapes.Memo())
+
+    def shown(self, opened: OpenRun) -> shapes.RunShown:
+        """A run as it is now."""
+        recorded = opened.recorder.recorded
+        return shapes.shown(opened.run, recorded=recorded, memo=self.memo(opened))
 
     async def follow(self, text: str, author: Author) -> str:
         """Do what a page says; the answer."""
@@ -211,11 +234,13 @@ class Outbox:
                     await send(text)
                 if text.startswith('{"type":"beat"'):
                     beat = anyio.current_time() + _BEAT_S
-            due = min(
-                [beat, self._engines_at, *(self._next.get(run, 0.0) for run in self._changed)]
-            )
+            runs = (self._due(run, opened) for run, opened in self._changed.items())
+            due = min([beat, self._engines_at, *runs])
             with anyio.move_on_after(max(0.0, due - anyio.current_time())):
                 await self._news.wait()
+
+    def _due(self, run: str, opened: OpenRun) -> float:
+        return max(self._next.get(run, 0.0), self._hub.due(opened))
 
     def _pick(self, beat: float) -> str | None:
         """The next thing to send: answers, then a beat, then runs whose turn has come."""
@@ -233,7 +258,7 @@ class Outbox:
             self._engines_next = now + _ENGINES_GAP_S
             return self._hub.engines()
         for run, opened in self._changed.items():
-            if self._next.get(run, 0.0) <= now:
+            if self._due(run, opened) <= now:
                 del self._changed[run]
                 frame = self._hub.frame(opened)
                 self._next[run] = now + max(_GAP_S, _SHARE * frame.cost)
@@ -250,7 +275,7 @@ async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
     author = author_of(socket)
     box = Outbox(hub, lambda: session is None or not session.expired)
     await socket.accept()
-    box.post(hub.hello())
+    box.post(await hub.hello())
     hub.boxes.add(box)
     try:
         async with anyio.create_task_group() as tasks:

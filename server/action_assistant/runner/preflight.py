@@ -10,11 +10,12 @@ from typing import Final, Literal, TypeAlias
 import msgspec
 
 from action_assistant.errors import Conflict, Refused
-from action_assistant.runner.admission import Admitted
+from action_assistant.runner.admission import Admitted, Prepared
 from action_assistant.runner.engines import Index
 from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.proof import strangers
 from action_assistant.runner.runs import Run
+from action_assistant.umrf import codec
 from action_assistant.umrf.check import STRUCTURAL, check
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph, Problem
@@ -94,7 +95,7 @@ def of_refusal(code: str, refused: Refused) -> Item:
     )
 
 
-def of_graph(admitted: Admitted) -> Item:
+def of_graph(admitted: Admitted | Prepared) -> Item:
     """The graph has been admitted; what warns does not stand in the way."""
     warned = tuple(each for each in admitted.problems if each.severity == "warning")[:_SHOWN]
     over = tuple(each for each in admitted.problems if each.severity == "error")[:_SHOWN]
@@ -147,6 +148,11 @@ def of_robot(sight: Sight, graph: Graph) -> tuple[Item, ...]:
         _others(sight),
         _actors(sight, graph),
     )
+
+
+def of_text(sight: Sight, umrf: str) -> tuple[Item, ...]:
+    """As `of_robot`, of a graph as it will be sent. For workers."""
+    return of_robot(sight, codec.read(umrf).graph)
 
 
 def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
@@ -265,6 +271,13 @@ def not_matched(
             else action.name not in index.actions
         )
     )
+
+
+def not_matched_in(
+    umrf: str, facts: EngineFacts, index: Index, held: Collection[str]
+) -> tuple[str, ...]:
+    """As `not_matched`, of a graph as it will be sent. For workers."""
+    return not_matched(codec.read(umrf).graph, facts, index, held)
 
 
 def _listed(names: Sequence[str]) -> str:

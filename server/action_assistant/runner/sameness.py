@@ -7,6 +7,11 @@ from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.model import Graph
 
 
+def differs(sent: str, text: str) -> str:
+    """As `difference`, of the text that was sent. For workers."""
+    return difference(codec.read(sent).graph, text)
+
+
 def difference(sent: Graph, text: str) -> str:
     """In which way a graph as an engine wrote it differs from the one that was sent, in words; ""
     when it is the same."""

@@ -1,9 +1,11 @@
 """Runs as the page and programs see them (DESIGN 7)."""
 
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from typing import Any, Final
 
 import msgspec
+from msgspec.structs import replace
 from sqlalchemy import Row
 
 from action_assistant.runner.durations import Took, of_run
@@ -156,17 +158,61 @@ def summary(run: Run, *, recorded: bool = True) -> Summary:
     return Summary(**_fields(run, recorded))
 
 
-def shown(run: Run, *, recorded: bool = True) -> RunShown:
+class Memo:
+    """What was shown of each action of a run, for as long as it is as it was: of thousands of them
+    few change between two looks."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, tuple[ActionRun, int, ActionShown]] = {}
+
+    def action(self, name: str, action: ActionRun, most: int) -> ActionShown:
+        """An action with its newest visits."""
+        known = self._known.get(name)
+        if known is not None and known[0] is action and known[1] == most:
+            return known[2]
+        found = _action(action, most)
+        self._known[name] = action, most, found
+        return found
+
+    def work_out(self, run: Run, at_once: int) -> Iterator[None]:
+        """Know all that `shown` will ask for, so many actions at a time."""
+        most = _most(run, _LIVE)
+        for number, (name, action) in enumerate(run.actions.items(), 1):
+            self.action(name, action, most)
+            if number % at_once == 0:
+                yield
+
+
+def shown(run: Run, *, recorded: bool = True, memo: Memo | None = None) -> RunShown:
     """A run with its actions and their newest visits."""
-    actions = _actions(run, _LIVE)
+    actions = _actions(run, _LIVE, memo)
     fields = _fields(run, recorded)
     return RunShown(**fields, like=run.like, actions=actions, log=_log(run, _LINES))
 
 
-def whole(run: Run, umrf: str, *, recorded: bool = True, place: Row[Any] | None = None) -> RunWhole:
-    """All there is."""
-    actions = _actions(run, _WHOLE)
-    raw = msgspec.Raw(umrf.encode())
+class Sent(msgspec.Struct, frozen=True):
+    """A graph as it was sent, and the values of its actions."""
+
+    umrf: str
+    values: dict[str, dict[str, str]]
+
+
+def sent_of(umrf: str) -> Sent:
+    """For workers: reads the graph."""
+    return Sent(umrf, sent(umrf))
+
+
+def whole(
+    run: Run,
+    graph: Sent,
+    *,
+    recorded: bool = True,
+    place: Row[Any] | None = None,
+    memo: Memo | None = None,
+) -> RunWhole:
+    """All there is; with a `memo` no more visits than `shown` shows."""
+    actions = _actions(run, _WHOLE if memo is None else _LIVE, memo)
+    raw = msgspec.Raw(graph.umrf.encode())
     return RunWhole(
         **_fields(run, recorded),
         like=run.like,
@@ -175,7 +221,7 @@ def whole(run: Run, umrf: str, *, recorded: bool = True, place: Row[Any] | None 
         umrf=raw,
         override=run.override,
         despite=list(run.despite),
-        sent=sent(umrf),
+        sent=graph.values,
         archived=archived(place),
     )
 
@@ -214,6 +260,20 @@ def summary_of_row(row: Row[Any]) -> Summary:
         ],
         recorded=True,
     )
+
+
+def thinned(run: Run) -> Run:
+    """The run without the visits that `shown` leaves out."""
+    most = _most(run, _LIVE)
+    actions = {
+        name: replace(
+            each,
+            visits=each.visits[-most:],
+            older=each.older + len(each.visits) - len(each.visits[-most:]),
+        )
+        for name, each in run.actions.items()
+    }
+    return replace(run, actions=actions)
 
 
 def listed(found: Summary, row: Row[Any], labels: list[str]) -> Listed:
@@ -284,10 +344,14 @@ def visit(each: Visit) -> VisitShown:
     )
 
 
-def _actions(run: Run, visits: int) -> dict[str, ActionShown]:
-    """Encoding holds up everything else, a Stop too, so very many visits are not shown."""
-    most = max(1, visits // max(1, len(run.actions)))
-    return {name: _action(action, most) for name, action in run.actions.items()}
+def _most(run: Run, visits: int) -> int:
+    """Visits of one action. Encoding holds up everything else, so very many are not shown."""
+    return max(1, visits // max(1, len(run.actions)))
+
+
+def _actions(run: Run, visits: int, memo: Memo | None = None) -> dict[str, ActionShown]:
+    memo, most = memo or Memo(), _most(run, visits)
+    return {name: memo.action(name, action, most) for name, action in run.actions.items()}
 
 
 def _action(action: ActionRun, most: int) -> ActionShown:

@@ -13,6 +13,7 @@ import msgspec
 from action_assistant.runner.runs import Run
 from action_assistant.runner.seen import ACTIVE, Snapshot
 from action_assistant.runner.visits import ActionRun
+from action_assistant.umrf import codec
 from action_assistant.umrf.model import (
     ENTRY,
     EXIT,
@@ -86,6 +87,11 @@ class Standstill:
         """It was not seen, or moves."""
         self._since, self._looks = None, 0
 
+    @property
+    def lasts(self) -> bool:
+        """Whether it still stands still."""
+        return self._since is not None
+
     def seen(self, shown: Sequence[Snapshot], asked: float) -> bool:
         """After one more look, asked for at `asked`, at a graph and then its sub-graphs: whether it
         has stood still for so long that a person must know."""
@@ -95,6 +101,25 @@ class Standstill:
         self._since = asked if self._since is None else self._since
         self._looks += 1
         return self._looks >= _LOOKS and asked - self._since >= _AFTER_S
+
+
+def told_of(run: Run, umrf: str | None) -> str:
+    """As `told`, of a graph as it was sent. For workers."""
+    return told(run, None if umrf is None else _read(umrf))
+
+
+def lacking_in_words(umrf: str) -> str:
+    """Why an engine that holds this graph has not begun it; "" where it lacks nothing. For workers."""
+    graph = _read(umrf)
+    found = () if graph is None else unbegun(graph)
+    return " ".join(in_words(each) for each in found[:_TOLD])
+
+
+def _read(umrf: str) -> Graph | None:
+    try:
+        return codec.read(umrf).graph
+    except codec.Unreadable:
+        return None
 
 
 def moves(shown: Sequence[Snapshot]) -> bool:

@@ -1,6 +1,8 @@
 """What must be true before a start is stored and sent, found out for each engine it shall go to."""
 
+import secrets
 from collections.abc import Awaitable, Callable, Collection, Sequence
+from functools import partial
 from typing import Annotated, Final
 
 import anyio
@@ -8,18 +10,17 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
 from action_assistant.runner import preflight
-from action_assistant.runner.admission import SIMULATOR, Admitted, StartRequest, admit, decoded
+from action_assistant.runner.admission import SIMULATOR, Prepared, StartRequest, decoded, prepared
 from action_assistant.runner.driving import Clock
 from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.events import Overridden, Override
 from action_assistant.runner.history import Aside
 from action_assistant.runner.links.port import Answer, Link, NoAnswer
-from action_assistant.runner.links.simulator import SimulatorLink
+from action_assistant.runner.links.simulator import Simulator
 from action_assistant.runner.preflight import Item, Preflight, Sight
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
-from action_assistant.umrf.semantics import Engine
 
 #: The simulator as itself: a paused run can be stopped there.
 _ITSELF: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
@@ -69,7 +70,7 @@ class Cleared(msgspec.Struct, frozen=True, kw_only=True):
     """Nothing stands in the way: what will be sent, where, to which life of the engine, and which
     problems somebody answers for."""
 
-    admitted: Admitted
+    ready: Prepared
     link: Link
     own: bool
     incarnation: str
@@ -106,6 +107,7 @@ class Starting:
         taken: Callable[[str], Run | None],
         going: Callable[[str], Collection[str]],
         is_settled: Callable[[str], Awaitable[bool]],
+        simulator: Simulator,
     ) -> None:
         self._robots = robots
         self._wall = wall
@@ -113,26 +115,25 @@ class Starting:
         self._taken = taken
         self._going = going
         self._is_settled = is_settled
+        self._simulator = simulator
 
     async def cleared(self, asked: StartRequest) -> Cleared:
         """Look, and refuse what stands in the way. Raises Refused of many kinds."""
         if asked.engine == SIMULATOR:
             facts = self._simulated(asked)
-            admitted = await self._aside(lambda: admit(asked, facts))
-            engine = Engine(facts=facts, script=admitted.script)
-            link = SimulatorLink(engine, wall=self._wall)
-            incarnation = (await link.get()).incarnation
+            ready = await self._aside(prepared, asked, facts, secrets.token_urlsafe(9))
+            link = self._simulator(facts, ready.script, self._wall)
             return Cleared(
-                admitted=admitted,
+                ready=ready,
                 link=link,
                 own=True,
-                incarnation=incarnation,
-                despite=_despite(admitted, ()),
+                incarnation=link.standing.incarnation,
+                despite=_despite(ready, ()),
             )
         robot = self._robots.reachable(asked.engine)
         if asked.like is not None:
             raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
-        admitted = await self._aside(lambda: admit(asked, robot.facts))
+        ready = await self._aside(prepared, asked, robot.facts, secrets.token_urlsafe(9))
         free = preflight.of_taken(asked.engine, self._taken(asked.engine))
         preflight.check_items([free], ())
         if self._robots.silencing.going(asked.engine):
@@ -147,14 +148,14 @@ class Starting:
             raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
                 nothing
             )
-        items = await self._aside(lambda: preflight.of_robot(sight, admitted.graph))
+        items = await self._aside(preflight.of_text, sight, ready.umrf)
         preflight.check_items(items, asked.override.codes if asked.override else ())
         return Cleared(
-            admitted=admitted,
+            ready=ready,
             link=robot,
             own=False,
             incarnation=sight.answer.incarnation,
-            despite=_despite(admitted, items),
+            despite=_despite(ready, items),
         )
 
     async def all_cleared(self, starts: Sequence[StartRequest]) -> list[Cleared]:
@@ -194,7 +195,7 @@ class Starting:
     async def _look(self, asked: StartRequest) -> Preflight:
         items: list[Item] = []
         robot: KnownEngine | None = None
-        admitted: Admitted | None = None
+        ready: Prepared | None = None
         try:
             if asked.engine == SIMULATOR:
                 facts = self._simulated(asked)
@@ -204,25 +205,24 @@ class Starting:
         except Refused as refused:
             return preflight.summed(asked.engine, [preflight.of_refusal("link", refused)])
         try:
-            admitted = await self._aside(lambda: admit(asked, facts, approved=False))
-            items.append(preflight.of_graph(admitted))
+            ready = await self._aside(partial(prepared, approved=False), asked, facts, "")
+            items.append(preflight.of_graph(ready))
         except Refused as refused:
             items.append(preflight.of_refusal("graph", refused))
         if robot is not None:
             items.append(preflight.of_taken(asked.engine, self._taken(asked.engine)))
-            items += await self._look_at(robot, admitted)
-        digest = admitted.digest if admitted is not None else ""
+            items += await self._look_at(robot, ready)
+        digest = ready.digest if ready is not None else ""
         return preflight.summed(asked.engine, items, digest)
 
-    async def _look_at(self, robot: KnownEngine, admitted: Admitted | None) -> list[Item]:
+    async def _look_at(self, robot: KnownEngine, ready: Prepared | None) -> list[Item]:
         try:
             sight = await self._sight(robot)
         except NoAnswer as nothing:
             return [preflight.of_silence(robot.registration.name, str(nothing))]
-        if admitted is None:
+        if ready is None:
             return [preflight.of_answer(sight)]
-        graph = admitted.graph
-        return list(await self._aside(lambda: preflight.of_robot(sight, graph)))
+        return list(await self._aside(preflight.of_text, sight, ready.umrf))
 
     async def _sight(self, robot: KnownEngine) -> Sight:
         """The engine as it answers a get sent now, on the path that would confirm a stop. Raises
@@ -260,9 +260,9 @@ def _given_up(answer: Answer) -> set[str]:
     return {each.run for each in doubted if each.run is not None}
 
 
-def _despite(admitted: Admitted, items: Sequence[Item]) -> tuple[Overridden, ...]:
+def _despite(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:
     """What somebody overrides: of the graph, and of the robot that has answered."""
-    found = [each for each in admitted.problems if each.severity == "error"]
+    found = [each for each in ready.problems if each.severity == "error"]
     told: list[Overridden] = []
     for item in items:
         if item.verdict != "blocked":

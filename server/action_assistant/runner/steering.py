@@ -5,17 +5,15 @@ from typing import Annotated, Final
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
-from action_assistant.runner.admission import SIMULATOR, StartRequest, admit, decoded
+from action_assistant.runner.admission import SIMULATOR, StartRequest, decoded, prepared
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.events import Author, Override
 from action_assistant.runner.history import Aside
-from action_assistant.runner.links.port import EngineRefused, NotSent, Order
-from action_assistant.runner.preflight import not_matched
+from action_assistant.runner.links.port import EngineRefused, NotSent, Order, Outline
+from action_assistant.runner.preflight import not_matched_in
 from action_assistant.runner.runs import Run
-from action_assistant.umrf import codec
 from action_assistant.umrf.facts import SIMULATED
-from action_assistant.umrf.model import Graph
 
 _MOVING: Final = frozenset({"running", "paused"})
 
@@ -79,21 +77,20 @@ async def modify(
         override=asked.override,
     )
     facts = SIMULATED if engine is None else engine.facts
-    admitted = await aside(lambda: admit(start, facts))
+    ready = await aside(prepared, start, facts, run.id)
     if engine is not None:
-        await _require_matched(engine, admitted.graph, aside)
+        await _require_matched(engine, ready.umrf, aside)
     _require_moving(opened.run)  # somebody may have stopped it meanwhile
-    graph = admitted.graph
-    if graph.name != run.graph_name:
+    if ready.name != run.graph_name:
         raise Conflict(
-            f"The run is of {run.graph_name}; a graph called {graph.name} cannot take its place.",
+            f"The run is of {run.graph_name}; a graph called {ready.name} cannot take its place.",
             where={"path": "/umrf/graph_name"},
         )
-    umrf = codec.write(graph, codec.Stamp(run.graph, asked.version, run.id))
     targets = () if run.simulated else (run.engine,)
-    order = Order(run=run.id, graph=graph, umrf=umrf, targets=targets)
+    graph = Outline(ready.name, ready.actions)
+    order = Order(run=run.id, graph=graph, umrf=ready.umrf, targets=targets)
     try:
-        await opened.modify(author, order, asked.version, admitted.digest, asked.continue_from)
+        await opened.modify(author, order, asked.version, ready.digest, asked.continue_from)
     except NotSent as why:
         raise Unavailable(f"The change could not be sent: {why}") from why
     except EngineRefused as why:
@@ -101,10 +98,11 @@ async def modify(
     return opened.run
 
 
-async def _require_matched(engine: KnownEngine, graph: Graph, aside: Aside) -> None:
+async def _require_matched(engine: KnownEngine, umrf: str, aside: Aside) -> None:
     """A change is taken without looking anything up. Raises Conflict."""
     held = {each.graph for each in engine.answer.graphs} if engine.answer is not None else set()
-    lost = not_matched(graph, engine.facts, await engine.index(aside), held)
+    index = await engine.index(aside)
+    lost = await aside(not_matched_in, umrf, engine.facts, index, held)
     if lost:
         raise Conflict(
             f"{engine.registration.name} does not look up {', '.join(lost[:3])} in a change, and would "

@@ -136,7 +136,7 @@ class Stragglers:
         while True:
             try:
                 told = await self._robots.flight.newest(robot, _TOLD)
-                found, seq = await self._history.replayed(run)
+                found, seq = await self._history.followed(run)
             except Refused:
                 await anyio.sleep(_AGAIN_S)
             except msgspec.DecodeError:

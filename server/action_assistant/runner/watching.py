@@ -1,12 +1,15 @@
 """Watches a run: asks, listens, and draws the conclusions that the evidence allows, and no others."""
 
 import itertools
-from collections.abc import Callable
+import logging
+from collections.abc import Awaitable, Callable
 from typing import Final, Protocol
 
 import anyio
+from anyio.abc import TaskGroup
 from msgspec.structs import replace
 
+from action_assistant.errors import Refused
 from action_assistant.runner import refusals, stall
 from action_assistant.runner.doubts import Doubts
 from action_assistant.runner.engine_process import has_ended
@@ -17,9 +20,10 @@ from action_assistant.runner.links.port import Answer, Link, NoAnswer
 from action_assistant.runner.parts import Parts
 from action_assistant.runner.proof import NEVER_BEGAN, Rest, hash_of
 from action_assistant.runner.runs import Run, is_news
-from action_assistant.runner.sameness import difference
+from action_assistant.runner.sameness import differs
 from action_assistant.runner.seen import TERMINAL, Seen, Snapshot
-from action_assistant.umrf.model import Graph
+
+log: Final = logging.getLogger(__name__)
 
 _POLL_S: Final = 1.0
 _STOP_POLL_S: Final = 0.1
@@ -27,7 +31,6 @@ _GET_S: Final = 1.0  # an engine that is not busy answers within milliseconds
 _SILENT_S: Final = 3.0
 _APPEAR_S: Final = 3.0  # until a started graph must show in answers
 _ABSENT_S: Final = 1.0  # for which answers must lack what the engine has said it refused
-_LACKING: Final = 3  # inputs without a value that are named
 _GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun
 _SEVERAL: Final = (
     "{servers} engines are seen on the path of its answers, so that none proves anything"
@@ -70,7 +73,7 @@ class Watched(Protocol):
 
 class Watch:
     """Evidence of one run. `trouble`: why its stop is not proven yet; `seen_at`: when its engine last
-    showed it; `graph`: what that has been given last, where it is known. `rested_at`: when it was last
+    showed it; `umrf`: what that has been given last, where it is known. `rested_at`: when it was last
     seen to be over, for one that moves again."""
 
     def __init__(
@@ -86,7 +89,7 @@ class Watch:
     ) -> None:
         self.trouble = ""
         self.seen_at: int | None = None
-        self.graph: Graph | None = None
+        self.umrf: str | None = None
         self._it = it
         self._link = link
         self._wall = wall
@@ -96,10 +99,13 @@ class Watch:
         self._stop_sent: int | None = None
         self._disturbed = 0
         self._begun = 0  # when feedback was the first to show it
-        self._sent: Graph | None = None  # until it was compared with what the engine shows
+        self._sent: str | None = None  # until it was compared with what the engine shows
         self._start = refusals.StartLog(it.run)
         self._absent: float | None = None  # since when answers lack a start that was refused
         self._standstill = stall.Standstill()
+        self._stalled_as: object = None  # the actions at which that was told
+        self._lacking: str | None = None  # what the graph that was sent lacks to begin
+        self._beside: TaskGroup
         self._parts = Parts()
         self._answered = False  # by a get, since the last feedback
         self._exact = exact
@@ -113,9 +119,9 @@ class Watch:
         """Ask now."""
         self._look.set()
 
-    def sends(self, graph: Graph) -> None:
+    def sends(self, umrf: str) -> None:
         """This graph is being started: what the engine shows is compared with it, once."""
-        self._sent = self.graph = graph
+        self._sent = self.umrf = umrf
 
     def hear(self, line: str) -> None:
         """A line of the engine's own log, about whatever."""
@@ -150,7 +156,12 @@ class Watch:
             self._it.observe(tuple(replace(each, since_asked=asked) for each in news))
 
     async def run(self) -> None:
-        """Ask until cancelled: each second, sooner when there is news, ten times as often for a stop."""
+        """Ask until cancelled. What takes longer is found out beside it: no proof waits for that."""
+        async with anyio.create_task_group() as self._beside:
+            await self._ask()
+
+    async def _ask(self) -> None:
+        """Each second, sooner when there is news, ten times as often for a stop."""
         wait = 0.0
         while True:
             with anyio.move_on_after(wait):
@@ -164,7 +175,7 @@ class Watch:
                 self._hear_nothing(str(nothing))
             else:
                 self._take(answer, order, began)
-                await self._compare(answer)
+                self._compare(answer)
             process = self._it.run.process
             if process is not None and has_ended(process):
                 self._it.engine_ended()
@@ -212,16 +223,27 @@ class Watch:
         else:
             self.trouble = _SEVERAL.format(servers=servers or "no")
 
-    async def _compare(self, answer: Answer) -> None:
+    def _compare(self, answer: Answer) -> None:
         """Once: whether the engine has what was sent. It is never stopped for that by itself."""
         sent, text = self._sent, answer.texts.get(self._it.run.graph_name)
         if sent is None or text is None or self._it.run.graph_state is None:
             return
         self._sent = None
-        if why := await self._aside(lambda: difference(sent, text)):
-            self._it.alarm(
-                "echo_differs", f"What {self._it.run.engine} shows is not what was sent: {why}"
-            )
+
+        async def compare() -> None:
+            if why := await self._aside(differs, sent, text):
+                self._it.alarm(
+                    "echo_differs", f"What {self._it.run.engine} shows is not what was sent: {why}"
+                )
+
+        self._beside.start_soon(self._found_out, compare)
+
+    async def _found_out(self, work: Callable[[], Awaitable[None]]) -> None:
+        """What only helps people is given up where nobody can work on it."""
+        try:
+            await work()
+        except Refused as why:
+            log.warning("run %s: %s", self._it.run.id, why.detail)
 
     def _note(self, shown: list[Snapshot]) -> None:
         """Keep what an answer says beyond what is known already."""
@@ -284,6 +306,9 @@ class Watch:
             if self._exact and at_rest:
                 self._it.engine_ended()  # a simulated one is switched off, and nothing has moved
             return
+        if _never_began(own) and self.umrf is not None and self._lacking is None:
+            self._lacking = ""
+            self._beside.start_soon(self._found_out, self._find_lacking)
         if self._it.run.desired != "stopped":
             end = self._it.run.apparent_end
             if end is not None and own.state in TERMINAL and at_rest:
@@ -318,9 +343,20 @@ class Watch:
         engine, words = self._it.run.engine, self._start.words
         if words:
             return f"{refusals.why_refused(engine, words)} It has begun none of it."
-        lacking = stall.unbegun(self.graph) if self.graph is not None else ()
-        why = " ".join(stall.in_words(each) for each in lacking[:_LACKING])
-        return f"{engine} holds the graph and has not begun it, without a word why. {why}".rstrip()
+        told = f"{engine} holds the graph and has not begun it, without a word why. {self._lacking or ''}"
+        return told.rstrip()
+
+    async def _find_lacking(self) -> None:
+        self._lacking = await self._aside(stall.lacking_in_words, self.umrf)
+
+    async def _tell_stall(self) -> None:
+        run = self._it.run
+        try:
+            text = await self._aside(stall.told_of, run, self.umrf)
+        except Refused:  # nobody can read the graph now; what is known must be said all the same
+            text = stall.told(run, None)
+        if self._it.run.end is None and self._standstill.lasts:
+            self._it.alarm(stall.STALLED, text)
 
     def _look_for_trouble(self, shown: list[Snapshot], asked: float) -> None:
         """It goes on, as far as the engine says."""
@@ -331,8 +367,10 @@ class Watch:
                 f"{own.state}: some of it may have begun. Stop it, and restart its engine."
             )
             self._it.alarm(refusals.HALF_BEGUN, text)
-        if self._standstill.seen(shown, asked) and not self._exact:
-            self._it.alarm(stall.STALLED, stall.told(run, self.graph))
+        stalls = self._standstill.seen(shown, asked) and not self._exact
+        if stalls and self._stalled_as is not run.actions:
+            self._stalled_as = run.actions
+            self._beside.start_soon(self._tell_stall)
 
 
 def _never_began(own: Snapshot) -> bool:

@@ -5,6 +5,7 @@ import getpass
 import logging
 import re
 from collections.abc import Callable
+from contextvars import ContextVar
 from typing import Any, Final, NamedTuple
 
 import anyio
@@ -95,6 +96,34 @@ def live_session(connection: ASGIConnection[Any, Any, Any, Any]) -> Session:
     return session
 
 
+class Caller(NamedTuple):
+    """Who waits for what is being done now. What is done for nobody may end."""
+
+    person: str
+    receive: Receive | None = None  # a socket's messages are not ours to read
+
+    async def gone(self) -> None:
+        """Wait until they have gone. Only after the request was read."""
+        if self.receive is None:
+            await anyio.sleep_forever()
+        else:
+            while (await self.receive())["type"] != "http.disconnect":
+                pass
+
+
+_CALLER: Final[ContextVar[Caller | None]] = ContextVar("caller", default=None)
+
+
+def caller() -> Caller | None:
+    """Whoever asked for what this task does; None when nobody did."""
+    return _CALLER.get()
+
+
+def done_for_nobody() -> None:
+    """From here on this task, and those that it begins, go on for themselves."""
+    _CALLER.set(None)
+
+
 class Plain(NamedTuple):
     """A connection as the server below gave it: for sockets whose every message counts."""
 
@@ -149,6 +178,9 @@ class Access:
         except Refused as refused:
             await refuse(scope, receive, send, refused)
             return
+        known: Person | None = scope["state"].get("person")
+        asked = receive if scope["type"] == ScopeType.HTTP else None
+        _CALLER.set(None if known is None else Caller(known.id, asked))
         if preflight:
             await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
             return

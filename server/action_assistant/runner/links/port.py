@@ -36,11 +36,27 @@ class NoAnswer(Exception):
     """The engine did not answer a get in time, or cannot; the text says what is known."""
 
 
+class Outline(msgspec.Struct, frozen=True):
+    """What the runner itself knows of a graph: its name, and the aid of each action by full name."""
+
+    name: str
+    actions: dict[str, str]
+
+
+def outline(graph: Graph | Outline) -> Outline:
+    """What the runner needs to know of a graph."""
+    if isinstance(graph, Outline):
+        return graph
+    named = {each.full_name: each.key for each in graph.actions if not each.missing}
+    return Outline(graph.name, named)
+
+
 class Order(msgspec.Struct, frozen=True, kw_only=True):
-    """One start: the graph as a value, and the text that carries the run's identity."""
+    """One start: the text that carries the run's identity, and what it is of. Whoever needs the
+    graph reads the text, beside the runner; where it is at hand it may be given along."""
 
     run: str
-    graph: Graph
+    graph: Graph | Outline
     umrf: str
     targets: tuple[str, ...] = ()
 

@@ -6,18 +6,21 @@ that is started here keeps its name to itself, so one link serves many runs of d
 
 import math
 import secrets
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from typing import Final, assert_never
+from typing import Final, TypeAlias, assert_never
 
 import anyio
+import msgspec
 
+from action_assistant.runner.admission import slowed
 from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
     EngineRefused,
     EngineState,
+    Link,
     NoAnswer,
     NotSent,
     Order,
@@ -35,10 +38,26 @@ from action_assistant.runner.seen import (
     NodeState,
     Snapshot,
 )
-from action_assistant.umrf import semantics
+from action_assistant.umrf import codec, semantics
+from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.model import Graph
 
 _GRAIN_MS: Final = 0.01  # clocks are not finer: what is due so soon is due now
 _SLICE: Final = 50  # engine steps between two turns of the event loop
+
+#: What makes a simulated engine of these facts that follows a script (JSON; "" for none).
+Simulator: TypeAlias = Callable[[EngineFacts, str, Callable[[], int]], Link]
+
+
+def in_this_process(facts: EngineFacts, script: str, wall: Callable[[], int]) -> "SimulatorLink":
+    """A simulated engine that shares the event loop: where time is virtual."""
+    return SimulatorLink(engine_of(facts, script), wall=wall)
+
+
+def engine_of(facts: EngineFacts, script: str) -> semantics.Engine:
+    """An engine that follows a script which was admitted."""
+    behaviours = slowed(semantics.script_from(msgspec.json.decode(script))) if script else None
+    return semantics.Engine(facts=facts, script=behaviours)
 
 
 class SimulatorLink:
@@ -74,10 +93,11 @@ class SimulatorLink:
     async def start(self, order: Order) -> None:
         """Start at this moment. Raises EngineRefused."""
         self._alive()
+        graph = _whole(order)
         before = self._runs.get(order.graph.name)
         self._runs[order.graph.name] = order.run
         try:
-            self._tell(self._engine.start(order.graph, self._now()))
+            self._tell(self._engine.start(graph, self._now()))
         except semantics.EngineRefused as refused:
             if before is not None:  # that one goes on, or is stopped, under its own identity
                 self._runs[order.graph.name] = before
@@ -104,7 +124,7 @@ class SimulatorLink:
         if self._dead is not None:
             raise NotSent(self._dead)
         try:
-            self._tell(self._engine.modify(order.graph, self._now(), continue_from=continue_from))
+            self._tell(self._engine.modify(_whole(order), self._now(), continue_from=continue_from))
         except semantics.EngineRefused as refused:
             self._wake.set()
             raise EngineRefused(str(refused)) from refused
@@ -127,8 +147,9 @@ class SimulatorLink:
         )
         return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=graphs)
 
-    async def run(self) -> None:
-        """Let the engine live until cancelled."""
+    async def run(self, heard: Callable[[], Awaitable[None]] | None = None) -> None:
+        """Let the engine live until cancelled, not faster than what it says is `heard`."""
+        heard = heard or anyio.lowlevel.checkpoint
         while True:
             due = self._engine.due
             late = due is None or self._dead is not None
@@ -136,7 +157,9 @@ class SimulatorLink:
             with anyio.move_on_after(wait):
                 await self._wake.wait()
             while not self._advance():
+                await heard()
                 await anyio.lowlevel.checkpoint()
+            await heard()
             self._wake = anyio.Event()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
@@ -216,6 +239,10 @@ class SimulatorLink:
             return self._runs[graph]
         owners = [name for name in self._runs if graph.startswith(f"{name}__")]
         return self._runs[max(owners, key=len)] if owners else None
+
+
+def _whole(order: Order) -> Graph:
+    return order.graph if isinstance(order.graph, Graph) else codec.read(order.umrf).graph
 
 
 def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact | None:

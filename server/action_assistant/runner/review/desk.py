@@ -1,42 +1,50 @@
 """Where runs are looked back on: sums up what has ended, keeps marks, compares, exports, expects."""
 
 import logging
-from collections.abc import AsyncIterator, Sequence
+from collections import Counter
+from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Concatenate, Final, Literal, ParamSpec, Protocol, TypeAlias, TypeVar
 
 import anyio
 import msgspec
-from sqlalchemy import Row, func, select
+from sqlalchemy import Row, Select, func, select
 
-from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refused
-from action_assistant.journal.events import Draft
+from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refused, TooLarge
+from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.tables import expectation, review, run, run_label
 from action_assistant.runner import recorded_runs, shapes
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.events import Author
-from action_assistant.runner.history import Aside
+from action_assistant.runner.history import Aside, History
 from action_assistant.runner.recorder import stream_of
+from action_assistant.runner.recordings import Recording, hours
 from action_assistant.runner.review import about, again, exports, statistics
 from action_assistant.runner.review.cause import causes
 from action_assistant.runner.review.cause_words import words
 from action_assistant.runner.review.compare import Comparison, compare
 from action_assistant.runner.review.film import Film, film
 from action_assistant.runner.review.raw import Raw, RawPut, raw_of, stream_of_raw
-from action_assistant.runner.review.reel import APART, Reels
+from action_assistant.runner.review.reel import Reels
 from action_assistant.runner.review.shelf import Archived, Shelf
 from action_assistant.runner.runs import Run
+from action_assistant.runner.workers import Crashed
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 
 log: Final = logging.getLogger(__name__)
 
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_TRIES: Final = 3
 _LAST: Final = 1_000  # runs in one statistics
 _CAUSES: Final = 10  # in one answer
 _AT_ONCE: Final = 200  # runs summed up between two looks
 _ROWS: Final = 400  # parameters of one query
+_PAGE: Final = 500  # events exported at once
 _CLOCK: Final = 3_600_000_000  # microseconds by which a clock may be set back
 
 Format: TypeAlias = Literal["jsonl", "csv", "mcap"]
@@ -76,18 +84,53 @@ class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
     quote: str
 
 
-class Desk:
-    """Looks back on runs. Nothing here commands a robot."""
+class Asking(Protocol):
+    """Somebody who answers what a method of `Desk` would."""
 
-    def __init__(self, control: Control, ledger: Shelf, aside: Aside, wall: Clock) -> None:
+    async def value(
+        self,
+        question: Callable[Concatenate["Desk", P], Awaitable[T]],
+        *args: P.args,
+        **kw: P.kwargs,
+    ) -> T:
+        """The answer."""
+        ...
+
+
+class Going:
+    """What goes on, as far as looking back needs it: open runs, and how others are read."""
+
+    open: dict[str, OpenRun]
+    history: History
+
+    def next_number(self) -> int:
+        """Nothing begins here."""
+        raise NotImplementedError
+
+
+class Desk:
+    """Looks back on runs. Nothing here commands a robot. What only reads is asked of a worker that
+    has a desk of its own (`stored.Asked`), over the same file and with nothing that goes on."""
+
+    def __init__(
+        self,
+        control: Control | Going,
+        ledger: Shelf,
+        aside: Aside,
+        wall: Clock,
+        asked: Asking | None = None,
+    ) -> None:
         self.reels = Reels(ledger, aside)
+        self._asked = asked
         self._control = control
         self._ledger = ledger
         self._aside = aside
         self._wall = wall
         self._ended = anyio.Event()
         self._summed_up: int | None = None  # all runs that had ended by then are summed up
-        control.watch(self._saw)
+        self._tried: Counter[str] = Counter()  # runs whose sums took a worker's life
+        if isinstance(control, Control):
+            control.watch(self._saw)
 
     def _saw(self, opened: OpenRun) -> None:
         if opened.run.end is not None:
@@ -134,16 +177,39 @@ class Desk:
 
     async def _sum_up(self, run_id: str) -> None:
         try:
-            found = (await self.reels.reel(run_id)).keys[-1].run
-            good = found.end == "finished" and found.result == "on_true"
-            graph = None if good else await self._graph(run_id)  # only failures have causes
-            summed = await self._aside(lambda: about.sum_of(found, graph, self._wall()))
-        except Refused:
-            raise  # it will be, later
+            if self._asked is None:
+                summed = await self.summed(run_id, self._wall())
+            else:
+                summed = await self._asked.value(Desk.summed, run_id, self._wall())
+        except Refused as refused:
+            self._tried[run_id] += 1
+            if self._tried[run_id] < _TRIES or not isinstance(refused, Crashed | TooLarge):
+                raise  # it will be, later
+            log.error("run %s is left out of sums: %s", run_id, refused.detail)
+            summed = about.SummedUp(self._wall(), {})
         except Exception:  # whatever a run of long ago holds, those that go on are not ended by it
             log.exception("run %s cannot be read; it is left out of sums", run_id)
             summed = about.SummedUp(self._wall(), {}, figures=about.FIGURES)
         await self._ledger.append(about.stream_about(run_id), [about.draft(summed)])
+
+    async def summed(self, run_id: str, now: int) -> about.SummedUp:
+        """The sum of a run that is over. Raises NotFound."""
+        found = (await self.reels.reel(run_id)).keys[-1].run
+        good = found.end == "finished" and found.result == "on_true"
+        graph = None if good else await self._graph(run_id)  # only failures have causes
+        return await self._aside(lambda: about.sum_of(found, graph, now))
+
+    async def whole(self, run_id: str) -> shapes.RunWhole:
+        """A run that is over, and the graph as it was sent. Raises NotFound."""
+        umrf = await self._control.history.umrf(run_id)
+        found, place = await self.known(run_id), await self.place(run_id)
+        return shapes.whole(found, shapes.sent_of(umrf), place=place)
+
+    async def followed(self, run_id: str, robots_too: bool) -> tuple[Run, int]:
+        """A run and the seq of its last event; with few visits unless it has to go on exactly.
+        Raises NotFound."""
+        key = (await self.reels.reel(run_id)).keys[-1]
+        return (key.run if robots_too else shapes.thinned(key.run)), key.seq
 
     async def known(self, run_id: str) -> Run:
         """A run, open or over. Raises NotFound."""
@@ -172,17 +238,33 @@ class Desk:
             )
         return shown
 
+    async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
+        """Rows of the tables. Raises Unavailable."""
+        return await self._ledger.query(statement)
+
+    async def events(self, run_id: str, after: int, limit: int) -> Sequence[Event]:
+        """Stored events of a run. Raises Unavailable."""
+        return await self._control.history.events(run_id, after, limit)
+
+    async def sent(self, run_id: str) -> shapes.Sent:
+        """The graph as it was sent, and the values of its actions. Raises NotFound."""
+        return shapes.sent_of(await self._control.history.umrf(run_id))
+
     async def place(self, run_id: str) -> Row[Any] | None:
         """Where the events of a run are, when they are in an archive."""
         return await self._ledger.place(stream_of(run_id))
 
-    async def raw(self, run_id: str) -> Raw:
-        """The raw messages of its robot from its time. Raises NotFound."""
+    async def raw(self, run_id: str, recordings: Sequence[Recording], now: int) -> Raw:
+        """The raw messages of its robot from its time; `recordings` are all of it that are here.
+        Raises NotFound."""
         run_ = await self.known(run_id)
-        since = run_.started_at or run_.requested_at
-        until = run_.ended_at or self._wall()
-        kept = self._control.robots.recordings
-        here = [] if run_.simulated or kept is None else await kept.of(run_.engine, since, until)
+        until = run_.ended_at or now
+        first, last = hours(run_.started_at or run_.requested_at, until)
+        here = [
+            each
+            for each in recordings
+            if not run_.simulated and first <= each.name[: len(first)] <= last
+        ]
         told = await self._ledger.read(stream_of_raw(run_.engine))
         gone = (msgspec.json.decode(event.body, type=RawPut) for event in told)
         return raw_of(run_, here, gone, until)
@@ -228,12 +310,13 @@ class Desk:
             return await self._aside(lambda: exports.mcap(events))
         return await self._aside(lambda: b"".join(exports.lines(run_id, events)))
 
-    async def lines(self, run_id: str) -> AsyncIterator[bytes]:
-        """JSON lines, page by page: the run may be longer than memory should hold."""
-        after = 0
-        while events := await self._ledger.read(stream_of(run_id), after=after, limit=APART):
-            after = events[-1].seq
-            yield b"".join(exports.lines(run_id, events))
+    async def lines(self, run_id: str, after: int) -> tuple[int, bytes]:
+        """A page of JSON lines, and the seq of its last event; the run may be longer than memory
+        should hold. Raises NotFound when there is nothing at all."""
+        events = await self._ledger.read(stream_of(run_id), after=after, limit=_PAGE)
+        if not events and not after:
+            raise NotFound("There is no such run.")
+        return events[-1].seq if events else after, b"".join(exports.lines(run_id, events))
 
     async def script(
         self, run_id: str, fault: tuple[str, again.Fault] | None, umrf: bytes | None = None
@@ -296,22 +379,28 @@ class Desk:
         name = " ".join(name.split())
         if not 1 <= len(name) <= 100:
             raise BadInput("A name has 1 to 100 characters.", where={"path": "/name"})
-        found = await self.known(run_id)
-        if found.end is None:
+        if run_id in self._control.open:
             raise Conflict("The run is not over yet.")
-        umrf = await self._control.history.umrf(run_id)
-        saved = await self._aside(lambda: self._expected(found, umrf, name, author))
+        if self._asked is None:
+            saved = await self.expected(run_id, name, author, self._wall())
+        else:
+            saved = await self._asked.value(Desk.expected, run_id, name, author, self._wall())
         draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
         await self._ledger.append(again.STREAM, [draft])
         return _shown(saved)
 
-    def _expected(self, found: Run, umrf: str, name: str, author: Author) -> again.Expected:
+    async def expected(self, run_id: str, name: str, author: Author, now: int) -> again.Expected:
+        """What would be expected. Raises NotFound, Conflict."""
+        found = await self.known(run_id)
+        if found.end is None:
+            raise Conflict("The run is not over yet.")
+        umrf = await self._control.history.umrf(run_id)
         recorded = again.recorded(found)
         script = {"behaviours": recorded.behaviours}
         course = again.course(codec.read(umrf.encode()).graph, script_from(script))
         _check_alike(found, course)
         return again.Expected(
-            at=self._wall(),
+            at=now,
             name=name,
             author=author,
             run=found.id,

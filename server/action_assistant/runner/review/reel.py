@@ -156,7 +156,7 @@ class Reels:
             events = await self._ledger.read(stream, after=after, limit=room)
             if not events:
                 break
-            key = await self.aside(lambda last=last, events=events: _next(last, events))  # type: ignore[misc]
+            key = await self.aside(lambda last=last, events=events: _next(last, events))
             marks += marks_of(events)
             if last is not None and last.seq % APART:
                 keys.pop()  # an end that has gone on is no keyframe

@@ -1,7 +1,8 @@
 """Routes for looking back: films, marks, comparisons, statistics, files, expectations."""
 
-from collections.abc import Callable
-from typing import Annotated, Any, Final
+import time
+from collections.abc import AsyncIterator
+from typing import Annotated, Any, Final, Protocol
 
 import msgspec
 from anyio import to_thread
@@ -15,6 +16,7 @@ from action_assistant.errors import BadInput
 from action_assistant.runner import recorded_runs
 from action_assistant.runner.admission import decoded
 from action_assistant.runner.asking import author_of
+from action_assistant.runner.control import Control
 from action_assistant.runner.described import FitOperation
 from action_assistant.runner.review import about, again
 from action_assistant.runner.review.compare import Comparison
@@ -23,6 +25,7 @@ from action_assistant.runner.review.film import Film
 from action_assistant.runner.review.raw import Raw
 from action_assistant.runner.review.retention import Retention, Swept
 from action_assistant.runner.review.statistics import Statistics
+from action_assistant.runner.review.stored import Asked, json_of
 from action_assistant.web.access import Needs
 
 _Asking = Request[Any, Any, Any]
@@ -55,14 +58,22 @@ class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     raw: Annotated[float, msgspec.Meta(ge=0)] | None = None
 
 
-def routes(
-    desk: Callable[[], Desk], retention: Callable[[], Retention]
-) -> list[ControllerRouterHandler]:
-    """All routes. `desk` and `retention` are there before the first request."""
-    return [*_of_one(desk), *_of_many(desk), *_expecting(desk), _archiving(retention)]
+class Has(Protocol):
+    """What these routes work on; all of it is there before the first request. What only reads is
+    `asked` of a worker."""
+
+    control: Control
+    desk: Desk
+    asked: Asked
+    retention: Retention
 
 
-def _archiving(retention: Callable[[], Retention]) -> ControllerRouterHandler:
+def routes(house: Has) -> list[ControllerRouterHandler]:
+    """All routes."""
+    return [*_of_one(house), *_of_many(house), *_expecting(house), _archiving(house)]
+
+
+def _archiving(house: Has) -> ControllerRouterHandler:
     @post(
         "/api/archive",
         status_code=200,
@@ -70,37 +81,38 @@ def _archiving(retention: Callable[[], Retention]) -> ControllerRouterHandler:
         guards=[Needs("restore")],
     )
     async def archive(data: Sweep) -> Swept:
-        return await retention().sweep(data.runs, data.raw)
+        return await house.retention.sweep(data.runs, data.raw)
 
     return archive
 
 
-def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
+def _of_one(house: Has) -> list[ControllerRouterHandler]:
     @get("/api/runs/{run:str}/film", summary="What every event of a run changed, a page at a time")
-    async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Film:
-        return await desk().film(run, after)
+    async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Response[Film]:
+        return json_of(await house.asked.text(Desk.film, run, after), Film)
 
     @get("/api/runs/{run:str}/causes", summary="What is proven to be behind the end of a run")
-    async def found_causes(run: str) -> list[CauseShown]:
-        return await desk().causes(run)
+    async def found_causes(run: str) -> Response[list[CauseShown]]:
+        return json_of(await house.asked.text(Desk.causes, run), list[CauseShown])
 
     @get("/api/runs/{run:str}/umrf", summary="The graph of a run as it was sent")
     async def umrf(run: str) -> Response[bytes]:
-        return Response(await desk().umrf(run), media_type="application/json")
+        return json_of(await house.asked.value(Desk.umrf, run), bytes)
 
     @get("/api/runs/{run:str}/marks", summary="What people noted about a run")
     async def marks(run: str) -> Marked:
-        return await desk().marks(run)
+        return await house.desk.marks(run)
 
     @patch("/api/runs/{run:str}/marks", summary="Pin, note or label a run", guards=[Needs("edit")])
     async def mark(run: str, data: about.Marks, request: _Asking) -> Marked:
-        return await desk().mark(run, data, author_of(request))
+        return await house.desk.mark(run, data, author_of(request))
 
     @get("/api/runs/{run:str}/script", summary="What a run did, as a script for the simulator")
     async def script(
         run: str, action: str | None = None, fault: again.Fault | None = None
-    ) -> again.Recorded:
-        return await desk().script(run, _fault(action, fault))
+    ) -> Response[again.Recorded]:
+        text = await house.asked.text(Desk.script, run, _fault(action, fault))
+        return json_of(text, again.Recorded)
 
     @post(
         "/api/runs/{run:str}/script",
@@ -109,9 +121,11 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
         operation_class=FitOperation,
         guards=[Needs("see")],
     )
-    async def fit(run: str, request: _Asking) -> again.Recorded:
+    async def fit(run: str, request: _Asking) -> Response[again.Recorded]:
         asked = decoded(await request.body(), Fit)
-        return await desk().script(run, _fault(asked.action, asked.fault), bytes(asked.umrf))
+        fault = _fault(asked.action, asked.fault)
+        text = await house.asked.text(Desk.script, run, fault, bytes(asked.umrf))
+        return json_of(text, again.Recorded)
 
     @get("/api/runs/{run:str}/export", summary="A run as a file: jsonl, csv or mcap")
     async def export(
@@ -119,30 +133,41 @@ def _of_one(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
     ) -> Response[bytes] | Stream:
         head = {"content-disposition": f'attachment; filename="run.{form}"'}
         if form == "jsonl":
-            await desk().reels.reel(run)
-            return Stream(desk().lines(run), media_type=_TYPES[form], headers=head)
-        content = await desk().export(run, form)
+            seq, first = await house.asked.value(Desk.lines, run, 0)
+            lines = _lines(house.asked, run, seq, first)
+            return Stream(lines, media_type=_TYPES[form], headers=head)
+        content = await house.asked.value(Desk.export, run, form)
         return Response(content, media_type=_TYPES[form], headers=head)
 
     @get("/api/runs/{run:str}/raw", summary="Where the raw messages from the time of a run are")
-    async def raw(run: str) -> Raw:
-        return await desk().raw(run)
+    async def raw(run: str) -> Response[Raw]:
+        found = await house.control.find(run)
+        kept = house.control.robots.recordings
+        here = [] if found.simulated or kept is None else await kept.listed(found.engine)
+        text = await house.asked.text(Desk.raw, run, here, time.time_ns() // 1000)
+        return json_of(text, Raw)
 
     return [film, found_causes, umrf, marks, mark, script, fit, export, raw]
 
 
-def _of_many(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
+async def _lines(asked: Asked, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
+    while page:
+        yield page
+        seq, page = await asked.value(Desk.lines, run, seq)
+
+
+def _of_many(house: Has) -> list[ControllerRouterHandler]:
     @get("/api/comparison", summary="Two runs side by side, and where they part")
-    async def comparison(a: str, b: str) -> Comparison:
-        return await desk().compare(a, b)
+    async def comparison(a: str, b: str) -> Response[Comparison]:
+        return json_of(await house.asked.text(Desk.compare, a, b), Comparison)
 
     @get("/api/statistics", summary="The newest runs of a graph together")
     async def statistics(
         graph: str,
         robot: str | None = None,
         last: Annotated[int, Parameter(ge=1, le=1000)] = 200,
-    ) -> Statistics:
-        return await desk().statistics(graph, robot, last)
+    ) -> Response[Statistics]:
+        return json_of(await house.asked.text(Desk.statistics, graph, robot, last), Statistics)
 
     @post(
         "/api/examples",
@@ -152,15 +177,15 @@ def _of_many(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
     )
     async def take_in_examples(request: _Asking) -> list[str]:
         texts = await to_thread.run_sync(recorded_runs.shipped, places.examples())
-        return await desk().take_in(texts, author_of(request))
+        return await house.desk.take_in(texts, author_of(request))
 
     return [comparison, statistics, take_in_examples]
 
 
-def _expecting(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
+def _expecting(house: Has) -> list[ControllerRouterHandler]:
     @get("/api/expectations", summary="Runs that shall go the same for ever")
-    async def listed() -> list[Expectation]:
-        return await desk().expectations()
+    async def listed() -> Response[list[Expectation]]:
+        return json_of(await house.asked.text(Desk.expectations), list[Expectation])
 
     @post(
         "/api/expectations",
@@ -168,11 +193,11 @@ def _expecting(desk: Callable[[], Desk]) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def expect(data: Expect, request: _Asking) -> Expectation:
-        return await desk().expect(data.run, data.name, author_of(request))
+        return await house.desk.expect(data.run, data.name, author_of(request))
 
     @delete("/api/expectations/{name:str}", summary="Expect it no more", guards=[Needs("edit")])
     async def retire(name: str, request: _Asking) -> None:
-        await desk().retire(name, author_of(request))
+        await house.desk.retire(name, author_of(request))
 
     return [listed, expect, retire]
 

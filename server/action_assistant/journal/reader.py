@@ -1,0 +1,120 @@
+"""Reading a journal: events by stream or in order, the tables, what was cached."""
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, TypeVar
+from urllib.parse import quote
+
+from sqlalchemy import Connection, NullPool, Row, Select, create_engine, func, select
+from sqlalchemy.exc import DatabaseError
+
+from action_assistant.errors import Unavailable
+from action_assistant.journal.chain import NOTHING, Head
+from action_assistant.journal.database import cause_of
+from action_assistant.journal.events import Event, Snapshot
+from action_assistant.journal.tables import editor_event, editor_head, editor_snapshot
+
+T = TypeVar("T")
+
+_PAGE: Final = 500  # events that are read at once
+
+# The tables of the log are the same for both branches.
+_event, _head, _snapshot = editor_event.c, editor_head.c, editor_snapshot.c
+_EVENTS: Final = select(*(_event[name] for name in Event.__struct_fields__))
+
+
+class Reader:
+    """Who can ask a database, in whichever way."""
+
+    async def _ask(self, question: Callable[[Connection], T]) -> T:
+        """The answer. Raises Unavailable."""
+        raise NotImplementedError
+
+    async def read(
+        self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
+    ) -> list[Event]:
+        """The events of a stream with `after < seq <= upto`, in order."""
+        chosen = _EVENTS.where(_event.stream == stream, _event.seq > after)
+        if upto is not None:
+            chosen = chosen.where(_event.seq <= upto)
+        return await self._events(chosen.order_by(_event.seq).limit(limit))
+
+    async def read_all(self, *, after: int = 0, limit: int = _PAGE) -> list[Event]:
+        """The events of all streams with `position > after`, in order."""
+        return await self._events(following(after, limit))
+
+    async def newest(self, stream: str) -> int:
+        """The seq of a stream's last event; 0 when there is none."""
+        return await self._number(select(_head.seq).where(_head.stream == stream))
+
+    async def position(self) -> int:
+        """The position of the last event of all."""
+        return await self._number(select(func.max(_event.position)))
+
+    async def query(self, statement: Select[Any]) -> list[Row[Any]]:
+        """Ask the tables."""
+        return await self._ask(lambda connection: list(connection.execute(statement).all()))
+
+    async def snapshot(self, stream: str) -> Snapshot | None:
+        """The cached sum of a stream; None when there is none, or when it does not fit the log."""
+        chosen = select(_snapshot.seq, _snapshot.proof, _snapshot.state).where(
+            _snapshot.stream == stream
+        )
+
+        def find(connection: Connection) -> Snapshot | None:
+            row = connection.execute(chosen).first()
+            if row is None:
+                return None
+            seal = seal_of(body_of(connection, stream, row.seq), row.state)
+            return Snapshot(stream, row.seq, row.state) if seal == row.proof else None
+
+        return await self._ask(find)
+
+    async def end(self, stream: str) -> Head:
+        """The last event of a stream, and the chain up to it."""
+        chosen = select(_head.seq, _head.chain).where(_head.stream == stream)
+        row = await self._ask(lambda connection: connection.execute(chosen).first())
+        return Head(*row) if row is not None else NOTHING
+
+    async def _events(self, chosen: Select[Any]) -> list[Event]:
+        return await self._ask(lambda c: [Event(*row) for row in c.execute(chosen)])
+
+    async def _number(self, chosen: Select[Any]) -> int:
+        found: int | None = await self._ask(lambda c: c.execute(chosen).scalar())
+        return found or 0
+
+
+class FileReader(Reader):
+    """Reads the SQLite file of a journal that another process writes; waits for each answer. Never
+    changes it, nor holds up its writer."""
+
+    def __init__(self, path: Path) -> None:
+        self._engine = create_engine(
+            f"sqlite:///file:{quote(str(path))}?mode=ro&uri=true",
+            poolclass=NullPool,  # nothing of ours stays open between two questions
+            isolation_level="AUTOCOMMIT",
+        )
+
+    async def _ask(self, question: Callable[[Connection], T]) -> T:
+        try:
+            with self._engine.connect() as connection:
+                return question(connection)
+        except DatabaseError as error:
+            raise Unavailable(f"The journal cannot be read: {cause_of(error)}.") from error
+
+
+def following(position: int, limit: int) -> Select[Any]:
+    """Events of all streams from a position on."""
+    return _EVENTS.where(_event.position > position).order_by(_event.position).limit(limit)
+
+
+def body_of(connection: Connection, stream: str, seq: int) -> bytes:
+    """The bytes of an event; none when it is not there."""
+    chosen = select(_event.body).where(_event.stream == stream, _event.seq == seq)
+    return connection.execute(chosen).scalar() or b""
+
+
+def seal_of(event: bytes, state: bytes) -> bytes:
+    """Ties a snapshot to its own bytes and to the event it was made at."""
+    return hashlib.sha256(hashlib.sha256(event).digest() + state).digest()

@@ -1,0 +1,293 @@
+"""The link to a simulated engine in a process of its own: nothing it computes holds up the runner.
+
+The process runs `SimulatorLink`; here is its other end. Commands and answers travel as pickled
+tuples behind their length. It ends with the runner, and by itself when nobody listens any more.
+"""
+
+import asyncio
+import itertools
+import logging
+import pickle
+import secrets
+import socket
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import AbstractContextManager, suppress
+from functools import partial
+from typing import Any, Final
+
+import anyio
+import msgspec
+from anyio import to_thread
+
+from action_assistant.runner.links.ears import Ears
+from action_assistant.runner.links.port import (
+    Answer,
+    EngineChanged,
+    EngineRefused,
+    EngineState,
+    NoAnswer,
+    NotSent,
+    Order,
+    Report,
+    Standing,
+    Transitions,
+)
+from action_assistant.runner.links.simulator import SimulatorLink, engine_of
+from action_assistant.runner.workers import child
+from action_assistant.umrf.facts import EngineFacts
+
+log: Final = logging.getLogger(__name__)
+
+_HEAD: Final = 4  # bytes of a length
+_CHANGES: Final = 100  # of one report; the runner does nothing else while it takes one in
+_REST: Final = 3  # for so many times as long as reports took, all simulated runs wait together
+_START_S: Final = 4.0  # less than a start may take
+_GONE: Final = "The simulated engine was switched off."
+_DIED: Final = "The process of the simulated engine has died, and the engine with it."
+
+_COMMANDS: Final = frozenset({"start", "stop", "pause", "resume", "modify", "get"})
+
+
+class Simulators:
+    """Makes links. What they report takes a bounded share of the runner's time, all together."""
+
+    def __init__(self) -> None:
+        self._turn = anyio.Lock()
+
+    def __call__(self, facts: EngineFacts, script: str, wall: Callable[[], int]) -> "SimulatedLink":
+        """A simulated engine. Its process begins with its first start."""
+        return SimulatedLink(facts, script, wall, self.take)
+
+    async def take(self, report: Callable[[], None]) -> None:
+        """Take in one report, then leave time for others."""
+        async with self._turn:
+            began = time.perf_counter()
+            report()
+            await anyio.sleep(_REST * (time.perf_counter() - began))
+
+
+class SimulatedLink:
+    """A simulated engine in another process."""
+
+    simulated: Final = True
+    pauses: Final = True
+
+    def __init__(
+        self,
+        facts: EngineFacts,
+        script: str,
+        wall: Callable[[], int],
+        take: Callable[[Callable[[], None]], Awaitable[None]],
+    ) -> None:
+        self._facts = facts
+        self._script = script
+        self._wall = wall
+        self._take = take
+        self._incarnation = secrets.token_hex(8)
+        self._ears = Ears[Report]()
+        self._numbers = itertools.count(1)
+        self._asked: dict[int, asyncio.Future[Any]] = {}
+        self._writer: asyncio.StreamWriter | None = None
+        self._reading: asyncio.Task[None] | None = None
+        self._process: Any = None
+        self._state: EngineState = "answering"
+        self._why = ""
+
+    @property
+    def standing(self) -> Standing:
+        """Answering until it has crashed, hangs, or its process has ended."""
+        if self._why:
+            return Standing(state=self._state, why=self._why, incarnation=self._incarnation)
+        return Standing(
+            state="answering", incarnation=self._incarnation, generation="current", servers=1
+        )
+
+    async def start(self, order: Order) -> None:
+        """Start at this moment; the first start begins the process. Raises NotSent, EngineRefused."""
+        with anyio.CancelScope(shield=True):  # a Stop that comes meanwhile finds something to stop
+            if self._process is None and not self._why:
+                await self._begin()
+            await self._told("start", order)
+
+    async def stop(self, graph_name: str) -> None:
+        """Stop at this moment."""
+        self._say(next(self._numbers), "stop", graph_name)
+
+    async def pause(self, graph_name: str) -> None:
+        """Pause at this moment."""
+        self._say(next(self._numbers), "pause", graph_name)
+
+    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+        """Resume at this moment."""
+        self._say(next(self._numbers), "resume", graph_name, continue_from)
+
+    async def modify(self, order: Order, continue_from: str = "") -> None:
+        """Change the graph at this moment. Raises NotSent, EngineRefused."""
+        await self._told("modify", order, continue_from)
+
+    async def get(self) -> Answer:
+        """What the engine holds right now. Raises NoAnswer."""
+        if self._process is None and not self._why:  # nothing was started yet
+            at = self._wall()
+            return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=())
+        asked_at = self._wall()
+        try:
+            found: Answer = await self._told("get")
+        except NotSent as gone:
+            raise NoAnswer(str(gone)) from gone
+        return msgspec.structs.replace(found, asked_at=asked_at, incarnation=self._incarnation)
+
+    async def run(self) -> None:
+        """The process lives by itself."""
+        await anyio.sleep_forever()
+
+    def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
+        """Every transition from now on."""
+        return self._ears.listening(hear)
+
+    async def aclose(self) -> None:
+        """End the engine, and its process."""
+        self._end(_GONE)
+        if self._reading is not None:
+            self._reading.cancel()
+
+    async def _begin(self) -> None:
+        ours, theirs = socket.socketpair()
+        try:
+            with anyio.fail_after(_START_S):
+                self._process = await to_thread.run_sync(
+                    _born, theirs, self._facts, self._script, abandon_on_cancel=True
+                )
+        except (OSError, EOFError, TimeoutError) as error:
+            ours.close()
+            self._end(f"No process could be begun for the simulated engine: {error!r}.")
+            raise NotSent(self._why) from error
+        reader, self._writer = await asyncio.open_connection(sock=ours)
+        self._reading = asyncio.create_task(self._read(reader))
+
+    async def _told(self, command: str, *args: Any) -> Any:
+        """What the engine says to a command. Raises NotSent, EngineRefused, NoAnswer."""
+        number = next(self._numbers)
+        future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        self._asked[number] = future
+        try:
+            if not self._say(number, command, *args):
+                raise NotSent(self._why or _GONE)
+            return await future
+        finally:
+            self._asked.pop(number, None)
+
+    def _say(self, number: int, command: str, *args: Any) -> bool:
+        if self._writer is None or self._why:
+            return False
+        self._writer.write(_framed((number, command, args)))
+        return True
+
+    async def _read(self, reader: asyncio.StreamReader) -> None:
+        """Take in what the process says, until it has ended."""
+        try:
+            while True:
+                size = int.from_bytes(await reader.readexactly(_HEAD), "big")
+                number, said = pickle.loads(await reader.readexactly(size))
+                if number:
+                    self._answer(number, said)
+                else:
+                    await self._take(partial(self._hear, said))
+        except (asyncio.IncompleteReadError, OSError):
+            self._end(_DIED)
+
+    def _answer(self, number: int, said: Any) -> None:
+        future = self._asked.get(number)
+        if future is None or future.done():
+            return
+        if isinstance(said, Exception):
+            future.set_exception(said)
+        else:
+            future.set_result(said)
+
+    def _hear(self, report: Report) -> None:
+        if isinstance(report, EngineChanged):
+            self._state, self._why = report.state, report.why
+        self._ears.tell(report)
+
+    def _end(self, why: str) -> None:
+        """The engine is no more; whoever waits for it is told."""
+        was, self._state = self._state, "gone"
+        fresh, self._why = not self._why, self._why or why
+        if self._writer is not None:
+            self._writer.close()
+        if self._process is not None and self._process.is_alive():
+            self._process.kill()
+        for future in self._asked.values():
+            if not future.done():
+                future.set_exception(NoAnswer(self._why))
+        if why == _DIED and (fresh or was != "gone"):
+            self._ears.tell(EngineChanged(at=self._wall(), state="gone", why=self._why))
+
+
+def _born(theirs: socket.socket, facts: EngineFacts, script: str) -> Any:
+    with theirs:
+        return child(_live, theirs, facts, script, name="simulated engine")
+
+
+def _framed(value: object) -> bytes:
+    raw = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
+    return len(raw).to_bytes(_HEAD, "big") + raw
+
+
+# --- in the process -------------------------------------------------------------------------------
+
+
+def _live(wire: socket.socket, facts: EngineFacts, script: str) -> None:
+    """One engine, until nobody listens any more."""
+    with suppress(asyncio.IncompleteReadError, ConnectionError, BrokenPipeError):
+        anyio.run(_serve, wire, facts, script)
+
+
+async def _serve(wire: socket.socket, facts: EngineFacts, script: str) -> None:
+    reader, writer = await asyncio.open_connection(sock=wire)
+    link = SimulatorLink(engine_of(facts, script), wall=_now)
+
+    def hear(report: Report) -> None:
+        for part in _parts(report):
+            writer.write(_framed((0, part)))
+
+    async def live() -> None:
+        """Not faster than it is listened to: what waits to be read is bounded."""
+        await link.run(writer.drain)
+
+    async def obey() -> None:
+        with suppress(asyncio.IncompleteReadError, ConnectionError):
+            while True:
+                size = int.from_bytes(await reader.readexactly(_HEAD), "big")
+                number, command, args = pickle.loads(await reader.readexactly(size))
+                writer.write(_framed((number, await _obeyed(link, command, args))))
+        tasks.cancel()
+
+    with link.listen(hear):
+        async with anyio.create_task_group() as group:
+            tasks = group.cancel_scope
+            group.start_soon(live)
+            group.start_soon(obey)
+
+
+async def _obeyed(link: SimulatorLink, command: str, args: tuple[Any, ...]) -> object:
+    assert command in _COMMANDS
+    try:
+        return await getattr(link, command)(*args)
+    except (EngineRefused, NotSent, NoAnswer) as error:
+        return error
+
+
+def _parts(report: Report) -> Iterator[Report]:
+    """A report that the runner can take in without doing nothing else for long."""
+    if not isinstance(report, Transitions):
+        yield report
+        return
+    for start in range(0, len(report.changes), _CHANGES):
+        yield Transitions(run=report.run, changes=report.changes[start : start + _CHANGES])
+
+
+def _now() -> int:
+    return time.time_ns() // 1000

@@ -1,0 +1,60 @@
+"""What is read page by page, put together in a worker: the list of runs, and the events of one."""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any, Final
+
+import msgspec
+from sqlalchemy import Row
+
+from action_assistant.journal.events import Event
+from action_assistant.runner import archive, shapes
+from action_assistant.runner.review.desk import Desk
+
+_PAGE: Final = 500  # events read at once
+
+
+class HistoryEvent(msgspec.Struct, frozen=True):
+    """One stored event, as programs that follow a run read it."""
+
+    seq: int
+    kind: str
+    author: str
+    at: datetime
+    body: msgspec.Raw
+
+
+async def listed(
+    desk: Desk, wanted: archive.Filter, limit: int, going: Mapping[str, shapes.Summary]
+) -> list[shapes.Listed]:
+    """Runs, newest first; those that are `going` are as they are there."""
+    rows = await desk.rows(archive.listed(wanted, limit))
+    labels = await _labels(desk, rows)
+    shown = (
+        shapes.listed(going.get(row.id) or shapes.summary_of_row(row), row, labels.get(row.id, []))
+        for row in rows
+    )
+    return [each for each in shown if not wanted.states or each.state in wanted.states]
+
+
+async def _labels(desk: Desk, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    if rows:
+        for row in await desk.rows(archive.labels_of([row.id for row in rows])):
+            found.setdefault(row.run, []).append(row.label)
+    return found
+
+
+async def streamed(desk: Desk, run: str, after: int) -> tuple[int, bytes]:
+    """A page of stored events as an event stream has them, and the seq of the last one."""
+    events = await desk.events(run, after, _PAGE)
+    lines = [
+        b"id: %d\nevent: %b\ndata: %b\n\n" % (each.seq, each.kind.encode(), _told(each))
+        for each in events
+    ]
+    return events[-1].seq if events else after, b"".join(lines)
+
+
+def _told(event: Event) -> bytes:
+    at, body = shapes.time(event.at), msgspec.Raw(event.body)
+    return msgspec.json.encode(HistoryEvent(event.seq, event.kind, event.author, at, body))

@@ -1,0 +1,168 @@
+"""Questions about stored runs, answered in a worker: it reads the database itself, and never writes.
+
+A question is a method of `Desk`. `Asked` is the runner's side: it has what was just shown stored
+before it asks, and keeps what the worker folded on the way.
+"""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any, Concatenate, Final, NoReturn, ParamSpec, TypeVar, cast
+
+import anyio
+import msgspec
+from litestar import MediaType, Response
+
+from action_assistant.errors import Refused, Unavailable
+from action_assistant.journal.events import Draft, Snapshot
+from action_assistant.journal.reader import FileReader
+from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.history import Aside, History, Ledger
+from action_assistant.runner.recorder import stream_of
+from action_assistant.runner.review.desk import Desk, Going
+from action_assistant.runner.review.reel import Archive
+from action_assistant.runner.review.shelf import Shelf
+from action_assistant.runner.runs import Run
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_SETTLED_S: Final = 2.0  # for what was shown to be stored; then what is stored is told
+
+
+def json_of(text: bytes, _: type[T]) -> Response[T]:
+    """An answer that was encoded elsewhere; the type is for those who read the interface."""
+    return cast("Response[T]", Response(text, media_type=MediaType.JSON))
+
+
+class Place(msgspec.Struct, frozen=True):
+    """Where the runs are: the database file, and the folder of archives."""
+
+    database: Path
+    archive: Path
+
+
+class Asked:
+    """Asks a worker. `opened` are the runs that go on, once that is known."""
+
+    def __init__(self, aside: Aside, place: Place, ledger: Archive) -> None:
+        self.opened: Mapping[str, OpenRun] = {}
+        self._aside = aside
+        self._place = place
+        self._ledger = ledger
+
+    async def value(
+        self, question: Callable[Concatenate[Desk, P], Awaitable[T]], *args: P.args, **kw: P.kwargs
+    ) -> T:
+        """What a method of `Desk` returns. Raises what that raises, Unavailable, TooMany."""
+        await self._settled(args)
+        found, kept = await self._aside(
+            answered, self._place, partial(question, **kw) if kw else question, args
+        )
+        await self._keep(kept)
+        value: T = found
+        return value
+
+    async def text(
+        self, question: Callable[Concatenate[Desk, P], Awaitable[T]], *args: P.args, **kw: P.kwargs
+    ) -> bytes:
+        """The same as JSON: it need not be taken apart and put together here."""
+        await self._settled(args)
+        found, kept = await self._aside(
+            encoded, self._place, partial(question, **kw) if kw else question, args
+        )
+        await self._keep(kept)
+        text: bytes = found
+        return text
+
+    async def newest(self, run: str) -> int:
+        """The seq of the last stored event of a run; 0 when there is none. Raises Unavailable."""
+        await self._settled([run])
+        return await self._ledger.newest(stream_of(run))
+
+    async def past(self, run: str, robots_too: bool) -> tuple[Run, int]:
+        """As `history.Past`."""
+        return await self.value(Desk.followed, run, robots_too)
+
+    async def _settled(self, args: Sequence[object]) -> None:
+        for each in args:
+            opened = self.opened.get(each) if isinstance(each, str) else None
+            if opened is not None:
+                with anyio.move_on_after(_SETTLED_S):
+                    await opened.recorder.flushed()
+
+    async def _keep(self, kept: Sequence[Snapshot]) -> None:
+        for each in kept:
+            with suppress(Refused):  # a cache: it is made again when the journal can be written
+                await self._ledger.keep_snapshot(each.stream, each.seq, each.state)
+
+
+def answered(
+    place: Place, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
+) -> tuple[Any, list[Snapshot]]:
+    """In the worker: the answer, and what of it is worth keeping."""
+    desk, file = _reading(place)
+    found = asyncio.run(_asked(question, desk, args))
+    return found, file.given()
+
+
+def encoded(
+    place: Place, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
+) -> tuple[bytes, list[Snapshot]]:
+    """The same as JSON."""
+    found, kept = answered(place, question, args)
+    return msgspec.json.encode(found), kept
+
+
+async def _asked(
+    question: Callable[..., Awaitable[Any]], desk: Desk, args: Sequence[Any]
+) -> object:
+    return await question(desk, *args)
+
+
+@lru_cache(maxsize=1)
+def _reading(place: Place) -> "tuple[Desk, _File]":
+    file = _File(place.database)
+    shelf = Shelf(file, place.archive, _here)
+    return Desk(_Nothing(shelf), shelf, _here, _no_clock), file
+
+
+async def _here(work: Callable[..., T], *args: Any) -> T:
+    return work(*args)
+
+
+def _no_clock() -> NoReturn:
+    raise AssertionError("what is stored needs no clock to be read")
+
+
+class _File(FileReader):
+    """The journal as a worker has it: what is to be kept is given to the runner."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._kept: list[Snapshot] = []
+
+    async def append(
+        self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
+    ) -> int:
+        """Never."""
+        raise Unavailable("A worker writes nothing.")
+
+    async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
+        """By the runner."""
+        self._kept.append(Snapshot(stream, seq, state))
+
+    def given(self) -> list[Snapshot]:
+        """What is to be kept, once."""
+        given, self._kept = self._kept, []
+        return given
+
+
+class _Nothing(Going):
+    """Where nothing goes on: all that is known is stored."""
+
+    def __init__(self, ledger: Ledger) -> None:
+        self.open = {}
+        self.history = History(ledger)
