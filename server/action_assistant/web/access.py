@@ -31,6 +31,8 @@ from action_assistant.web.roles import OWNER, Deed, allowed, may
 
 log: Final = logging.getLogger(__name__)
 
+#: Under this name the state of a request has what wants to be told who asks.
+KNOWN: Final = "known"
 _CALLS: Final = frozenset({"http", "websocket"})
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _STOPS: Final = re.compile(r"/api/stop|/api/(runs|robots)/[^/]+/stop")
@@ -180,6 +182,8 @@ class Access:
             return
         known: Person | None = scope["state"].get("person")
         asked = receive if scope["type"] == ScopeType.HTTP else None
+        if known is not None:
+            scope["state"].get(KNOWN, _nobody)(known.id)
         _CALLER.set(None if known is None else Caller(known.id, asked))
         if preflight:
             await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
@@ -295,6 +299,10 @@ class Access:
             await send(message)
 
         return dressed
+
+
+def _nobody(_: str) -> None:
+    """Nobody wants to know."""
 
 
 def _ended(session: Session | None) -> Refused:

@@ -6,23 +6,36 @@ import gc
 import logging
 import os
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
+import h11
 import uvicorn
 from litestar.enums import ScopeType
 from litestar.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from action_assistant.errors import CannotStart
 from action_assistant.settings import EVERYWHERE
+from action_assistant.web.access import KNOWN
 from action_assistant.web.certificate import Certificate
+from action_assistant.web.connections import Connections, raise_limit
 
 log: Final = logging.getLogger(__name__)
 
 WEBSOCKET_LIMIT: Final = 1_114_112  # bytes; an update of 1 MiB and its frame
 GRACE: Final = 5  # seconds that open requests get when the process is told to end
+HEAD_LIMIT: Final = 32_768  # bytes of a request line and its header fields
+_CALLS: Final = frozenset({"http", "websocket"})
+_FAILED: Final = 3  # exit code when the application could not be set up
+_BODY_S: Final = 30.0  # between two pieces of a body
+_LENGTH_REQUIRED: Final = (
+    b"HTTP/1.1 411 Length Required\r\ncontent-type: text/plain; charset=utf-8\r\n"
+    b"connection: close\r\ncontent-length: 21\r\n\r\nA body has a length.\n"
+)
 _LOOK_S: Final = 60.0  # between two looks at the certificate
 _GARBAGE: Final = (10_000, 10, 10)  # objects, and collections of the younger generations
 UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it was sent is gone
@@ -45,8 +58,11 @@ def serve(
         for listener in sockets:
             listener.close()
         raise
+    connections = Connections(raise_limit())
     config = uvicorn.Config(
-        endings,
+        Watched(endings, connections),
+        http=_Http,
+        h11_max_incomplete_event_size=HEAD_LIMIT,
         lifespan="on",
         log_config=None,
         access_log=False,
@@ -63,7 +79,7 @@ def serve(
     )
     if identity is not None:
         identity.keep(config)
-    server = _Server(config, endings)
+    server = _Server(config, endings, connections)
     _end_with_parent(server)
     server.run(sockets=sockets)
     if not server.started:
@@ -150,25 +166,106 @@ class Endings:
             told.cancel()
 
 
+class Watched:
+    """Around everything: says for which connection something is being done, and for whom. A request
+    whose body does not come is not waited for."""
+
+    def __init__(self, app: ASGIApp, connections: Connections) -> None:
+        self._app = app
+        self._connections = connections
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on."""
+        if scope["type"] not in _CALLS:  # lifespan
+            await self._app(scope, receive, send)
+            return
+        peer: Any = scope.get("client")
+        whole = scope["type"] == ScopeType.WEBSOCKET
+
+        async def received() -> Any:
+            nonlocal whole
+            if whole:
+                return await receive()
+            try:
+                async with asyncio.timeout(_BODY_S):
+                    message: Any = await receive()
+            except TimeoutError:
+                self._connections.drop(peer)
+                return {"type": "http.disconnect"}
+            whole = not message.get("more_body", False)
+            return message
+
+        with self._connections.answering(peer and tuple(peer)) as known:
+            scope.setdefault("state", {})[KNOWN] = known
+            await self._app(scope, received, send)
+
+
+class _Http(H11Protocol):
+    """HTTP as everybody speaks it who has business here: bodies with a length."""
+
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **more)
+        self._strict = self.conn = _Strict(h11.SERVER, HEAD_LIMIT)
+
+    def send_400_response(self, msg: str) -> None:
+        """The refusal that fits."""
+        if not self._strict.in_crumbs:
+            super().send_400_response(msg)
+            return
+        self.transport.write(_LENGTH_REQUIRED)
+        self.transport.close()
+
+
+class _Strict(h11.Connection):
+    """Refuses a body without a length: a chunk of one byte costs us a thousand times more than it
+    costs to send, before anybody could say whose it is."""
+
+    in_crumbs = False
+
+    def next_event(self) -> Any:
+        """The next one. Raises RemoteProtocolError."""
+        event = super().next_event()
+        if isinstance(event, h11.Request):
+            names = [name for name, _ in event.headers]
+            if b"transfer-encoding" in names:
+                self.in_crumbs = True
+                raise h11.RemoteProtocolError("a body needs a length", error_status_hint=411)
+        return event
+
+
 class _Server(uvicorn.Server):
     """Ends streams before it waits for them."""
 
-    def __init__(self, config: uvicorn.Config, endings: Endings) -> None:
+    def __init__(self, config: uvicorn.Config, endings: Endings, connections: Connections) -> None:
         super().__init__(config)
         self._endings = endings
+        self._connections = connections
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Called once, before anyone is let in."""
-        await super().startup(sockets)
+        """Called once, before anyone is let in. Connections are accepted by ourselves: uvicorn
+        counts them when it is too late, after a handshake and with the last descriptor gone."""
+        await self.lifespan.startup()
+        if self.lifespan.should_exit:
+            sys.exit(_FAILED)
+        self.servers = []
+        for listener in sockets or []:
+            self._connections.listen(listener, self._protocol, self.config.ssl)
+        self.started = True
         # What is there now stays: looking through it for garbage again and again costs a busy
         # process a fifth of its time.
         gc.collect()
         gc.freeze()
         gc.set_threshold(*_GARBAGE)
 
+    def _protocol(self) -> asyncio.Protocol:
+        return _Http(
+            config=self.config, server_state=self.server_state, app_state=self.lifespan.state
+        )
+
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Called once, when the process is told to end."""
         self._endings.begin()
+        self._connections.close()
         await super().shutdown(sockets)
 
 

@@ -1,0 +1,133 @@
+"""Who says nothing, or not who they are, takes no room from those who are signed in."""
+
+import os
+import resource
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+
+from support.product import TOKEN, free_ports
+
+BEARER = {"authorization": f"Bearer {TOKEN}"}
+#: Descriptors that the process may have.
+FEW = 256
+
+
+@contextmanager
+def process(name: str, folder: Path, *flags: str) -> Iterator[int]:
+    """An editor or a runner that may have few descriptors."""
+    port = free_ports()
+    scheme = "https" if "--tls" in flags else "http"
+
+    def few() -> None:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (FEW, FEW))
+
+    with (folder / "log").open("ab") as log:
+        running = subprocess.Popen(
+            [
+                *(sys.executable, "-m", "action_assistant", name),
+                *("--data", str(folder / "data"), "--port", str(port), *flags),
+            ],
+            env={**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN},
+            preexec_fn=few,
+            stdout=log,
+            stderr=log,
+        )
+    try:
+        deadline = time.monotonic() + 40
+        while True:
+            try:
+                url = f"{scheme}://127.0.0.1:{port}/readyz"
+                if httpx.get(url, trust_env=False, verify=False).status_code == 200:
+                    break
+            except httpx.TransportError:
+                assert time.monotonic() < deadline, (folder / "log").read_text()
+                time.sleep(0.05)
+        yield port
+    finally:
+        running.terminate()
+        running.wait()
+
+
+@pytest.fixture(autouse=True)
+def many() -> None:
+    """This process needs more descriptors than it asks for at first."""
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 8192), hard))
+
+
+def crowd(stack: ExitStack, port: int, count: int, said: bytes = b"") -> list[socket.socket]:
+    """So many strangers who hold a connection each."""
+    found = []
+    for _ in range(count):
+        one = stack.enter_context(socket.create_connection(("127.0.0.1", port), timeout=5))
+        if said:
+            one.send(said)
+        found.append(one)
+    return found
+
+
+@pytest.mark.parametrize("name", ["runner", "editor"])
+@pytest.mark.parametrize("said", [b"", b"POST /api/stop HTTP/1.1\r\nhost: localhost\r\nx-slow: "])
+def test_idle_strangers_keep_nobody_from_coming_in(tmp_path: Path, name: str, said: bytes) -> None:
+    with process(name, tmp_path) as port, ExitStack() as stack:
+        url = f"http://127.0.0.1:{port}"
+        before = stack.enter_context(httpx.Client(base_url=url, headers=BEARER, trust_env=False))
+        path = "/api/robots" if name == "runner" else "/api/graphs"
+        before.get(path).raise_for_status()
+        crowd(stack, port, 2 * FEW, said)
+        for _ in range(20):
+            fresh = httpx.get(f"{url}{path}", headers=BEARER, trust_env=False, timeout=5)
+            assert fresh.status_code == 200
+            assert before.get(path).status_code == 200
+
+
+def test_a_stop_of_somebody_signed_in_comes_through_a_crowd_of_strangers(tmp_path: Path) -> None:
+    with process("runner", tmp_path) as port, ExitStack() as stack:
+        crowd(stack, port, 2 * FEW)
+        for _ in range(20):
+            answer = httpx.post(
+                f"http://127.0.0.1:{port}/api/stop", headers=BEARER, trust_env=False, timeout=5
+            )
+            assert answer.status_code == 202
+
+
+def test_strangers_who_do_not_even_finish_a_handshake_make_room_too(tmp_path: Path) -> None:
+    with process("runner", tmp_path, "--tls") as port, ExitStack() as stack:
+        crowd(stack, port, 2 * FEW)
+        for _ in range(5):
+            answer = httpx.post(
+                f"https://127.0.0.1:{port}/api/stop",
+                headers=BEARER,
+                trust_env=False,
+                verify=False,
+                timeout=10,
+            )
+            assert answer.status_code == 202
+
+
+def test_who_says_nothing_is_let_go_and_who_waits_for_an_answer_is_not(tmp_path: Path) -> None:
+    with process("runner", tmp_path) as port, ExitStack() as stack:
+        (silent,) = crowd(stack, port, 1, b"GET /healthz HTTP/1.1\r\n")
+        stream = b"GET /api/robots HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\n\r\n"
+        (known,) = crowd(stack, port, 1, stream % TOKEN.encode())
+        assert known.recv(100).startswith(b"HTTP/1.1 200")
+        silent.settimeout(30)
+        assert silent.recv(100) == b""
+
+
+def test_a_body_in_crumbs_is_refused(tmp_path: Path) -> None:
+    """Each crumb would cost the loop more than it costs to send."""
+    with process("runner", tmp_path) as port, ExitStack() as stack:
+        head = (
+            b"POST /api/session HTTP/1.1\r\nhost: localhost\r\ntransfer-encoding: chunked\r\n\r\n"
+        )
+        (one,) = crowd(stack, port, 1, head + b"1\r\nx\r\n" * 1000)
+        assert one.recv(100).startswith(b"HTTP/1.1 411")
