@@ -6,7 +6,7 @@ from typing import Annotated, Final, TypeVar
 
 import msgspec
 
-from action_assistant.errors import BadInput, Conflict, NotUmrf
+from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
 from action_assistant.runner.events import Override
 from action_assistant.umrf import codec
 from action_assistant.umrf.check import STRUCTURAL, blocking, check
@@ -27,6 +27,7 @@ _PLAIN_NAME: Final = re.compile(r"[^%\x00-\x1f\x7f\u2028\u2029]{1,200}")
 #: No simulated action is quicker: a loop of instant actions would never let go of the processor.
 _QUICKEST_S: Final = 0.01
 _SHOWN: Final = 20  # problems in an answer
+_ACTIONS: Final = 5_000  # as in the editor
 _KEPT: Final = 40  # problems of a kind that somebody could be shown
 
 
@@ -126,6 +127,8 @@ def prepared(
     """As `admit`, for a start that becomes this run. For workers: takes its time with large graphs."""
     admitted = admit(asked, facts, approved=approved)
     graph = admitted.graph
+    if len(graph.actions) > _ACTIONS:
+        raise TooLarge(f"A graph that is started has at most {_ACTIONS:,} actions.")
     errors = [each for each in admitted.problems if each.severity == "error"]
     warnings = [each for each in admitted.problems if each.severity != "error"]
     return Prepared(

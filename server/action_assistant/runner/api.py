@@ -17,7 +17,7 @@ from action_assistant.errors import BadInput, NotFound, TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive, robots_api, shapes
 from action_assistant.runner.admission import SIMULATOR, decoded, read_request
-from action_assistant.runner.asking import author_of
+from action_assistant.runner.asking import LARGE, author_of, body_of, start_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import (
     ModifyOperation,
@@ -35,9 +35,12 @@ from action_assistant.runner.review.stored import Asked, json_of
 from action_assistant.runner.runs import State
 from action_assistant.runner.steering import RestRequest
 from action_assistant.web.access import Needs, person_of, refuse, require
-from action_assistant.web.crowd import Crowd
+from action_assistant.web.crowd import Crowd, Turns
 
 _PAGE: Final = 500  # events read at once
+_BODIES: Final = 4  # large ones of a person at a time
+_STOP_BYTES: Final = 4_096  # of the body of a Stop; whatever comes after them is not read
+_STOP_S: Final = 1.0  # that a Stop waits for its body
 _ALIVE_S: Final = 15.0  # between two signs of life of an event stream
 _Asking = Request[Any, Any, Any]
 
@@ -52,10 +55,12 @@ class House:
     desk: Desk
     asked: Asked
     retention: Retention
+    turns: Turns
     sent: WeakKeyDictionary[OpenRun, shapes.Sent]
 
     def __init__(self) -> None:
         self.sent = WeakKeyDictionary()
+        self.turns = Turns(_BODIES)
 
 
 class StopAsked(msgspec.Struct, frozen=True):
@@ -82,12 +87,14 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
         summary="Start a version, at most once per request_id",
         operation_class=StartOperation,
         guards=[Needs("simulate")],
+        request_max_body_size=LARGE,
     )
     async def start(request: _Asking) -> Response[shapes.RunShown]:
-        asked = read_request(await request.body())
-        if asked.engine != SIMULATOR:
-            require(request, "operate")
-        started = await house.control.start(asked, author_of(request))
+        async with body_of(request, house.turns) as body:
+            asked = read_request(body)
+            if asked.engine != SIMULATOR:
+                require(request, "operate")
+            started = await house.control.start(asked, author_of(request))
         return Response(
             _shown(house, started.run.id) or shapes.shown(started.run),
             status_code=201 if started.fresh else 200,
@@ -154,11 +161,12 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
         summary="Change a running graph, where its engine makes that safe",
         operation_class=ModifyOperation,
         guards=[Needs("simulate")],
+        request_max_body_size=LARGE,
     )
     async def modify(run: str, request: _Asking) -> shapes.RunShown:
         await _require_hand_on(house, run, request)
-        body = await request.body()
-        return shapes.shown(await house.control.modify(run, body, author_of(request)))
+        async with body_of(request, house.turns) as body:
+            return shapes.shown(await house.control.modify(run, body, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/at_rest",
@@ -275,8 +283,9 @@ async def _require_hand_on(house: House, run: str, request: _Asking) -> None:
 async def _stop_id(request: _Asking) -> str:
     """Whatever the body is: a Stop is never refused for its form."""
     try:
-        return msgspec.json.decode(await request.body(), type=StopAsked).stop_id[:100]
-    except (msgspec.DecodeError, HTTPException):
+        body = await start_of(request, _STOP_BYTES, _STOP_S)
+        return msgspec.json.decode(body, type=StopAsked).stop_id[:100]
+    except (msgspec.DecodeError, HTTPException, RecursionError):
         return ""
 
 

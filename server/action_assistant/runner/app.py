@@ -13,6 +13,7 @@ from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive
 from action_assistant.runner.api import House, routes
+from action_assistant.runner.asking import SMALL
 from action_assistant.runner.control import Control
 from action_assistant.runner.links import ros2_reach
 from action_assistant.runner.links.port import Reach
@@ -149,4 +150,5 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         lifespan=[lifespan],
         ready=ready,
         measures=measures,
+        body_limit=SMALL,
     )

@@ -1,12 +1,24 @@
 """Who asks the runner for something, and from where, as runs record it."""
 
 import ipaddress
-from typing import Any
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any, Final
 
+import anyio
+from litestar import Request
 from litestar.connection import ASGIConnection
 
+from action_assistant.errors import Unavailable
 from action_assistant.runner.events import Author
 from action_assistant.web.access import person_of, session_of
+from action_assistant.web.crowd import Turns
+
+#: Bytes of a body that carries a graph: 5,000 actions, the most that the editor takes, are 1.2 MB.
+LARGE: Final = 2_000_000
+#: Bytes of any other body.
+SMALL: Final = 100_000
+_BODY_S: Final = 60.0
 
 
 def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
@@ -18,6 +30,30 @@ def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
         by="program" if session_of(connection) is None else "browser",
         address=_address(connection.client.host if connection.client else ""),
     )
+
+
+@asynccontextmanager
+async def body_of(request: Request[Any, Any, Any], turns: Turns) -> AsyncIterator[bytes]:
+    """A body that may be large: of one person few are in memory at a time, and it has to come in
+    time. Raises TooLarge, Unavailable."""
+    async with turns.turn(person_of(request).id):
+        try:
+            with anyio.fail_after(_BODY_S):
+                body = await request.body()
+        except TimeoutError as late:
+            raise Unavailable(f"The body did not come within {_BODY_S:.0f} s.") from late
+        yield body
+
+
+async def start_of(request: Request[Any, Any, Any], most: int, seconds: float) -> bytes:
+    """What comes of a body soon, `most` bytes of it at most."""
+    found = b""
+    with anyio.move_on_after(seconds):
+        async for part in request.stream():
+            found += part[: most - len(found)]
+            if len(found) >= most:
+                break
+    return found
 
 
 def _address(host: str) -> str:

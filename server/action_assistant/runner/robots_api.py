@@ -10,7 +10,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import BadInput, NotFound
 from action_assistant.runner import shapes
 from action_assistant.runner.admission import SIMULATOR
-from action_assistant.runner.asking import author_of
+from action_assistant.runner.asking import LARGE, author_of, body_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import GroupOperation, LookOperation
 from action_assistant.runner.flight import (
@@ -29,6 +29,7 @@ from action_assistant.runner.starting import read_group
 from action_assistant.umrf import codec
 from action_assistant.umrf.model import Signature
 from action_assistant.web.access import Needs
+from action_assistant.web.crowd import Turns
 
 _EVENTS: Final = 200
 _Asking = Request[Any, Any, Any]
@@ -38,6 +39,7 @@ class Has(Protocol):
     """What these routes work on."""
 
     control: Control
+    turns: Turns
 
 
 class Reached(msgspec.Struct, frozen=True):
@@ -206,19 +208,22 @@ def _starts(house: Has) -> list[ControllerRouterHandler]:
         summary="What stands between a graph and its start, engine by engine",
         operation_class=LookOperation,
         guards=[Needs("simulate")],
+        request_max_body_size=LARGE,
     )
     async def look(request: _Asking) -> list[Preflight]:
-        return await house.control.look(read_group(await request.body()))
+        async with body_of(request, house.turns) as body:
+            return await house.control.look(read_group(body))
 
     @post(
         "/api/groups",
         summary="Start a version on several robots",
         operation_class=GroupOperation,
         guards=[Needs("operate")],
+        request_max_body_size=LARGE,
     )
     async def start(request: _Asking) -> Response[GroupShown]:
-        asked = read_group(await request.body())
-        grouped = await house.control.start_group(asked, author_of(request))
+        async with body_of(request, house.turns) as body:
+            grouped = await house.control.start_group(read_group(body), author_of(request))
         runs = [shapes.shown(run) for run in grouped.runs]
         shown = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
         return Response(shown, status_code=201 if grouped.fresh else 200)

@@ -57,8 +57,9 @@ def application(
     measures: Measures | None = None,
     page: Path | None = None,
     runner_port: int | None = None,
+    body_limit: int = BODY_LIMIT,
 ) -> ASGIApp:
-    """The whole application. `page` and `runner_port` are the editor's: it serves the page, whose
+    """The whole application. Routes may read less or more than `body_limit` bytes. `page` and `runner_port` are the editor's: it serves the page, whose
     Content-Security-Policy names the runner."""
     decisions: dict[tuple[str, str], Deed] = {}
     inner = Litestar(
@@ -67,7 +68,7 @@ def application(
         exception_handlers=problem_handlers(),
         lifespan=list(lifespan),
         openapi_config=_openapi(title, decisions),
-        request_max_body_size=BODY_LIMIT,
+        request_max_body_size=body_limit,
         logging_config=None,
     )
     decisions.update(_decisions(inner))

@@ -2,9 +2,11 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from typing import Final
+
+import anyio
 
 from action_assistant.errors import TooMany
 
@@ -36,6 +38,27 @@ class Pace:
             full = self._at_once * 60 / self._per_minute  # seconds after which all is forgiven
             self._left = {a: each for a, each in self._left.items() if now - each[1] < full}
         return left >= 1
+
+
+class Turns:
+    """So many requests with large bodies of each person at a time; the others wait unread."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._turns: dict[str, tuple[anyio.Semaphore, int]] = {}
+
+    @asynccontextmanager
+    async def turn(self, person: str) -> AsyncIterator[None]:
+        """One of them, as long as you are inside."""
+        turn, waiting = self._turns.get(person, (anyio.Semaphore(self._most), 0))
+        self._turns[person] = turn, waiting + 1
+        try:
+            async with turn:
+                yield
+        finally:
+            turn, waiting = self._turns.pop(person)
+            if waiting > 1:
+                self._turns[person] = turn, waiting - 1
 
 
 class Crowd:

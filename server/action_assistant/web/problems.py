@@ -7,6 +7,7 @@ from typing import Any, Final
 import msgspec
 from litestar import Request, Response
 from litestar.exceptions import HTTPException, ValidationException
+from litestar.handlers import HTTPRouteHandler
 from litestar.types import ExceptionHandlersMap
 
 from action_assistant.errors import Refused
@@ -87,10 +88,21 @@ def _told(
         case HTTPStatus.METHOD_NOT_ALLOWED:
             return f"{request.method} is not possible at {request.url.path}.", None
         case HTTPStatus.REQUEST_ENTITY_TOO_LARGE:
-            return "At most 10 MB are read.", None
+            return f"At most {_limit(request)} are read.", None
         case status if status >= 500:
             return "The server failed; its log says why.", None
     return error.detail, None
+
+
+def _limit(request: Request[Any, Any, Any]) -> str:
+    """How long a body may be that this route takes."""
+    handler = request.scope.get("route_handler")
+    most = (
+        handler.resolve_request_max_body_size() if isinstance(handler, HTTPRouteHandler) else None
+    )
+    if most is None:
+        return "some bytes"
+    return f"{most // 1_000_000} MB" if most >= 1_000_000 else f"{most // 1_000} kB"
 
 
 def _too_deep(_: Request[Any, Any, Any], __: RecursionError) -> Response[bytes]:

@@ -16,6 +16,7 @@ from action_assistant.web.keys import SESSION_SECONDS, Author, Keys, Person, Ses
 from action_assistant.web.revoked import Revoked
 from action_assistant.web.roles import Role, rank
 
+_BODY: Final = 10_000  # bytes; strangers send it
 _NAME: Final = 60  # characters
 _TRIES_AT_ONCE: Final = 60  # of one address: a class may sit behind one
 _TRIES_PER_MINUTE: Final = 30  # after that
@@ -152,11 +153,21 @@ def session_routes(
     async def who(request: _Asking) -> SignedIn:
         return _signed_in(live_session(request))
 
-    @post("/api/session", status_code=200, summary="Sign in, or change one's name")
+    @post(
+        "/api/session",
+        status_code=200,
+        summary="Sign in, or change one's name",
+        request_max_body_size=_BODY,
+    )
     async def sign_in(data: JSONBody[SignIn], request: _Asking) -> Response[SignedIn]:
         return desk.answer(await desk.session(data, request))
 
-    @post("/api/session/invitation", status_code=200, summary="What an invitation leads to")
+    @post(
+        "/api/session/invitation",
+        status_code=200,
+        summary="What an invitation leads to",
+        request_max_body_size=_BODY,
+    )
     async def look(data: JSONBody[Looking], request: _Asking) -> Invited:
         return await desk.look(data.invitation, request)
 

@@ -15,7 +15,7 @@ from action_assistant import places
 from action_assistant.errors import BadInput
 from action_assistant.runner import recorded_runs
 from action_assistant.runner.admission import decoded
-from action_assistant.runner.asking import author_of
+from action_assistant.runner.asking import LARGE, author_of, body_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import FitOperation
 from action_assistant.runner.review import about, again
@@ -27,6 +27,7 @@ from action_assistant.runner.review.retention import Retention, Swept
 from action_assistant.runner.review.statistics import Statistics
 from action_assistant.runner.review.stored import Asked, json_of
 from action_assistant.web.access import Needs
+from action_assistant.web.crowd import Turns
 
 _Asking = Request[Any, Any, Any]
 _TYPES: Final[dict[str, str]] = {
@@ -66,6 +67,7 @@ class Has(Protocol):
     desk: Desk
     asked: Asked
     retention: Retention
+    turns: Turns
 
 
 def routes(house: Has) -> list[ControllerRouterHandler]:
@@ -120,11 +122,13 @@ def _of_one(house: Has) -> list[ControllerRouterHandler]:
         summary="What a run did, as a script for another version of its graph",
         operation_class=FitOperation,
         guards=[Needs("see")],
+        request_max_body_size=LARGE,
     )
     async def fit(run: str, request: _Asking) -> Response[again.Recorded]:
-        asked = decoded(await request.body(), Fit)
-        fault = _fault(asked.action, asked.fault)
-        text = await house.asked.text(Desk.script, run, fault, bytes(asked.umrf))
+        async with body_of(request, house.turns) as body:
+            asked = decoded(body, Fit)
+            fault = _fault(asked.action, asked.fault)
+            text = await house.asked.text(Desk.script, run, fault, bytes(asked.umrf))
         return json_of(text, again.Recorded)
 
     @get("/api/runs/{run:str}/export", summary="A run as a file: jsonl, csv or mcap")

@@ -1,0 +1,190 @@
+"""What is worked on in another process: it never holds up this one, and nothing of it is left over."""
+
+import os
+import signal
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import anyio
+import anyio.lowlevel
+import psutil
+import pytest
+
+from action_assistant.errors import Conflict, TooLarge, TooMany, Unavailable
+from action_assistant.runner.workers import Crashed, Lane, Workers
+from action_assistant.web import access
+from action_assistant.web.access import Caller, done_for_nobody
+from runner.labour import devour, die, pid, refuse, spin, standing, stumble
+
+
+@pytest.fixture(scope="module")
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+@asynccontextmanager
+async def lane() -> AsyncIterator[Lane]:
+    async with Workers.opened() as workers:
+        yield workers.looks
+
+
+@asynccontextmanager
+async def asked_by(person: str, receive: Callable[[], Any] | None = None) -> AsyncIterator[None]:
+    access._CALLER.set(Caller(person, receive))
+    try:
+        yield
+    finally:
+        done_for_nobody()
+
+
+pytestmark = pytest.mark.anyio
+
+
+async def test_work_is_done_elsewhere_and_its_outcome_comes_back() -> None:
+    async with lane() as aside:
+        assert await aside(max, 3, 4) == 4
+        assert await aside(pid) == await aside(pid) != os.getpid()
+
+
+async def test_a_worker_gives_way_and_is_the_first_to_go() -> None:
+    async with lane() as aside:
+        nice, score, ros = await aside(standing)
+        assert nice >= min(19, os.nice(0) + 5)
+        assert score == 1000
+        assert ros == []
+
+
+async def test_errors_come_back_as_they_are() -> None:
+    async with lane() as aside:
+        with pytest.raises(Conflict, match="It cannot be") as told:
+            await aside(refuse)
+        assert told.value.where == {"path": "/umrf"}
+        with pytest.raises(RuntimeError, match="cannot travel"):
+            await aside(stumble)
+        assert await aside(max, 1, 2) == 2
+
+
+async def test_a_worker_that_dies_is_told_and_the_next_one_works() -> None:
+    async with lane() as aside:
+        for _ in range(3):
+            with pytest.raises(Crashed, match="died"):
+                await aside(die)
+            assert await aside(max, 1, 2) == 2
+
+
+async def test_a_worker_that_was_killed_while_it_waited_is_replaced() -> None:
+    async with lane() as aside:
+        os.kill(await aside(pid), signal.SIGKILL)
+        with pytest.raises(Crashed):
+            await aside(pid)
+        assert await aside(max, 1, 2) == 2
+
+
+async def test_memory_is_bounded() -> None:
+    async with lane() as aside:
+        with pytest.raises(TooLarge):
+            await aside(devour, 4_000)
+        assert await aside(max, 1, 2) == 2
+
+
+async def test_what_takes_too_long_is_given_up() -> None:
+    async with lane() as aside:
+        await aside(pid)
+        aside._patience = 0.2
+        with pytest.raises(Unavailable, match="given up"):
+            await aside(spin, 60.0)
+        aside._patience = 60.0
+        assert await aside(max, 1, 2) == 2
+
+
+async def test_a_frozen_worker_takes_nobody_along() -> None:
+    async with lane() as aside:
+        worker = await aside(pid)
+        os.kill(worker, signal.SIGSTOP)
+        aside._patience = 0.3
+        with pytest.raises(Unavailable):
+            await aside(pid)
+        aside._patience = 60.0
+        assert await aside(pid) != worker
+
+
+async def test_what_nobody_waits_for_ends() -> None:
+    async with lane() as aside:
+        worker = psutil.Process(await aside(pid))
+        with anyio.move_on_after(0.2):
+            await aside(spin, 60.0)
+        worker.wait(10)
+        gone = anyio.Event()
+
+        async def receive() -> dict[str, str]:
+            await gone.wait()
+            return {"type": "http.disconnect"}
+
+        async with asked_by("ann", receive):
+            worker = psutil.Process(await aside(pid))
+            async with anyio.create_task_group() as tasks:
+
+                async def leave() -> None:
+                    await anyio.sleep(0.2)
+                    gone.set()
+
+                tasks.start_soon(leave)
+                with pytest.raises(Unavailable, match="gone"):
+                    await aside(spin, 60.0)
+        worker.wait(10)
+
+
+async def test_nobody_waits_behind_the_many_requests_of_somebody_else() -> None:
+    async with lane() as aside:
+        done: list[str] = []
+
+        async def ask(person: str, seconds: float) -> None:
+            async with asked_by(person):
+                await aside(spin, seconds)
+                done.append(person)
+
+        async with anyio.create_task_group() as tasks:
+            for _ in range(8):
+                tasks.start_soon(ask, "greedy", 0.3)
+            await anyio.sleep(0.1)
+            await ask("modest", 0.0)
+            assert done.count("greedy") < 8
+            assert "modest" in done
+
+
+async def test_of_one_person_only_so_much_waits() -> None:
+    async with lane() as aside:
+        refused = 0
+
+        async def ask() -> None:
+            nonlocal refused
+            async with asked_by("greedy"):
+                try:
+                    await aside(spin, 0.001)
+                except TooMany:
+                    refused += 1
+
+        async with anyio.create_task_group() as tasks:
+            for _ in range(100):
+                tasks.start_soon(ask)
+        assert 0 < refused < 100
+
+
+async def test_the_loop_goes_on_meanwhile() -> None:
+    """Beside threads that hold the interpreter lock it would not."""
+    async with lane() as aside:
+        turns = 0
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(aside, spin, 1.0)
+            end = anyio.current_time() + 1.0
+            while anyio.current_time() < end:
+                await anyio.lowlevel.checkpoint()
+                turns += 1
+        assert turns > 1_000
+
+
+async def test_workers_end_with_whoever_has_them() -> None:
+    async with lane() as aside:
+        worker = psutil.Process(await aside(pid))
+    worker.wait(10)
