@@ -41,6 +41,7 @@ log: Final = logging.getLogger(__name__)
 
 _HEAD: Final = 4  # bytes of a length
 _CHANGES: Final = 100  # of one report; the runner does nothing else while it takes one in
+_WAITING: Final = 16_384  # bytes on the way; an answer comes after what was said before it
 _REST: Final = 3  # for so many times as long as reports took, all simulated runs wait together
 _START_S: Final = 4.0  # less than a start may take
 _GONE: Final = "The simulated engine was switched off."
@@ -154,6 +155,7 @@ class SimulatedLink:
 
     async def _begin(self) -> None:
         ours, theirs = socket.socketpair()
+        theirs.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING)
         try:
             with anyio.fail_after(_START_S):
                 self._process = await to_thread.run_sync(
@@ -163,7 +165,7 @@ class SimulatedLink:
             ours.close()
             self._end(f"No process could be begun for the simulated engine: {error!r}.")
             raise NotSent(self._why) from error
-        reader, self._writer = await asyncio.open_connection(sock=ours)
+        reader, self._writer = await asyncio.open_connection(sock=ours, limit=_WAITING)
         self._reading = asyncio.create_task(self._read(reader))
 
     async def _told(self, command: str, *args: Any) -> Any:
@@ -247,6 +249,7 @@ def _live(wire: socket.socket, facts: EngineFacts, script: str) -> None:
 
 async def _serve(wire: socket.socket, facts: EngineFacts, script: str) -> None:
     reader, writer = await asyncio.open_connection(sock=wire)
+    writer.transport.set_write_buffer_limits(high=_WAITING)
     link = SimulatorLink(engine_of(facts, script), wall=_now)
 
     def hear(report: Report) -> None:
