@@ -36,11 +36,12 @@ class RunnerProcess:
         assert self._process is not None
         return self._process.pid
 
-    def start(self) -> "RunnerProcess":
-        """Start it and wait until it is ready."""
+    def start(self, *wrapper: str) -> "RunnerProcess":
+        """Start it, through another program if need be, and wait until it is ready."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
                 [
+                    *wrapper,
                     *(sys.executable, "-m", "action_assistant", "runner"),
                     *("--data", str(self.data), "--port", str(self.port)),
                 ],

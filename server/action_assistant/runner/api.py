@@ -26,13 +26,14 @@ from action_assistant.runner.described import (
     StopOperation,
 )
 from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.live import Hub, Stopping, attend
+from action_assistant.runner.history import Aside
+from action_assistant.runner.live import Hub, Stopping, attend, work_out
 from action_assistant.runner.review import listing
 from action_assistant.runner.review import routes as review
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.review.stored import Asked, json_of
-from action_assistant.runner.runs import State
+from action_assistant.runner.runs import Run, State
 from action_assistant.runner.steering import RestRequest
 from action_assistant.web.access import Needs, person_of, refuse, require
 from action_assistant.web.crowd import Crowd, Turns
@@ -56,6 +57,7 @@ class House:
     asked: Asked
     retention: Retention
     turns: Turns
+    aside: Aside
     sent: WeakKeyDictionary[OpenRun, shapes.Sent]
 
     def __init__(self) -> None:
@@ -96,7 +98,7 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
                 require(request, "operate")
             started = await house.control.start(asked, author_of(request))
         return Response(
-            _shown(house, started.run.id) or shapes.shown(started.run),
+            await _shown(house, started.run),
             status_code=201 if started.fresh else 200,
             headers={"location": f"/api/runs/{started.run.id}"},
         )
@@ -276,7 +278,7 @@ def _live(house: House) -> ControllerRouterHandler:
 
 async def _require_hand_on(house: House, run: str, request: _Asking) -> None:
     """Who may steer this run: more is needed for one on a robot. Raises Forbidden, NotFound."""
-    if not (await house.control.find(run)).simulated:
+    if not await house.control.simulates(run):
         require(request, "operate")
 
 
@@ -289,9 +291,15 @@ async def _stop_id(request: _Asking) -> str:
         return ""
 
 
-def _shown(house: House, run: str) -> shapes.RunShown | None:
-    opened = house.control.open.get(run)
-    return None if opened is None else house.hub.shown(opened)
+async def _shown(house: House, run: Run) -> shapes.RunShown:
+    """As it is now, put together without holding up others."""
+    opened = house.control.open.get(run.id)
+    if opened is not None:
+        await house.hub.work_out(opened)
+        return house.hub.shown(opened)
+    memo = shapes.Memo()
+    await work_out(run, memo)
+    return shapes.shown(run, memo=memo)
 
 
 def _states(asked: str | None) -> tuple[str, ...]:

@@ -1,9 +1,11 @@
 """The runner process: its journal, its service, its routes."""
 
+import sys
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Final
 
 import anyio
 from litestar import Litestar
@@ -34,6 +36,9 @@ from action_assistant.web.keys import Keys
 from action_assistant.web.revoked import Revoked
 from action_assistant.web.sessions import revocation
 
+#: For so long (seconds) a thread may keep the interpreter to itself while the loop waits for it.
+_SWITCH_S: Final = 0.0005
+
 
 def wall_clock() -> int:
     """Microseconds UTC."""
@@ -44,6 +49,7 @@ def wall_clock() -> int:
 async def open_house(settings: RunnerSettings, house: House | None = None) -> AsyncIterator[House]:
     """Everything the routes need, working. Raises CannotStart."""
     house = house or House()
+    sys.setswitchinterval(_SWITCH_S)
     journal = await Journal.open(_database(settings), branch="runner", fold=archive.fold)
     try:
         keep = settings.keep or Keep(folder=settings.data / ARCHIVE)
@@ -53,6 +59,7 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
         shelf = Shelf(journal, keep.folder, on_disk)
         async with Workers.opened() as workers:
             house.asked = Asked(workers.looks, Place(_file(settings), keep.folder), shelf)
+            house.aside = workers.looks
             reach = ros2_reach(wall_clock)
             robots = Robots(reach=reach, recordings=recordings)
             async with (

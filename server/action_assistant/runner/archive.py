@@ -157,6 +157,11 @@ def last_number() -> Select[Any]:
     return select(func.coalesce(func.max(run.c.number), 0))
 
 
+def of_run(run_id: str) -> Select[Any]:
+    """A run: state, simulated."""
+    return select(run.c.state, run.c.simulated).where(run.c.id == run_id)
+
+
 def by_request(request_id: str) -> Select[Any]:
     """The run that a request has become: id, digest, engine."""
     return select(run.c.id, run.c.digest, run.c.engine).where(run.c.request_id == request_id)

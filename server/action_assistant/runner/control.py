@@ -7,13 +7,14 @@ import logging
 import secrets
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
-from typing import Final
+from typing import Any, Final
 
 import anyio
 import msgspec
 from anyio.abc import TaskGroup
+from sqlalchemy import Row
 
-from action_assistant.errors import BadInput, Conflict, Refused
+from action_assistant.errors import BadInput, Conflict, NotFound, Refused
 from action_assistant.runner import archive, steering
 from action_assistant.runner.admission import SIMULATOR, StartRequest
 from action_assistant.runner.booking import Book, Stops, booked
@@ -295,7 +296,7 @@ class Control:
         if group:
             self._stops.note(run, author, stop_id)
             return [each for each in group if self._stop(each, author, stop_id)]
-        await self.find(run)
+        await self._over(run)
         return []
 
     def _stop(self, run: str, author: Author, stop_id: str) -> bool:
@@ -328,8 +329,8 @@ class Control:
     async def _movable(self, run: str) -> OpenRun:
         opened = self.open.get(run)
         if opened is None or opened.run.end is not None:
-            found = opened.run if opened is not None else await self.find(run)
-            raise Conflict(f"The run is over: {found.state}.")
+            state = opened.run.state if opened is not None else (await self._over(run)).state
+            raise Conflict(f"The run is over: {state}.")
         return opened
 
     # --- what there is ------------------------------------------------------------------------
@@ -340,6 +341,20 @@ class Control:
         if opened is not None:
             return opened.run
         return await self.history.run(run)
+
+    async def simulates(self, run: str) -> bool:
+        """Whether nothing moves in the world because of a run. Raises NotFound."""
+        opened = self.open.get(run)
+        return bool(
+            opened.run.simulated if opened is not None else (await self._over(run)).simulated
+        )
+
+    async def _over(self, run: str) -> Row[Any]:
+        """What the table tells of a run: that takes no time. Raises NotFound, Unavailable."""
+        rows = await self._ledger.query(archive.of_run(run))
+        if not rows:
+            raise NotFound("There is no such run.")
+        return rows[0]
 
     async def register(self, asked: Registration, author: Author) -> Robot:
         """Take a robot into the registry, or change it. Raises BadInput, Conflict, Unavailable."""

@@ -25,6 +25,7 @@ from action_assistant.runner.control import Control
 from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.events import Author
 from action_assistant.runner.registered import Robot
+from action_assistant.runner.runs import Run
 from action_assistant.web.access import session_of
 
 log: Final = logging.getLogger(__name__)
@@ -162,8 +163,7 @@ class Hub:
 
     async def work_out(self, opened: OpenRun) -> None:
         """Make sure that showing a run takes little time now."""
-        for _ in self.memo(opened).work_out(opened.run, _AT_ONCE):
-            await anyio.lowlevel.checkpoint()
+        await work_out(opened.run, self.memo(opened))
 
     def memo(self, opened: OpenRun) -> shapes.Memo:
         """What was shown of a run so far."""
@@ -191,6 +191,12 @@ class Hub:
         except Refused as refused:
             return _text(RefusedMessage(stop_id, refused.detail))
         return _text(Stopping(stop_id, runs))
+
+
+async def work_out(run: Run, memo: shapes.Memo) -> None:
+    """Know how a run is shown, without doing nothing else meanwhile."""
+    for _ in memo.work_out(run, _AT_ONCE):
+        await anyio.lowlevel.checkpoint()
 
 
 class Outbox:

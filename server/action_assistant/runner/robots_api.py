@@ -21,6 +21,7 @@ from action_assistant.runner.flight import (
     StopUnproven,
     StopWasProven,
 )
+from action_assistant.runner.history import Aside
 from action_assistant.runner.links.port import Candidate, Registration
 from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.recordings import Recording
@@ -40,6 +41,7 @@ class Has(Protocol):
 
     control: Control
     turns: Turns
+    aside: Aside
 
 
 class Reached(msgspec.Struct, frozen=True):
@@ -168,12 +170,12 @@ def _one_robot(house: Has) -> list[ControllerRouterHandler]:
     @get("/api/robots/{name:str}/events/{seq:int}/umrf", summary="The graph of a command, as UMRF")
     async def commanded(name: str, seq: int) -> Response[bytes]:
         house.control.robots.registration(name)
-        return _umrf(await house.control.robots.flight.graph(name, seq))
+        return await _umrf(house, await house.control.robots.flight.graph(name, seq))
 
     @get("/api/robots/{name:str}/umrf", summary="A graph that a robot holds, as UMRF")
     async def held(name: str, graph: str) -> Response[bytes]:
         """Without its run state: a graph that carries one must not be sent again."""
-        return _umrf(house.control.robots.held(name, graph))
+        return await _umrf(house, house.control.robots.held(name, graph))
 
     @get("/api/robots/{name:str}/recordings", summary="What an engine said, hour by hour")
     async def recorded(name: str) -> list[Recording]:
@@ -263,10 +265,14 @@ def _told(seq: int, event: RobotEvent) -> Told:
             assert_never(event)
 
 
-def _umrf(text: str) -> Response[bytes]:
-    """A graph as it can be imported. Raises NotFound when it cannot be read at all."""
+async def _umrf(house: Has, text: str) -> Response[bytes]:
+    return Response(await house.aside(canonical, text), media_type="application/json")
+
+
+def canonical(text: str) -> bytes:
+    """A graph as it can be imported. Raises NotFound when it cannot be read at all. For workers."""
     try:
         graph = codec.read(text).graph
     except codec.Unreadable as wrong:
         raise NotFound(f"What was sent is no UMRF graph: {wrong.message}") from wrong
-    return Response(codec.write(graph).encode(), media_type="application/json")
+    return codec.write(graph).encode()

@@ -38,7 +38,8 @@ _PRELOADED: Final = (
     "action_assistant.runner.links.simulated",
     "action_assistant.runner.review.stored",
 )
-_NICE: Final = 10
+_NICE: Final = 5  # somebody waits for a start
+_NICER: Final = 10
 _MEMORY: Final = 768 << 20  # bytes that a worker may take beyond what it begins with
 _TIRED: Final = 256 << 20  # bytes in use after which a worker makes room for a fresh one
 _WAITING: Final = 32  # requests of one person
@@ -59,8 +60,11 @@ class Lane:
     outlives whoever asked: when they have gone, or after `patience` seconds, the worker is killed.
     """
 
-    def __init__(self, name: str, hands: int, patience: float, threads: CapacityLimiter) -> None:
+    def __init__(
+        self, name: str, hands: int, patience: float, nice: int, threads: CapacityLimiter
+    ) -> None:
         self._name = name
+        self._nice = nice
         self._patience = patience
         self._threads = threads
         self._idle: list[_Worker] = []
@@ -153,7 +157,11 @@ class Lane:
         try:
             with anyio.fail_after(_START_S):
                 return await to_thread.run_sync(
-                    _Worker.born, self._name, abandon_on_cancel=True, limiter=self._threads
+                    _Worker.born,
+                    self._name,
+                    self._nice,
+                    abandon_on_cancel=True,
+                    limiter=self._threads,
                 )
         except (OSError, EOFError, TimeoutError) as error:
             raise Crashed(f"No process can be started to work on this: {error!r}.") from error
@@ -171,8 +179,8 @@ class Workers:
 
     def __init__(self) -> None:
         threads = CapacityLimiter(8)
-        self.starts: Final = Lane("starts", 2, 20.0, threads)
-        self.looks: Final = Lane("looks", 2, 60.0, threads)
+        self.starts: Final = Lane("starts", 2, 20.0, _NICE, threads)
+        self.looks: Final = Lane("looks", 2, 60.0, _NICER, threads)
 
     @classmethod
     @asynccontextmanager
@@ -207,10 +215,10 @@ class _Worker:
         self._wire = wire
 
     @classmethod
-    def born(cls, name: str) -> "_Worker":
+    def born(cls, name: str, nice: int) -> "_Worker":
         """Start one. Takes milliseconds, but for the first."""
         ours, theirs = _context.Pipe()
-        process = child(_work, theirs, name=name)
+        process = child(_work, theirs, name=name, nice=nice)
         theirs.close()
         return cls(process, ours)
 
@@ -226,21 +234,21 @@ class _Worker:
         # Its thread may still read from the wire: that ends by itself, since the other end is closed.
 
 
-def child(work: Callable[..., None], *args: Any, name: str) -> ForkServerProcess:
+def child(work: Callable[..., None], *args: Any, name: str, nice: int) -> ForkServerProcess:
     """A process of low priority that ends with this one, in which `work(*args)` runs. Waits for it
     to exist. Raises OSError, EOFError."""
     _context.set_forkserver_preload(list(_PRELOADED))
-    process = _context.Process(target=_humbly, args=(work, args), name=name, daemon=True)
+    process = _context.Process(target=_humbly, args=(work, args, nice), name=name, daemon=True)
     process.start()
     return process
 
 
-def _humbly(work: Callable[..., None], args: tuple[Any, ...]) -> None:
+def _humbly(work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
     """In the process: others first, when time or memory runs short."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the runner, which ends us
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(OSError):
-        os.nice(_NICE)
+        os.nice(nice)
     with contextlib.suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("1000")
     with contextlib.suppress(OSError, ValueError):

@@ -13,18 +13,19 @@ import resource
 import socket
 import ssl
 import time
-from collections import Counter
 from collections.abc import Callable, Coroutine, Iterator
+from itertools import islice
 from typing import Any, Final
 
 log: Final = logging.getLogger(__name__)
 
 _KEPT: Final = 96  # descriptors for files, the database, workers and robots
 _MOST: Final = 8_192  # connections; more would only cost memory
-_MOST_STRANGERS: Final = 512
+_MOST_STRANGERS: Final = 2_048
 _SILENT_S: Final = 10.0  # until a request has come, with a handshake before it
 _SWEEP_S: Final = 1.0
 _AT_ONCE: Final = 50  # accepted between two turns of the loop
+_LOOKED_AT: Final = 16  # of somebody's oldest ones, for one that nothing is being done for
 _PAUSE_S: Final = 0.05  # when the system has no descriptor left
 
 Peer = tuple[str, int]
@@ -47,10 +48,10 @@ class Connection:
 
     def __init__(self, wire: socket.socket, peer: Peer) -> None:
         self.holder = f"@{peer[0]}"
-        self.is_known = False
         self.answering = 0  # requests that are being answered
         self.since = time.monotonic()  # when it began to wait for a request
         self.transport: asyncio.BaseTransport | None = None  # after the handshake
+        self.is_silent = True  # nothing at all has come yet
         self._wire = wire
 
     @property
@@ -60,11 +61,54 @@ class Connection:
 
     def end(self) -> None:
         """Now, whatever waits to be sent."""
-        if isinstance(self.transport, asyncio.WriteTransport):
+        if self.is_silent:
+            asyncio.get_running_loop().remove_reader(self._wire)
+            self._wire.close()
+        elif isinstance(self.transport, asyncio.WriteTransport):
             self.transport.abort()
         else:
             with contextlib.suppress(OSError):
                 self._wire.shutdown(socket.SHUT_RDWR)
+
+
+class Held:
+    """Connections by who holds them, and the oldest first."""
+
+    def __init__(self) -> None:
+        self._by: dict[str, dict[Peer, Connection]] = {}
+        self._peers: dict[Peer, Connection] = {}
+
+    def __len__(self) -> int:
+        return len(self._peers)
+
+    def __iter__(self) -> Iterator[tuple[Peer, Connection]]:
+        return iter(self._peers.items())
+
+    def get(self, peer: Peer) -> Connection | None:
+        """The one with this other end."""
+        return self._peers.get(peer)
+
+    def most(self) -> dict[Peer, Connection]:
+        """Those of whoever holds most."""
+        return max(self._by.values(), key=len)
+
+    def add(self, peer: Peer, connection: Connection) -> None:
+        """One more."""
+        before = self._peers.get(peer)
+        if before is not None:  # its end was not noticed yet
+            self.remove(peer, before)
+        self._peers[peer] = connection
+        self._by.setdefault(connection.holder, {})[peer] = connection
+
+    def remove(self, peer: Peer, connection: Connection) -> None:
+        """One less, if it is there."""
+        if self._peers.get(peer) is not connection:
+            return
+        del self._peers[peer]
+        theirs = self._by[connection.holder]
+        del theirs[peer]
+        if not theirs:
+            del self._by[connection.holder]
 
 
 class Connections:
@@ -73,8 +117,8 @@ class Connections:
     def __init__(self, limit: int) -> None:
         self._most = max(32, min(_MOST, limit - _in_use() - _KEPT))
         self._most_strangers = max(16, min(_MOST_STRANGERS, self._most // 4))
-        self._all: dict[Peer, Connection] = {}  # the oldest first
-        self._strangers: dict[Peer, Connection] = {}
+        self._all = Held()
+        self._strangers = Held()
         self._tasks: set[asyncio.Task[None]] = set()
         self._listeners: list[socket.socket] = []
 
@@ -96,12 +140,16 @@ class Connections:
         for listener in self._listeners:
             loop.remove_reader(listener)
             listener.close()
+        for _, each in tuple(self._all):
+            if each.is_silent:
+                each.end()
         for task in self._tasks:
             task.cancel()
 
     def _accept(
         self, listener: socket.socket, factory: Factory, context: ssl.SSLContext | None
     ) -> None:
+        loop = asyncio.get_running_loop()
         for _ in range(_AT_ONCE):
             try:
                 wire, address = listener.accept()
@@ -114,10 +162,25 @@ class Connections:
                 return
             wire.setblocking(False)
             peer = (str(address[0]), int(address[1]))
-            connection = self._all[peer] = self._strangers[peer] = Connection(wire, peer)
+            connection = Connection(wire, peer)
+            self._all.add(peer, connection)
+            self._strangers.add(peer, connection)
             self._make_room(self._strangers, self._most_strangers)
             self._make_room(self._all, self._most)
-            self._keep(self._open(connection, wire, factory, context))
+            loop.add_reader(wire, self._spoke, connection, wire, factory, context)
+
+    def _spoke(
+        self,
+        connection: Connection,
+        wire: socket.socket,
+        factory: Factory,
+        context: ssl.SSLContext | None,
+    ) -> None:
+        """Something has come. Until then a connection costs next to nothing: many that say nothing
+        would take the time of those that do."""
+        asyncio.get_running_loop().remove_reader(wire)
+        connection.is_silent = False
+        self._keep(self._open(connection, wire, factory, context))
 
     async def _accept_again(
         self, listener: socket.socket, factory: Factory, context: ssl.SSLContext | None
@@ -151,24 +214,23 @@ class Connections:
 
     # --- going --------------------------------------------------------------------------------
 
-    def _make_room(self, among: dict[Peer, Connection], most: int) -> None:
+    def _make_room(self, among: Held, most: int) -> None:
         """The oldest of whoever holds most goes, those first that nothing is being done for."""
-        if len(among) <= most:
-            return
-        self._forget_gone()
         while len(among) > most:
-            held = Counter(each.holder for each in among.values())
-            ((holder, _),) = held.most_common(1)
-            of_them = [item for item in among.items() if item[1].holder == holder]
-            peer, connection = min(of_them, key=lambda item: item[1].answering > 0)
+            of_them = among.most()
+            first = tuple(islice(of_them.items(), _LOOKED_AT))
+            peer, connection = min(first, key=lambda item: item[1].answering > 0)
             connection.end()
-            self._all.pop(peer, None)
-            self._strangers.pop(peer, None)
+            self._forget(peer, connection)
+
+    def _forget(self, peer: Peer, connection: Connection) -> None:
+        self._all.remove(peer, connection)
+        self._strangers.remove(peer, connection)
 
     def _forget_gone(self) -> None:
-        for peer in [peer for peer, each in self._all.items() if each.is_over]:
-            del self._all[peer]
-            self._strangers.pop(peer, None)
+        for peer, each in tuple(self._all):
+            if each.is_over:
+                self._forget(peer, each)
 
     async def _sweep(self) -> None:
         """Whoever has asked for nothing in time has had it."""
@@ -176,7 +238,7 @@ class Connections:
             await asyncio.sleep(_SWEEP_S)
             self._forget_gone()
             late = time.monotonic() - _SILENT_S
-            for each in self._all.values():
+            for _, each in tuple(self._all):
                 if not each.answering and each.since < late:
                     each.end()
 
@@ -192,8 +254,10 @@ class Connections:
             return
 
         def known(person: str) -> None:
-            connection.holder, connection.is_known = person, True
-            self._strangers.pop(peer, None)
+            if connection.holder != person:
+                self._forget(peer, connection)
+                connection.holder = person
+                self._all.add(peer, connection)
 
         connection.answering += 1
         try:

@@ -15,11 +15,13 @@ from collections.abc import Awaitable, Callable, Iterator
 from contextlib import AbstractContextManager, suppress
 from functools import partial
 from typing import Any, Final
+from weakref import WeakSet
 
 import anyio
 import msgspec
 from anyio import to_thread
 
+from action_assistant.errors import TooMany
 from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.port import (
     Answer,
@@ -41,7 +43,10 @@ log: Final = logging.getLogger(__name__)
 
 _HEAD: Final = 4  # bytes of a length
 _CHANGES: Final = 100  # of one report; the runner does nothing else while it takes one in
+#: Simulated runs at a time; each takes 15 MB, and its part of the processors.
+MOST: Final = 64
 _WAITING: Final = 16_384  # bytes on the way; an answer comes after what was said before it
+_NICE: Final = 10
 _REST: Final = 3  # for so many times as long as reports took, all simulated runs wait together
 _START_S: Final = 4.0  # less than a start may take
 _GONE: Final = "The simulated engine was switched off."
@@ -55,10 +60,15 @@ class Simulators:
 
     def __init__(self) -> None:
         self._turn = anyio.Lock()
+        self._links: WeakSet[SimulatedLink] = WeakSet()
 
     def __call__(self, facts: EngineFacts, script: str, wall: Callable[[], int]) -> "SimulatedLink":
-        """A simulated engine. Its process begins with its first start."""
-        return SimulatedLink(facts, script, wall, self.take)
+        """A simulated engine. Its process begins with its first start. Raises TooMany."""
+        if sum(each.is_alive for each in self._links) >= MOST:
+            raise TooMany(f"{MOST} simulated runs go on already; stop some, or wait.")
+        link = SimulatedLink(facts, script, wall, self.take)
+        self._links.add(link)
+        return link
 
     async def take(self, report: Callable[[], None]) -> None:
         """Take in one report, then leave time for others."""
@@ -103,6 +113,11 @@ class SimulatedLink:
         return Standing(
             state="answering", incarnation=self._incarnation, generation="current", servers=1
         )
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it has a process."""
+        return self._process is not None and self._state != "gone"
 
     async def start(self, order: Order) -> None:
         """Start at this moment; the first start begins the process. Raises NotSent, EngineRefused."""
@@ -230,7 +245,7 @@ class SimulatedLink:
 
 def _born(theirs: socket.socket, facts: EngineFacts, script: str) -> Any:
     with theirs:
-        return child(_live, theirs, facts, script, name="simulated engine")
+        return child(_live, theirs, facts, script, name="simulated engine", nice=_NICE)
 
 
 def _framed(value: object) -> bytes:

@@ -1,0 +1,209 @@
+"""Nobody may delay Stop: while many press hard on every route, and strangers on every descriptor.
+
+Real processes: a runner at `ulimit -n 1024`, a crowd in another process, and somebody who presses
+Stop. What the runner itself does between a click and the answer is its *own share*: the processor
+time of its threads, as the kernel counts it. What is told beside it also holds the time for which the
+runner was ready to go on and others had the processors. `TEST_HOSTILE_STOPS` is how many stops are
+pressed (default 40), `TEST_HOSTILE_SILENT` how many strangers say nothing (default 300).
+"""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import httpx
+import psutil
+import pytest
+
+from action_assistant.web.keys import Keys
+from runner.process import TOKEN, RunnerProcess, body, started
+from runner.world import order, sequence
+from support.hostile import long_run
+
+STOPS = int(os.environ.get("TEST_HOSTILE_STOPS", "40"))
+SILENT = int(os.environ.get("TEST_HOSTILE_SILENT", "300"))
+WHOLE = STOPS >= 1_000
+CLIENTS = 20
+ODD = 'g_state={"i_l":0}; a b=1; lang=\xe9; aa_{port}=planted; '
+ENDLESS = {"*": [{"never": True}]}
+
+
+@pytest.fixture(scope="module")
+def runner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunnerProcess]:
+    """With a long run behind it, and few descriptors."""
+    data = tmp_path_factory.mktemp("hostile") / "data"
+    long_run(data, events=20_000 if WHOLE else 3_000)
+    process = RunnerProcess(data)
+    process.start("prlimit", "--nofile=1024:1024")
+    yield process
+    process.end()
+
+
+@contextmanager
+def crowd(runner: RunnerProcess, *what: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Everybody who presses hard."""
+    path = Path(__file__).parent
+    process = subprocess.Popen(
+        [sys.executable, "-m", "support.hostile", str(runner.port), *what],
+        env={**os.environ, "PYTHONPATH": str(path)},
+        stdout=subprocess.PIPE,
+    )
+    assert process.stdout is not None
+    try:
+        assert process.stdout.readline() == b"pressing\n"
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+class Share:
+    """Processor time of a process, thread by thread, and how long its first thread had to wait for
+    a processor (seconds)."""
+
+    def __init__(self, pid: int) -> None:
+        self._tasks = Path(f"/proc/{pid}/task")
+        self._first = self._tasks / str(pid) / "schedstat"
+
+    def now(self) -> tuple[float, float]:
+        total = 0
+        for task in self._tasks.iterdir():
+            with suppress(OSError):
+                total += int((task / "schedstat").read_text().split()[0])
+        return total / 1e9, int(self._first.read_text().split()[1]) / 1e9
+
+
+@contextmanager
+def overslept(late: list[float]) -> Iterator[None]:
+    """How late an idle process wakes up that asks for a millisecond."""
+    script = (
+        "import time,sys\n"
+        "while True:\n"
+        " t=time.perf_counter(); time.sleep(.001)\n"
+        " print(time.perf_counter()-t-.001, flush=True)\n"
+    )
+    idle = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE)
+
+    def read() -> None:
+        assert idle.stdout is not None
+        late.extend(float(line) for line in idle.stdout)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    try:
+        yield
+    finally:
+        idle.kill()
+        idle.wait()
+        reader.join()
+        assert idle.stdout is not None
+        idle.stdout.close()
+
+
+def told(name: str, seconds: list[float]) -> tuple[float, float]:
+    """Print p50, p99 and the longest; the last two."""
+    ordered = sorted(seconds)
+    p50, p99 = (ordered[min(len(ordered) - 1, int(len(ordered) * q))] for q in (0.5, 0.99))
+    sys.stdout.write(
+        f"{name:44} n={len(ordered):5} p50={1e3 * p50:8.2f} p99={1e3 * p99:8.2f} "
+        f"max={1e3 * ordered[-1]:8.2f} ms\n"
+    )
+    return p99, ordered[-1]
+
+
+@pytest.mark.timeout(0)
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux who used the processors")
+def test_stop_is_taken_whatever_everybody_does(runner: RunnerProcess) -> None:
+    with runner.client() as client:
+        runs = [
+            started(client, order(sequence(f"patrol{i}"), script=ENDLESS))["id"] for i in range(8)
+        ]
+    keys = Keys(TOKEN)
+    cookie = f"aa_{runner.port - 1}={keys.sealed(keys.new_session('Ann'))}"
+    signed_in = {
+        "cookie": ODD.replace("{port}", str(runner.port - 1)) + cookie,
+        "origin": f"http://127.0.0.1:{runner.port - 1}",
+    }
+    share = Share(runner.pid)
+    took: list[float] = []
+    own: list[float] = []
+    waited: list[float] = []
+    late: list[float] = []
+    with crowd(runner, str(SILENT), str(CLIENTS)), overslept(late):
+        time.sleep(2)
+        base = f"http://127.0.0.1:{runner.port}"
+        raw = [(name, value.encode("latin-1")) for name, value in signed_in.items()]
+        open_one = httpx.Client(base_url=base, headers=raw, trust_env=False, timeout=60)
+        with open_one:
+            for number in range(STOPS):
+                path = f"/api/runs/{runs[number % len(runs)]}/stop"
+                fresh = number % 2 == 0
+                asked: Callable[..., httpx.Response] = httpx.post if fresh else open_one.post
+                more: dict[str, Any] = (
+                    {"headers": raw, "trust_env": False, "timeout": 60} if fresh else {}
+                )
+                cpu, ready = share.now()
+                began = time.perf_counter()
+                answer = asked(
+                    f"{base}{path}" if fresh else path, json={"stop_id": str(number)}, **more
+                )
+                took.append(time.perf_counter() - began)
+                cpu_after, ready_after = share.now()
+                own.append(min(took[-1], cpu_after - cpu))
+                waited.append(min(took[-1], ready_after - ready))
+                assert answer.status_code == 202, answer.text
+                time.sleep(0.01)
+    sys.stdout.write("\n")
+    told("click to answer", took)
+    p99, longest = told("the runner's own share of it", own)
+    told("the runner was ready, others had the CPUs", waited)
+    told("an idle process woke up late by", late)
+    if WHOLE:
+        assert p99 < 0.05
+        assert longest < 0.15
+    with runner.client() as client:
+        for run in runs:
+            deadline = time.monotonic() + 60
+            while client.get(f"/api/runs/{run}").json()["state"] != "stopped":
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
+
+
+def test_a_start_whose_worker_dies_is_refused_and_nothing_was_sent(runner: RunnerProcess) -> None:
+    with runner.client() as client:
+        asked = order(sequence("again"), script=ENDLESS)
+        before = {run["id"] for run in client.get("/api/runs").json()}
+        for child in psutil.Process(runner.pid).children():
+            for worker in child.children():
+                with suppress(psutil.NoSuchProcess):
+                    worker.kill()
+        answer = client.post("/api/runs", content=body(asked))
+        assert answer.status_code == 503, answer.text
+        assert "died" in answer.json()["detail"]
+        second = client.get("/api/runs")
+        if second.status_code == 503:  # that worker had been killed, too
+            second = client.get("/api/runs")
+        assert {run["id"] for run in second.json()} == before
+        run = started(client, asked)
+        assert client.post(f"/api/runs/{run['id']}/stop").status_code == 202
+
+
+def test_bodies_that_are_too_large_are_refused(runner: RunnerProcess) -> None:
+    with runner.client() as client:
+        for path, size in [
+            ("/api/runs", 2_000_001),
+            ("/api/runs/x/script", 2_000_001),
+            ("/api/preflight", 2_000_001),
+            ("/api/groups", 2_000_001),
+            ("/api/robots", 100_001),
+            ("/api/expectations", 100_001),
+        ]:
+            assert client.post(path, content=b" " * size).status_code == 413, path
+        assert client.post("/api/stop", content=b"x" * 1_000_000).status_code == 202
