@@ -64,6 +64,11 @@ PARTS: Final[dict[str, Part]] = {
         {"FUZZ_EXAMPLES": "10000"},
         ("tests/fuzz",),
     ),
+    "hostile": Part(
+        "1,000 Stops while 20 people press hard on every route, beside 2,000 silent strangers",
+        {"TEST_HOSTILE_STOPS": "1000", "TEST_HOSTILE_SILENT": "2000"},
+        ("-s", "tests/test_nobody_delays_stop.py"),
+    ),
     "robots": Part(
         "10,000 histories of runs with false confirmations, 1,000 stops and races, 300 clicks on Stop",
         {
