@@ -162,7 +162,7 @@ async def hold(port: int, said: bytes) -> None:
             writer.close()
         except OSError:
             pass
-        await asyncio.sleep(0.2 + random.random())
+        await asyncio.sleep(2 + 2 * random.random())
 
 
 async def main(port: int, silent: int, clients: int) -> None:

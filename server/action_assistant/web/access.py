@@ -76,8 +76,10 @@ class Needs:
     def __init__(self, deed: Deed) -> None:
         self.deed: Final = deed
 
-    def __call__(self, connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler) -> None:
-        """Raises Forbidden."""
+    async def __call__(
+        self, connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler
+    ) -> None:
+        """Raises Forbidden. Plain functions would be called in a thread, for which Stop had to wait."""
         require(connection, self.deed)
 
 

@@ -116,7 +116,7 @@ class Connections:
 
     def __init__(self, limit: int) -> None:
         self._most = max(32, min(_MOST, limit - _in_use() - _KEPT))
-        self._most_strangers = max(16, min(_MOST_STRANGERS, self._most // 4))
+        self._most_strangers = max(16, min(_MOST_STRANGERS, self._most * 2 // 3))
         self._all = Held()
         self._strangers = Held()
         self._tasks: set[asyncio.Task[None]] = set()

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextvars import ContextVar
 from typing import Any, Final
 
 import h11
@@ -30,6 +31,8 @@ WEBSOCKET_LIMIT: Final = 1_114_112  # bytes; an update of 1 MiB and its frame
 GRACE: Final = 5  # seconds that open requests get when the process is told to end
 HEAD_LIMIT: Final = 32_768  # bytes of a request line and its header fields
 _CALLS: Final = frozenset({"http", "websocket"})
+#: Processor time and time (seconds) when what is answered came in.
+_RECEIVED: Final[ContextVar[tuple[float, float]]] = ContextVar("received", default=(0.0, 0.0))
 _FAILED: Final = 3  # exit code when the application could not be set up
 _BODY_S: Final = 30.0  # between two pieces of a body
 _LENGTH_REQUIRED: Final = (
@@ -195,9 +198,21 @@ class Watched:
             whole = not message.get("more_body", False)
             return message
 
+        async def sent(message: Message) -> None:
+            if message["type"] == "http.response.start" and scope["path"].endswith("/stop"):
+                message["headers"] = [*message.get("headers", []), _own_share()]
+            await send(message)
+
         with self._connections.answering(peer and tuple(peer)) as known:
             scope.setdefault("state", {})[KNOWN] = known
-            await self._app(scope, received, send)
+            await self._app(scope, received, sent)
+
+
+def _own_share() -> tuple[bytes, bytes]:
+    """What this process has done, and how long it took, since a Stop came in (milliseconds)."""
+    cpu, wall = _RECEIVED.get()
+    spent, took = time.process_time() - cpu, time.perf_counter() - wall
+    return b"server-timing", f"cpu;dur={1e3 * spent:.3f}, total;dur={1e3 * took:.3f}".encode()
 
 
 class _Http(H11Protocol):
@@ -206,6 +221,11 @@ class _Http(H11Protocol):
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
         self._strict = self.conn = _Strict(h11.SERVER, HEAD_LIMIT)
+
+    def data_received(self, data: bytes) -> None:
+        """Something has come."""
+        _RECEIVED.set((time.process_time(), time.perf_counter()))
+        super().data_received(data)
 
     def send_400_response(self, msg: str) -> None:
         """The refusal that fits."""
