@@ -13,6 +13,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests never speak to other machines.
 unit e2e ros-test soak soak-ros pictures bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
+# Whose packages a sourced ROS 2 can lend: the Python that it was built for, on Ubuntu the system's.
+PYTHON ?= python3
 BIN := .venv/bin
 # How many processes share the Python tests, of which many wait; each test file stays with one.
 PROCESSES ?= 3
@@ -125,12 +127,12 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@$(LOCK) requirements/build.in --output-file requirements/build.txt
 
 .venv/.done: requirements/dev.txt pyproject.toml scripts/need
-	@scripts/need python3=python3 || exit 1
-	@python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-		{ echo "Python 3.11 or newer is needed; this is $$(python3 --version)." >&2; exit 1; }
-	@python3 -c 'import ensurepip, venv' 2>/dev/null || scripts/need no-such-command=python3-venv
+	@scripts/need $(PYTHON)=python3 || exit 1
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "Python 3.11 or newer is needed; this is $$($(PYTHON) --version)." >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || scripts/need no-such-command=python3-venv
 	@echo "» Python packages into .venv"
-	@test -x $(BIN)/python || python3 -m venv .venv
+	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	@$(BIN)/pip install --quiet --require-hashes --requirement requirements/dev.txt
 	@$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
@@ -139,7 +141,7 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 .venv-ros/.done: requirements/ros.txt pyproject.toml scripts/build-messages $(wildcard ros/temoto_msgs/* ros/temoto_msgs/*/*)
 	@scripts/need cmake=cmake ninja=ninja-build g++=g++ || exit 1
 	@echo "» rclpy and Python packages into .venv-ros"
-	@test -x $(ROS)/python || python3 -m venv .venv-ros
+	@test -x $(ROS)/python || $(PYTHON) -m venv .venv-ros
 	@$(ROS)/python -m pip install --quiet --require-hashes --requirement requirements/ros.txt
 	@$(ROS)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@echo "» messages of TeMoto into .venv-ros"

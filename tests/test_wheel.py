@@ -53,9 +53,14 @@ def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: 
     shutil.copy(ROOT / "requirements" / "run.txt", files)
     subprocess.run([IMAGE, "install", environment, files], check=True)
     product = Product(tmp_path / "data")
-    tools = tmp_path / "bin"
+    tools, harmful = tmp_path / "bin", tmp_path / "sourced"
     tools.mkdir()
+    harmful.mkdir()
+    for name in ("litestar", "msgspec", "sqlalchemy"):
+        (harmful / f"{name}.py").write_text("raise ImportError('of another workspace')")
     clean = {
+        "PYTHONPATH": str(harmful),  # as a sourced ROS 2 sets it
+        "AMENT_PREFIX_PATH": str(tmp_path),
         "PATH": str(tools),
         "HOME": str(tmp_path),
         "ACTION_ASSISTANT_TOKEN": TOKEN,

@@ -1,7 +1,6 @@
 """Which Python the runner runs under: rclpy works only for the one that it was built for."""
 
 import hashlib
-import importlib.machinery
 import importlib.util
 import os
 import sys
@@ -11,8 +10,9 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant import places
+from action_assistant import places, sourced
 from action_assistant.errors import CannotStart
+from action_assistant.sourced import Workspace
 
 VARIABLE: Final = "ACTION_ASSISTANT_RUNNER_PYTHON"
 #: What a sourced ROS 2 puts into the environment. The wheels of `make ros` must not see it.
@@ -42,36 +42,36 @@ class Interpreter(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def for_runner(environ: Mapping[str, str] = os.environ) -> Interpreter:
-    """The one to take: whoever is named, else this one where it can speak ROS 2, else the one of
-    `make ros`, else this one. Raises CannotStart."""
+    """The one to take: whoever is named, else this one where it can speak ROS 2 by itself or through
+    the workspace that is sourced, else the one of `make ros`, else this one. Raises CannotStart."""
     named = environ.get(VARIABLE)
     if named:
         path = Path(named)
         if not os.access(path, os.X_OK) or path.is_dir():
             raise CannotStart(f"{VARIABLE} is {named!r}, which is no program.")
         return Interpreter(path=path, origin="named")
-    this = Interpreter(path=Path(sys.executable), origin="this")
+    this = Path(sys.executable)
+    if rclpy_fits(environ):
+        return Interpreter(path=this, origin="this")
+    remark = Workspace.of(environ).other_python()
     wheels = places.wheels()
-    if rclpy_fits() or wheels is None or not (wheels / "bin" / "python").exists():
-        return this
+    if wheels is None or not (wheels / "bin" / "python").exists():
+        return Interpreter(path=this, origin="this", remark=remark)
     if not is_current(wheels):
-        return Interpreter(
-            path=this.path,
-            origin="this",
-            remark=f"{wheels} was made for another version of this program; `make ros` renews it.",
-        )
-    return Interpreter(path=wheels / "bin" / "python", origin="wheels")
+        stale = f"{wheels} was made for another version of this program; `make ros` renews it."
+        return Interpreter(path=this, origin="this", remark=f"{remark} {stale}".strip())
+    if remark:
+        remark += f" Until then robots are reached with what `make ros` made, in {wheels}."
+    return Interpreter(path=wheels / "bin" / "python", origin="wheels", remark=remark)
 
 
-def rclpy_fits() -> bool:
-    """Whether this interpreter finds an rclpy that was built for it, without importing it."""
-    spec = importlib.util.find_spec("rclpy")
-    folders = spec.submodule_search_locations if spec else None
-    return any(
-        (Path(folder) / f"_rclpy_pybind11{suffix}").exists()
-        for folder in folders or ()
-        for suffix in importlib.machinery.EXTENSION_SUFFIXES
-    )
+def rclpy_fits(environ: Mapping[str, str] = os.environ) -> bool:
+    """Whether this interpreter finds an rclpy that was built for it, its own or that of the workspace
+    which is sourced, without importing it."""
+    own = importlib.util.find_spec("rclpy")
+    if own is not None and sourced.rclpy_fits(own):
+        return True
+    return Workspace.of(environ).rclpy() is not None
 
 
 def is_current(wheels: Path) -> bool:

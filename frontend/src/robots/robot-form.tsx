@@ -137,7 +137,7 @@ export function RobotForm({ editing, onClose }: { editing: Editing; onClose: () 
             <Stack gap="md">
               <TextInput
                 label="Path of its get service"
-                description="Each engine needs one of its own: two on one path prove nothing."
+                description="Two engines on one path prove nothing: give each a domain of its own."
                 value={robot.get_service}
                 error={at("get_service")}
                 onChange={(event) =>

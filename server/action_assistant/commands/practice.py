@@ -30,7 +30,10 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     robot.add_argument("name", metavar="NAME", help="its wake word, as it is registered")
     robot.add_argument("--domain", type=_domain, metavar="N", help="default: $ROS_DOMAIN_ID, or 0")
     robot.add_argument(
-        "--namespace", default="", metavar="NS", help="of its get service, where there are several"
+        "--namespace",
+        default="",
+        metavar="NS",
+        help="of its get service; real engines take none: give them domains of their own",
     )
     robot.add_argument(
         "--actions",

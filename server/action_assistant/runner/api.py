@@ -108,7 +108,7 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
         under_way = house.control.under_way(request_id)  # before: what it becomes is stored by then
         rows = await house.control.history.rows(archive.of_start(request_id))
         runs = [await house.control.find(row.id) for row in rows]
-        found = [_shown(house, run.id) or shapes.shown(run) for run in runs]
+        found = [await _shown(house, run) for run in runs]
         return shapes.StartShown(request_id=request_id, under_way=under_way, runs=found)
 
     return [start, started]

@@ -188,7 +188,7 @@ def _proof(sight: Sight) -> Item:
             if standing.servers
             else f"Discovery shows nobody who serves the path of {name}"
         )
-        text += ", so no answer would prove a stop. Give each engine a path of its own."
+        text += ", so no answer would prove a stop. Give each engine a domain of its own."
         return Item(code="proof", verdict="blocked", text=text, codes=("proof",), overridable=True)
     if standing.generation == "unknown":
         text = (

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from action_assistant import sourced
 from action_assistant.runner.links.port import Reach
 
 #: The fields of a start, in the order engines read them.
@@ -35,8 +36,12 @@ def ros2_reach(wall: Callable[[], int], environ: Mapping[str, str] = os.environ)
 def why_not(environ: Mapping[str, str] = os.environ) -> str:
     """Why this interpreter cannot speak ROS 2; empty when it can."""
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    sourced.offer(environ)
     if importlib.util.find_spec("rclpy") is None:
-        return f"rclpy is not there for this Python ({version}, {sys.executable}): {_MAKE}."
+        return (
+            sourced.Workspace.of(environ).other_python()
+            or f"rclpy is not there for this Python ({version}, {sys.executable}): {_MAKE}."
+        )
     rmw = environ.get("RMW_IMPLEMENTATION", "")
     if rmw and not _survives(rmw, environ):
         return (
@@ -69,5 +74,8 @@ def why_not(environ: Mapping[str, str] = os.environ) -> str:
 def _survives(rmw: str, environ: Mapping[str, str]) -> bool:
     """Whether rclpy can be imported with this middleware: if not, it ends the process (code 102)."""
     asked = {**environ, "RMW_IMPLEMENTATION": rmw}
-    command = [sys.executable, "-c", "import rclpy"]
+    command = [
+        *(sys.executable, "-c"),
+        "from action_assistant import sourced; sourced.offer(); import rclpy",
+    ]
     return subprocess.run(command, env=asked, capture_output=True, check=False).returncode != 102

@@ -1,13 +1,17 @@
 """What is wrong with ROS 2 here, as far as can be seen from this process: its environment, who is on
 its domains, and whether each registered robot answers."""
 
+import importlib
 import os
+import pwd
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
 import anyio
 
+from action_assistant import sourced
 from action_assistant.runner.links import ros2_reach
 from action_assistant.runner.links.findings import Finding, Verdict
 from action_assistant.runner.links.port import (
@@ -37,7 +41,14 @@ async def look(
     if isinstance(reach, str):
         verdict: Verdict = "wrong" if robots else "note"  # a computer without robots needs none
         return [*found, Finding(topic="rclpy", verdict=verdict, what=reach)]
-    found.append(Finding(topic="rclpy", verdict="fine", what=f"rclpy speaks {reach.rmw}."))
+    found.append(
+        Finding(
+            topic="rclpy",
+            verdict="fine",
+            what=f"rclpy of {_origin('rclpy')} speaks {reach.rmw}, with the temoto_msgs of "
+            f"{_origin('temoto_msgs')}.",
+        )
+    )
     try:
         found += await _robots(reach, robots)
         found += _seen(await reach.candidates(), robots)
@@ -124,22 +135,42 @@ def _shared_memory(environ: Mapping[str, str]) -> list[Finding]:
                 "on both sides.",
             )
         )
-    strangers = {
-        each.owner()
-        for each in _SHM.glob("fastrtps_*")
-        if each.exists() and each.stat().st_uid != os.getuid()
-    }
+    strangers = sorted(_name(uid) for uid in _owners() - {os.getuid()})
     if strangers:
+        runs = "runs" if len(strangers) == 1 else "run"
         found.append(
             Finding(
                 topic="shared memory",
                 verdict="note",
-                what=f"{', '.join(sorted(strangers))} runs nodes of Fast DDS too. Nodes of different "
+                what=f"{' and '.join(strangers)} {runs} nodes of Fast DDS too. Nodes of different "
                 "users see each other, but may not read each other's memory.",
                 advice=f"Run them as one user, or set {_SAYS_FASTRTPS}=UDPv4 for all of them.",
             )
         )
     return found
+
+
+def _owners() -> set[int]:
+    """The users whose nodes have shared memory here; it comes and goes while one looks."""
+    found: set[int] = set()
+    for each in _SHM.glob("fastrtps_*"):
+        with suppress(OSError):
+            found.add(each.stat().st_uid)
+    return found
+
+
+def _name(uid: int) -> str:
+    """A user for people. Those of containers mostly have no name outside."""
+    try:
+        return pwd.getpwuid(uid).pw_name
+    except KeyError:
+        return f"User {uid}"
+
+
+def _origin(module: str) -> str:
+    """Where a package of ROS 2 comes from, for people."""
+    place = getattr(importlib.import_module(module), "__file__", None)
+    return sourced.prefix_of(place) if place else "an unknown place"
 
 
 async def _robots(reach: Reach, robots: Sequence[Registration]) -> list[Finding]:

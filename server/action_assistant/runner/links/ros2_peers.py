@@ -42,7 +42,7 @@ def two_servers(place: str, count: int) -> str:
     """Why answers on a path prove nothing."""
     return (
         f"{count} engines answer on {place}, so an answer may be another's and proves nothing. Give "
-        "each engine a namespace or a domain of its own; one that died just now is seen for up to "
+        "each engine a domain of its own (ROS_DOMAIN_ID); one that died just now is seen for up to "
         "20 s more."
     )
 

@@ -1,0 +1,153 @@
+"""What a sourced ROS 2 gives to the runner, and to nobody else.
+
+A workspace is found by AMENT_PREFIX_PATH, not by PYTHONPATH: that would put whatever lies beside
+rclpy before our own packages, in the editor, too. Only what stands in a prefix's package index comes
+in, after everything of ours; and numpy, which messages need, of the distribution that they were built
+with. Imports nothing but the standard library, since it runs before anything else does.
+"""
+
+import importlib.machinery
+import os
+import site
+import sys
+from collections.abc import Mapping, Sequence
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
+from pathlib import Path
+from types import ModuleType
+from typing import Final
+
+_INDEX: Final = Path("share", "ament_index", "resource_index", "packages")
+_PYTHON: Final = f"python{sys.version_info.major}.{sys.version_info.minor}"
+#: Where the packages of one Python lie below a prefix, as distributions and colcon have it.
+_PACKAGES: Final = (
+    f"lib/{_PYTHON}/site-packages",
+    f"local/lib/{_PYTHON}/dist-packages",
+    f"lib/{_PYTHON}/dist-packages",
+    "lib/python3/dist-packages",
+)
+#: What rclpy and messages import that is no package of ROS, and a file that only one Python reads.
+_BESIDE: Final[Mapping[str, tuple[str, ...]]] = {
+    "numpy": ("core/_multiarray_umath", "_core/_multiarray_umath"),
+    "yaml": (),
+}
+_EXTENSION: Final = "_rclpy_pybind11"
+
+
+def hide() -> None:
+    """Take what PYTHONPATH put before our own packages out of this process and all that it starts.
+
+    Folders that are there anyway stay, after the others, and so does the one that holds this program.
+    """
+    listed = {_real(each) for each in os.environ.pop("PYTHONPATH", "").split(os.pathsep) if each}
+    program = Path(__file__).resolve().parents[1]
+    if program in listed:
+        listed.remove(program)
+        os.environ["PYTHONPATH"] = str(program)
+    anyway = [each for each in site.getsitepackages() if _real(each) in listed]
+    sys.path[:] = [*(each for each in sys.path if _real(each) not in listed), *anyway]
+
+
+def offer(environ: Mapping[str, str] = os.environ) -> None:
+    """Let this process import rclpy and messages of the workspace that is sourced, if there is one."""
+    workspace = Workspace.of(environ)
+    if workspace.prefixes and workspace not in sys.meta_path:
+        sys.meta_path.append(workspace)
+
+
+class Workspace(MetaPathFinder):
+    """The prefixes of a sourced ROS 2, the nearest first; none where nothing is sourced."""
+
+    def __init__(self, prefixes: tuple[Path, ...], system: tuple[Path, ...]) -> None:
+        self.prefixes = prefixes
+        self._system = system
+
+    @classmethod
+    def of(
+        cls,
+        environ: Mapping[str, str],
+        system: tuple[Path, ...] = (Path("/usr"), Path(sys.base_prefix)),
+    ) -> "Workspace":
+        """What this environment names. `system` is where numpy may be: the distribution's first, since
+        messages were compiled for its generation."""
+        named = environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+        return cls(tuple(Path(each) for each in named if each), system)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Workspace) and other.prefixes == self.prefixes
+
+    def __hash__(self) -> int:
+        return hash(self.prefixes)
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """As importlib asks, after nobody else had it. Parts of a package are found by the package."""
+        if "." in fullname or not self.prefixes:
+            return None
+        prefixes = [each for each in self.prefixes if (each / _INDEX / fullname).exists()]
+        if not prefixes and fullname in _BESIDE:
+            prefixes = [*self.prefixes, *self._system]
+        for folder in (str(each / below) for each in prefixes for below in _PACKAGES):
+            found = PathFinder.find_spec(fullname, [folder])
+            if found is not None and found.origin is not None and _fits(found):
+                return found
+        return None
+
+    def rclpy(self) -> ModuleSpec | None:
+        """Its rclpy, if that was built for this Python."""
+        found = self.find_spec("rclpy")
+        return found if found is not None and rclpy_fits(found) else None
+
+    def other_python(self) -> str:
+        """Why its rclpy is of no use here, in a sentence; empty where it is, or there is none."""
+        if self.rclpy() is not None:
+            return ""
+        for prefix in self.prefixes:
+            homes = (
+                each for base in ("lib", "local/lib") for each in (prefix / base).glob("python3.*")
+            )
+            for home in homes:
+                if any(home.glob("*-packages/rclpy")):
+                    return _for_another(prefix, home.name.removeprefix("python"))
+        return ""
+
+
+def rclpy_fits(rclpy: ModuleSpec) -> bool:
+    """Whether an rclpy that was found was built for this Python."""
+    return any(
+        Path(folder, f"{_EXTENSION}{suffix}").exists()
+        for folder in rclpy.submodule_search_locations or ()
+        for suffix in importlib.machinery.EXTENSION_SUFFIXES
+    )
+
+
+def prefix_of(file: str) -> str:
+    """The prefix in which a module of a workspace lies, for people."""
+    for each in Path(file).parents:
+        if (each / _INDEX).is_dir():
+            return str(each)
+    return str(Path(file).parent)
+
+
+def _for_another(prefix: Path, version: str) -> str:
+    return (
+        f"ROS 2 in {prefix} is for Python {version}, and this one is {_PYTHON.removeprefix('python')} "
+        f"({sys.executable}): install this program with python{version}, as `rm -rf .venv; make setup "
+        f"PYTHON=python{version}` does in a checkout."
+    )
+
+
+def _fits(found: ModuleSpec) -> bool:
+    """Whether a package beside ROS was built for this Python, as far as it was built."""
+    built = _BESIDE.get(found.name, ())
+    return not built or any(
+        Path(folder, f"{name}{suffix}").exists()
+        for folder in found.submodule_search_locations or ()
+        for name in built
+        for suffix in importlib.machinery.EXTENSION_SUFFIXES
+    )
+
+
+def _real(folder: str) -> Path:
+    return Path(folder).resolve()

@@ -1,0 +1,194 @@
+"""A sourced ROS 2 workspace is what the runner reaches robots with, however it is started.
+
+The prefix is laid out as the distribution lays it out; on its PYTHONPATH there are also packages that
+would do harm to ours. The runner's Python is the one of `.venv`, as people have it.
+"""
+
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import psutil
+import pytest
+
+from support.distribution import Distribution, lay_out
+from support.product import TOKEN, free_ports
+
+ROOT = Path(__file__).parents[2]
+WHEELS = Path(sys.prefix)
+PLAIN = ROOT / ".venv" / "bin" / "action-assistant"
+UNIT = ROOT / "ros" / "action-assistant-runner.service"
+
+pytestmark = pytest.mark.skipif(
+    not (PLAIN.exists() and (WHEELS / "share" / "ament_index").is_dir()),
+    reason="needs .venv and .venv-ros: `make setup ros`",
+)
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Distribution:
+    """As on Ubuntu: numpy is the system's."""
+    folder = tmp_path_factory.mktemp("ubuntu")
+    return lay_out(WHEELS, folder / "opt" / "ros" / "jazzy", folder / "workspace" / "install")
+
+
+def bare(tmp_path: Path) -> dict[str, str]:
+    """The environment of a fresh shell: nothing of the Python that runs this test."""
+    kept = {name: os.environ[name] for name in os.environ if name.startswith(("PIP_", "LC_"))}
+    return {
+        **kept,
+        "PATH": os.environ["PATH"].replace(f"{WHEELS}/bin{os.pathsep}", ""),
+        "HOME": str(tmp_path),
+        "LANG": os.environ.get("LANG", "C.UTF-8"),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ACTION_ASSISTANT_TOKEN": TOKEN,
+    }
+
+
+@contextmanager
+def started(command: Sequence[str], environ: Mapping[str, str], log: Path) -> Iterator[int]:
+    """A command in a session of its own, ended with all that it started; its process id."""
+    with log.open("wb") as out:
+        process = subprocess.Popen(
+            command, env=environ, cwd=ROOT, stdout=out, stderr=out, start_new_session=True
+        )
+    try:
+        yield process.pid
+    except BaseException as error:
+        error.add_note(log.read_text(errors="replace")[-4000:])
+        raise
+    finally:
+        os.killpg(process.pid, signal.SIGTERM)
+        process.wait(30)
+
+
+@pytest.fixture
+def david(workspace: Distribution, domain: int, tmp_path: Path) -> Iterator[dict[str, Any]]:
+    """A robot on the workspace's own messages, and how it is registered."""
+    command = [str(PLAIN), "simulate-robot", "David", "--domain", str(domain)]
+    with started(command, workspace.sourced(bare(tmp_path)), tmp_path / "david.log") as pid:
+        wait_for(lambda: b"is on domain" in (tmp_path / "david.log").read_bytes())
+        assert uses(pid, workspace)
+        yield {"name": "David", "domain": domain}
+
+
+def wait_for(told: Callable[[], bool], seconds: float = 60) -> None:
+    deadline = time.monotonic() + seconds
+    while not told():
+        assert time.monotonic() < deadline, "it never came to be"
+        time.sleep(0.1)
+
+
+def uses(pid: int, workspace: Distribution) -> bool:
+    """Whether a process has the workspace's messages in its memory, and no other ones."""
+    maps = Path(f"/proc/{pid}/maps").read_text()
+    assert str(WHEELS) not in maps
+    assert "/usr/lib/python3/dist-packages/numpy" in maps
+    return f"{workspace.workspace}/temoto_msgs/lib/libtemoto_msgs" in maps
+
+
+def reached(port: int, robot: dict[str, Any]) -> None:
+    """The runner on this port comes to reach a robot that is registered there."""
+    head = {"authorization": f"Bearer {TOKEN}"}
+    base = f"http://127.0.0.1:{port}"
+    with httpx.Client(base_url=base, headers=head, trust_env=False, timeout=20) as runner:
+
+        def ready() -> bool:
+            try:
+                return runner.get("/readyz").status_code == 200
+            except httpx.TransportError:
+                return False
+
+        def answers() -> bool:
+            (known,) = [
+                each for each in runner.get("/api/robots").json() if each["name"] == "David"
+            ]
+            return bool(known["state"] == "answering")
+
+        wait_for(ready)
+        assert runner.get("/api/reach").json()["no_reach"] == ""
+        runner.post("/api/robots", json=robot).raise_for_status()
+        wait_for(answers)
+
+
+def runner_of(pid: int) -> int:
+    """The runner among what a command started; itself, if it is one."""
+    family = [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
+    (found,) = [
+        each.pid
+        for each in family
+        if "runner" in each.cmdline() and "action_assistant" in " ".join(each.cmdline())
+    ] or [pid]
+    return found
+
+
+def test_make_run_in_a_sourced_shell_reaches_a_robot_with_the_workspaces_messages(
+    workspace: Distribution, david: dict[str, Any], tmp_path: Path
+) -> None:
+    port = free_ports()
+    run = f"make run ARGS='--no-open --data {tmp_path}/data --port {port}'"
+    shell = ["bash", "-c", f". {workspace.setup} && exec {run}"]
+    with started(shell, bare(tmp_path), tmp_path / "make.log") as pid:
+        reached(port + 1, david)
+        assert uses(runner_of(pid), workspace)
+
+
+def test_serve_in_a_sourced_shell_takes_nothing_else_of_its_packages(
+    workspace: Distribution, david: dict[str, Any], tmp_path: Path
+) -> None:
+    port = free_ports()
+    serve = [str(PLAIN), "serve", "--no-open", "--data", f"{tmp_path}/data", "--port", str(port)]
+    environ = workspace.sourced(bare(tmp_path))
+    harmful = Path(environ["PYTHONPATH"].split(":")[-1]) / "litestar.py"
+    assert harmful.exists(), "there to do harm"
+    with started(serve, environ, tmp_path / "serve.log") as pid:
+        reached(port + 1, david)
+        assert uses(runner_of(pid), workspace)
+
+
+def test_the_service_reaches_a_robot_from_an_environment_in_which_nothing_is_sourced(
+    workspace: Distribution, david: dict[str, Any], tmp_path: Path
+) -> None:
+    port = free_ports()
+    (line,) = [
+        each.removeprefix("ExecStart=")
+        for each in UNIT.read_text().splitlines()
+        if each.startswith("ExecStart=")
+    ]
+    environ = {
+        **bare(tmp_path),
+        "WORKSPACE": str(workspace.workspace),
+        "PROGRAM": str(PLAIN),
+        "STATE_DIRECTORY": str(tmp_path / "data"),
+        "ARGUMENTS": f"--port {port + 1} --page-port {port}",
+    }
+    with started(shlex.split(line), environ, tmp_path / "unit.log") as pid:
+        reached(port + 1, david)
+        assert uses(pid, workspace)
+    assert "--ros-args" not in line
+
+
+def test_doctor_in_a_sourced_shell_says_whose_rclpy_and_messages_there_are(
+    workspace: Distribution, tmp_path: Path
+) -> None:
+    told = subprocess.run(
+        [PLAIN, "doctor", "--only", "ros", "--data", tmp_path],
+        env=workspace.sourced(bare(tmp_path)),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert "ROS 2 jazzy is sourced." in told.stdout
+    assert (
+        f"rclpy of {workspace.prefix} speaks rmw_fastrtps_cpp, with the temoto_msgs of "
+        f"{workspace.workspace}/temoto_msgs." in told.stdout
+    )
