@@ -192,3 +192,21 @@ def test_doctor_in_a_sourced_shell_says_whose_rclpy_and_messages_there_are(
         f"rclpy of {workspace.prefix} speaks rmw_fastrtps_cpp, with the temoto_msgs of "
         f"{workspace.workspace}/temoto_msgs." in told.stdout
     )
+
+
+def test_the_package_for_workspaces_builds_and_runs_the_program_of_its_checkout(
+    tmp_path: Path,
+) -> None:
+    package = ROOT / "ros" / "temoto_action_assistant"
+    subprocess.run([ROOT / "scripts" / "build-messages", WHEELS, package, tmp_path], check=True)
+    program = tmp_path / "lib" / package.name / "action-assistant"
+    told = subprocess.run(
+        [program, "--version"],
+        env={"PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert told.stdout.startswith("action-assistant ")
+    assert (tmp_path / "share" / package.name / "launch" / "runner.launch.py").is_file()
+    assert (tmp_path / "share/ament_index/resource_index/packages" / package.name).is_file()
