@@ -95,6 +95,10 @@ soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops
 	TEST_ROS_HISTORIES=200 TEST_ROS_AT_ONCE=4 TEST_STOP_CLICKS=50 $(ROS)/python -m pytest -q -s \
 		--timeout=0 tests/ros/test_false_confirmations.py tests/ros/test_stop_latency.py
 
+.PHONY: workspace
+workspace: setup ## a sourced ROS 2 as Ubuntu 24.04 lays it out, in a root of its own (PYTHON312=…, FOLDER=…)
+	@scripts/try-workspace "$(or $(PYTHON312),python3.12)" "$(or $(FOLDER),/var/tmp/action-assistant-workspace)"
+
 .PHONY: pictures
 pictures: setup ## take the pictures of the documentation from the running product
 	@scripts/need chromium=chromium

@@ -3,11 +3,13 @@
     make contract DOMAIN=7 NAME=David [RMW=rmw_cyclonedds_cpp] [ACTION=OxWork]
 
 asks the engine of that name. ACTION is one of its own whose numbers mean seconds; without it, the
-first that has an input of type number is taken. Nothing else may run on that robot, and it moves.
+first that has an input of type number is taken, and named before it moves. Nothing else may run on
+that robot.
 """
 
 import json
 import os
+import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
@@ -75,15 +77,55 @@ ENGINE = os.environ.get("TEST_ENGINE_NAME", "")
 
 
 @pytest.mark.skipif(not ENGINE, reason="no engine was named; see the head of this file")
-async def test_the_link_over_ros_keeps_its_promises_with_a_real_engine() -> None:
+async def test_the_link_over_ros_keeps_its_promises_with_a_real_engine(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     async with reached(int(os.environ.get("TEST_ENGINE_DOMAIN", "0")), ENGINE) as link:
         plain = Bench(link=link, endless=sequence("endless"), quick=sequence("quick"))
         known = [json.loads(text) for text in (await answer(plain)).known_actions]
-        timed = [each for each in known if _numbers(each)]
-        wanted = os.environ.get("TEST_ENGINE_ACTION", "")
-        action = next(each for each in timed if wanted in {"", each["name"]})
+        action, why = _chosen(known, os.environ.get("TEST_ENGINE_ACTION", ""))
+        with capsys.disabled():
+            sys.stdout.write(f"\n{ENGINE} runs {why}\n")
         make = partial(_of, action)
         await all_kept(Bench(link=link, endless=make("endless", 15), quick=make("quick", 0.3)))
+
+
+def _chosen(known: list[dict[str, Any]], wanted: str) -> tuple[dict[str, Any], str]:
+    """The action that is run, and which one that is and why, for people."""
+    timed = [each for each in known if _numbers(each) and wanted in {"", each["name"]}]
+    if not timed:
+        names = ", ".join(sorted(each["name"] for each in known)) or "none"
+        pytest.fail(
+            f"ACTION={wanted} is no action of {ENGINE} with an input of type number; it has: {names}"
+            if wanted
+            else f"{ENGINE} has no action with an input of type number; it has: {names}"
+        )
+    action = timed[0]
+    others = ", ".join(each["name"] for each in timed[1:])
+    why = f"{action['name']}, with {' and '.join(_numbers(action))} in seconds"
+    if not wanted:
+        why += "; ACTION was not given, so it is the first with a number"
+        why += f", before {others}" if others else ""
+    return action, f"{why}."
+
+
+def test_the_contract_says_which_action_it_takes_where_none_was_named() -> None:
+    known: list[dict[str, Any]] = [
+        {"name": "Greet", "input_parameters": {"name": {"pvf_type": "string"}}},
+        {"name": "Wait", "input_parameters": {"delay": {"pvf_type": "number"}}},
+        {"name": "Turn", "input_parameters": {"angle": {"pvf_type": "number"}}},
+    ]
+    action, why = _chosen(known, "")
+    assert action["name"] == "Wait"
+    assert why == (
+        "Wait, with delay in seconds; ACTION was not given, so it is the first with a "
+        "number, before Turn."
+    )
+    assert _chosen(known, "Turn")[1] == "Turn, with angle in seconds."
+    with pytest.raises(
+        pytest.fail.Exception, match=r"ACTION=Greet is no action .* Greet, Turn, Wait"
+    ):
+        _chosen(known, "Greet")
 
 
 def _numbers(action: dict[str, Any]) -> list[str]:

@@ -1,14 +1,15 @@
 """A sourced ROS 2 workspace is what the runner reaches robots with, however it is started.
 
 The prefix is laid out as the distribution lays it out; on its PYTHONPATH there are also packages that
-would do harm to ours. The runner's Python is the one of `.venv`, as people have it.
+would do harm to ours. The runner's Python is the one of `.venv`, as people have it. `make workspace`
+runs these tests where all of that lies at its own place, under Python 3.12, and with a wheel's program
+(TEST_PREFIX, TEST_WORKSPACE, TEST_PROGRAMS).
 """
 
 import os
 import shlex
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -23,12 +24,14 @@ from support.distribution import Distribution, lay_out
 from support.product import TOKEN, free_ports
 
 ROOT = Path(__file__).parents[2]
-WHEELS = Path(sys.prefix)
+WHEELS = ROOT / ".venv-ros"
 PLAIN = ROOT / ".venv" / "bin" / "action-assistant"
+PROGRAMS = os.environ.get("TEST_PROGRAMS", str(PLAIN)).split(":")
 UNIT = ROOT / "ros" / "action-assistant-runner.service"
+LAID_OUT = os.environ.get("TEST_WORKSPACE", "")
 
 pytestmark = pytest.mark.skipif(
-    not (PLAIN.exists() and (WHEELS / "share" / "ament_index").is_dir()),
+    not (PLAIN.exists() and (LAID_OUT or (WHEELS / "share" / "ament_index").is_dir())),
     reason="needs .venv and .venv-ros: `make setup ros`",
 )
 
@@ -36,6 +39,8 @@ pytestmark = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Distribution:
     """As on Ubuntu: numpy is the system's."""
+    if LAID_OUT:
+        return Distribution(prefix=Path(os.environ["TEST_PREFIX"]), workspace=Path(LAID_OUT))
     folder = tmp_path_factory.mktemp("ubuntu")
     return lay_out(WHEELS, folder / "opt" / "ros" / "jazzy", folder / "workspace" / "install")
 
@@ -141,11 +146,12 @@ def test_make_run_in_a_sourced_shell_reaches_a_robot_with_the_workspaces_message
         assert uses(runner_of(pid), workspace)
 
 
+@pytest.mark.parametrize("program", PROGRAMS)
 def test_serve_in_a_sourced_shell_takes_nothing_else_of_its_packages(
-    workspace: Distribution, david: dict[str, Any], tmp_path: Path
+    program: str, workspace: Distribution, david: dict[str, Any], tmp_path: Path
 ) -> None:
     port = free_ports()
-    serve = [str(PLAIN), "serve", "--no-open", "--data", f"{tmp_path}/data", "--port", str(port)]
+    serve = [program, "serve", "--no-open", "--data", f"{tmp_path}/data", "--port", str(port)]
     environ = workspace.sourced(bare(tmp_path))
     harmful = Path(environ["PYTHONPATH"].split(":")[-1]) / "litestar.py"
     assert harmful.exists(), "there to do harm"
@@ -166,7 +172,7 @@ def test_the_service_reaches_a_robot_from_an_environment_in_which_nothing_is_sou
     environ = {
         **bare(tmp_path),
         "WORKSPACE": str(workspace.workspace),
-        "PROGRAM": str(PLAIN),
+        "PROGRAM": PROGRAMS[-1],
         "STATE_DIRECTORY": str(tmp_path / "data"),
         "ARGUMENTS": f"--port {port + 1} --page-port {port}",
     }
