@@ -59,7 +59,10 @@ fix: .venv/.done frontend/node_modules/.done ## mend what the formatters and lin
 	@$(NPM) run --silent fix
 
 .PHONY: test
-test: check unit ros-test e2e ## every check and every test, also in a real browser
+test: setup ros ## every check and every test, also in a real browser
+	@# Most of these wait for processes and robots: together they take little longer than the longest.
+	@$(MAKE) --no-print-directory --jobs=3 --output-sync=target check unit ros-test
+	@$(MAKE) --no-print-directory e2e
 
 .PHONY: unit
 unit: setup ## the tests of the server and of the page's pure parts

@@ -4,26 +4,40 @@ Exit codes: 0 fine, 1 the answer is no, 2 wrong use or cannot start.
 """
 
 import argparse
+import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Final
 
-from action_assistant.commands import (
-    backup,
-    doctor,
-    files,
-    maintenance,
-    people,
-    practice,
-    processes,
-    remote,
-)
 from action_assistant.errors import CannotStart
 from action_assistant.settings import check_environment
 from action_assistant.version import VERSION
 
+_MODULES: Final = (
+    "processes",
+    "files",
+    "remote",
+    "people",
+    "practice",
+    "maintenance",
+    "backup",
+    "doctor",
+)
+#: Commands that are started often, and need nothing of the other modules.
+_ALONE: Final[Mapping[str, str]] = {
+    "serve": "processes",
+    "editor": "processes",
+    "runner": "processes",
+    "check": "files",
+    "convert": "files",
+    "simulate": "files",
+    "simulate-robot": "practice",
+}
 
-def parser() -> argparse.ArgumentParser:
-    """Every command with its help and an example."""
+
+def parser(command: str = "") -> argparse.ArgumentParser:
+    """Every command with its help and an example. With a `command`, the others may be missing:
+    importing them all takes most of a second."""
     top = argparse.ArgumentParser(
         prog="action-assistant",
         description="Design, run and review robot tasks (UMRF graphs) together, in the browser.",
@@ -31,14 +45,15 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"action-assistant {VERSION}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in (processes, files, remote, people, practice, maintenance, backup, doctor):
-        module.add_to(commands)
+    for name in (_ALONE[command],) if command in _ALONE else _MODULES:
+        importlib.import_module(f"action_assistant.commands.{name}").add_to(commands)
     return top
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code."""
-    options = parser().parse_args(arguments)
+    asked = sys.argv[1:] if arguments is None else arguments
+    options = parser(asked[0] if asked else "").parse_args(asked)
     try:
         check_environment()
         code: int = options.deed(options)

@@ -26,7 +26,7 @@ from editor.process import Editor, running
 
 WRITERS: Final = 3
 KILLS: Final = 4
-SMALL_KILLS: Final = int(os.environ.get("TEST_KILLS", "200"))
+SMALL_KILLS: Final = int(os.environ.get("TEST_KILLS", "80"))
 _SHARING: Final = 5  # kills in a row that hit the same graph
 
 

@@ -29,10 +29,13 @@ OLDER = {
     "string[] graph_jsons_running\n",
 }
 
-pytestmark = pytest.mark.skipif(
-    "_ROS_WHEELS_BOOTSTRAP_COMPLETE" not in os.environ,
-    reason="messages are built with the wheels of `make ros`",
-)
+pytestmark = [
+    pytest.mark.skipif(
+        "_ROS_WHEELS_BOOTSTRAP_COMPLETE" not in os.environ,
+        reason="messages are built with the wheels of `make ros`",
+    ),
+    pytest.mark.timeout(300),  # a compiler shares two cores with other tests
+]
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +52,7 @@ def older(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (source / name).parent.mkdir(exist_ok=True)
         (source / name).write_text(text)
     subprocess.run(
-        [ROOT / "scripts" / "build-messages", sys.prefix, source, prefix], check=True, timeout=110
+        [ROOT / "scripts" / "build-messages", sys.prefix, source, prefix], check=True, timeout=280
     )
     return prefix
 
