@@ -19,6 +19,8 @@ BIN := .venv/bin
 # How many processes share the Python tests, of which many wait; each test file stays with one.
 PROCESSES ?= 3
 ROS := .venv-ros/bin
+# Tests see nothing of a sourced ROS 2 either; `make run` does.
+BARE := env -u AMENT_PREFIX_PATH -u COLCON_PREFIX_PATH -u LD_LIBRARY_PATH
 NODE := scripts/with-node
 NPM := $(NODE) npm --prefix frontend
 LOCK = $(BIN)/uv pip compile --quiet --generate-hashes --universal --python-version 3.11 --no-header \
@@ -67,26 +69,26 @@ test: setup ros ## every check and every test, also in a real browser
 .PHONY: unit
 unit: setup ## the tests of the server and of the page's pure parts
 	@echo "» pytest"
-	@$(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile $(PYTEST)
+	@$(BARE) $(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile $(PYTEST)
 	@echo "» vitest"
 	@$(NPM) run --silent test
 
 .PHONY: ros-test
 ros-test: ros ## tests over real rclpy, on loopback
 	@echo "» pytest over rclpy"
-	@$(ROS)/python -m pytest -q tests/ros $(PYTEST)
+	@$(BARE) $(ROS)/python -m pytest -q tests/ros $(PYTEST)
 
 .PHONY: contract
 contract: ros ## what a link promises, with a real engine: NAME=David [DOMAIN=0] [RMW=…] [ACTION=…]; it moves
 	@TEST_ENGINE_NAME="$(NAME)" TEST_ENGINE_DOMAIN="$(or $(DOMAIN),0)" TEST_ENGINE_ACTION="$(ACTION)" \
 		$(if $(RMW),RMW_IMPLEMENTATION="$(RMW)") \
-		$(ROS)/python -m pytest -q tests/ros/test_contract.py -k real_engine
+		$(BARE) $(ROS)/python -m pytest -q tests/ros/test_contract.py -k real_engine
 
 .PHONY: e2e
 e2e: setup ros ## tests in Chromium against the real processes
 	@scripts/need chromium=chromium
 	@echo "» Playwright"
-	@$(NPM) run --silent e2e
+	@$(BARE) $(NPM) run --silent e2e
 
 .PHONY: soak
 soak: setup ## what takes longer than CI may, by the thousand (ARGS="kills images" for some of it)
@@ -95,7 +97,7 @@ soak: setup ## what takes longer than CI may, by the thousand (ARGS="kills image
 
 .PHONY: soak-ros
 soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops
-	TEST_ROS_HISTORIES=200 TEST_ROS_AT_ONCE=4 TEST_STOP_CLICKS=50 $(ROS)/python -m pytest -q -s \
+	TEST_ROS_HISTORIES=200 TEST_ROS_AT_ONCE=4 TEST_STOP_CLICKS=50 $(BARE) $(ROS)/python -m pytest -q -s \
 		--timeout=0 tests/ros/test_false_confirmations.py tests/ros/test_stop_latency.py
 
 .PHONY: workspace
