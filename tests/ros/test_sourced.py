@@ -6,6 +6,7 @@ runs these tests where all of that lies at its own place, under Python 3.12, and
 (TEST_PREFIX, TEST_WORKSPACE, TEST_PROGRAMS).
 """
 
+import importlib.machinery
 import os
 import shlex
 import signal
@@ -29,6 +30,10 @@ PLAIN = ROOT / ".venv" / "bin" / "action-assistant"
 PROGRAMS = os.environ.get("TEST_PROGRAMS", str(PLAIN)).split(":")
 UNIT = ROOT / "ros" / "action-assistant-runner.service"
 LAID_OUT = os.environ.get("TEST_WORKSPACE", "")
+#: The distribution's; there is none for a Python that somebody built.
+NUMPY = Path("/usr/lib/python3/dist-packages/numpy")
+FITS = f"core/_multiarray_umath{importlib.machinery.EXTENSION_SUFFIXES[0]}"
+OF_THE_SYSTEM = any((NUMPY / f"{private}{FITS}").exists() for private in ("", "_"))
 
 pytestmark = pytest.mark.skipif(
     not (PLAIN.exists() and (LAID_OUT or (WHEELS / "share" / "ament_index").is_dir())),
@@ -38,11 +43,12 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Distribution:
-    """As on Ubuntu: numpy is the system's."""
+    """As on Ubuntu, where numpy is the system's; in the prefix where the system has none for us."""
     if LAID_OUT:
         return Distribution(prefix=Path(os.environ["TEST_PREFIX"]), workspace=Path(LAID_OUT))
     folder = tmp_path_factory.mktemp("ubuntu")
-    return lay_out(WHEELS, folder / "opt" / "ros" / "jazzy", folder / "workspace" / "install")
+    prefix, base = folder / "opt" / "ros" / "jazzy", folder / "workspace" / "install"
+    return lay_out(WHEELS, prefix, base, numpy=not OF_THE_SYSTEM)
 
 
 def bare(tmp_path: Path) -> dict[str, str]:
@@ -96,7 +102,7 @@ def uses(pid: int, workspace: Distribution) -> bool:
     """Whether a process has the workspace's messages in its memory, and no other ones."""
     maps = Path(f"/proc/{pid}/maps").read_text()
     assert str(WHEELS) not in maps
-    assert "/usr/lib/python3/dist-packages/numpy" in maps
+    assert (str(NUMPY) if OF_THE_SYSTEM else f"{workspace.prefix}/lib/python") in maps
     return f"{workspace.workspace}/temoto_msgs/lib/libtemoto_msgs" in maps
 
 
@@ -191,7 +197,7 @@ def test_doctor_in_a_sourced_shell_says_whose_rclpy_and_messages_there_are(
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=110,
     )
     assert "ROS 2 jazzy is sourced." in told.stdout
     assert (
