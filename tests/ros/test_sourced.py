@@ -189,11 +189,11 @@ def test_the_service_reaches_a_robot_from_an_environment_in_which_nothing_is_sou
 
 
 def test_doctor_in_a_sourced_shell_says_whose_rclpy_and_messages_there_are(
-    workspace: Distribution, tmp_path: Path
+    workspace: Distribution, domain: int, tmp_path: Path
 ) -> None:
     told = subprocess.run(
         [PLAIN, "doctor", "--only", "ros", "--data", tmp_path],
-        env=workspace.sourced(bare(tmp_path)),
+        env={**workspace.sourced(bare(tmp_path)), "ROS_DOMAIN_ID": str(domain)},
         capture_output=True,
         text=True,
         check=False,

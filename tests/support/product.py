@@ -1,6 +1,7 @@
 """The real product for tests: `action-assistant serve` on free ports with a data folder of its own."""
 
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -18,19 +19,17 @@ COMMAND = (sys.executable, "-m", "action_assistant")
 
 
 def free_ports() -> int:
-    """The first of two neighbouring ports that nobody listens on."""
+    """The first of two neighbouring ports that nobody listens on. Of those that the system hands out
+    to whoever connects, any may be taken again before it is used."""
     while True:
-        with socket.socket() as one:
-            one.bind(("127.0.0.1", 0))
-            port: int = one.getsockname()[1]
-            if port == 65535:
+        port = random.SystemRandom().randrange(10_000, 32_000, 2)
+        with socket.socket() as one, socket.socket() as two:
+            try:
+                one.bind(("127.0.0.1", port))
+                two.bind(("127.0.0.1", port + 1))
+            except OSError:
                 continue
-            with socket.socket() as two:
-                try:
-                    two.bind(("127.0.0.1", port + 1))
-                except OSError:
-                    continue
-                return port
+            return port
 
 
 class Product:
