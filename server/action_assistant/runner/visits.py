@@ -13,7 +13,7 @@ an upper bound each, and a bound that nothing proves is none:
   the graph can tell (`once`, umrf.laps); of an action that may have begun anew in between, nothing
   but its begin bounds the end from below. Nor does a sight count after a pause: code that returns
   while it is paused is shown running until it is resumed.
-- ERROR is no end where a stop may have reached the action for longer than the engine waits: its code
+- ERROR is no end where a stop may have reached the action, which did not obey or threw at it: its code
   may go on, so nothing bounds the end from above.
 - Feedback may be older than an answer that came before it. An action that runs at most once only goes
   forward, so what looks older is older. Of any other, feedback does not tell the end of what an answer
@@ -44,8 +44,6 @@ MOMENT_US: Final = 100_000
 #: Feedback of actions that may run again is taken to be younger than this: twice what a stop that is
 #: not obeyed holds an engine up for.
 _OLD_US: Final = 10_000_000
-#: An engine calls an action ERROR that has not obeyed a stop for so long (SPEC 2.4).
-_GIVES_UP_US: Final = 5_000_000
 
 _OUTCOMES: Final[dict[str, Outcome]] = {
     "on_true": "true",
@@ -303,7 +301,7 @@ def _closed(action: ActionRun, state: str, sight: Sight) -> ActionRun:
         last, action = replace(last, not_before=before), replace(action, going=before)
     implied = last.result or _implied(action.state, state)
     how: How = "inferred" if implied is not None and last.result is None else last.how
-    after = _not_after(state, last.not_before, sight)
+    after = _not_after(state, sight)
     ended = replace(
         last,
         start=min(last.start, max(sight.at, last.not_before)),
@@ -328,7 +326,7 @@ def _missed(action: ActionRun, state: str, sight: Sight) -> ActionRun:
         start=sight.at,
         not_before=before,
         until=before,
-        not_after=_not_after(state, before, sight),
+        not_after=_not_after(state, sight),
         result="error" if state == "ERROR" else None,
         how="inferred",
     )
@@ -343,9 +341,9 @@ def _not_before(action: ActionRun, sight: Sight) -> int:
     return min(sight.at, max(rest, sight.begun))
 
 
-def _not_after(state: str, before: int, sight: Sight) -> int | None:
-    outlasts = state == "ERROR" and sight.stoppable and sight.at - before >= _GIVES_UP_US
-    return None if outlasts else sight.at
+def _not_after(state: str, sight: Sight) -> int | None:
+    """When its code had ended; None of one that was told to stop and failed, which may go on."""
+    return None if state == "ERROR" and sight.stoppable else sight.at
 
 
 def heard(action: ActionRun, messages: tuple[str, ...], at: int) -> ActionRun:
