@@ -7,6 +7,7 @@ import msgspec
 import pytest
 
 from action_assistant.runner.events import Override
+from action_assistant.runner.links.port import Registration
 from action_assistant.runner.parts import Parts
 from action_assistant.runner.seen import Snapshot
 from action_assistant.runner.standin_engine import StandIn
@@ -17,7 +18,7 @@ from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 from runner.air import Node, now_ms
 from runner.scene import PATHS, Scene
-from runner.world import ANN, ended, order, sequence, virtual
+from runner.world import ANN, ended, order, sequence, until, virtual
 
 SUB = sequence("Sub", 1)
 FACTS = msgspec.structs.replace(PINNED, restart_matches=True)
@@ -58,6 +59,9 @@ async def played(scene: Scene, graph: Graph) -> str:
     codes = ("quiet", "others", "actions", "actors", "H5", "H8", "unknown-action", "restart")
     override = Override(codes=codes, reason="it is a test")
     async with scene.played() as control:
+        knows = Registration(name="David", profile={"restart_matches": True})
+        await control.register(knows, ANN)
+        await until(lambda: control.robots.robot("David").state == "answering")
         run = (await control.start(order(graph, engine="David", override=override), ANN)).run.id
         assert await ended(control, run) == "finished"
         await anyio.sleep(1)

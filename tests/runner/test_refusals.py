@@ -18,7 +18,7 @@ from action_assistant.umrf.model import Graph, Parameter, Signature
 from action_assistant.umrf.semantics import script_from
 from runner.air import Node, now, now_ms
 from runner.scene import PATHS, Scene
-from runner.world import ANN, BEN, ended, order, sequence, virtual
+from runner.world import ANN, BEN, ended, order, sequence, until, virtual
 
 CODES = ("quiet", "others", "actions", "actors", "H7", "unknown-action", "signature")
 PATROL = sequence("patrol")
@@ -122,7 +122,7 @@ async def test_without_a_word_an_engine_that_does_not_show_the_run_has_refused_n
         await anyio.sleep(20)
         assert control.open[run.id].run.state == "unknown"
         await control.stop(run.id, BEN)
-        assert await ended(control, run.id) == "lost"
+        await until(lambda: control.open[run.id].run.state == "lost")
 
 
 @virtual

@@ -122,6 +122,7 @@ class Lane:
 
     async def _done(self, request: bytes) -> bytes:
         """The reply of the worker. Raises Crashed, Unavailable."""
+        self._idle = [each for each in self._idle if each.lives]
         worker = self._idle.pop() if self._idle else await self._hired()
         self._busy.add(worker)
         finished = False
@@ -221,6 +222,11 @@ class _Worker:
         process = child(_work, theirs, name=name, nice=nice)
         theirs.close()
         return cls(process, ours)
+
+    @property
+    def lives(self) -> bool:
+        """Whether it has not died meanwhile, for want of memory say."""
+        return self._process.is_alive()
 
     def asked(self, request: bytes) -> bytes:
         """Have one thing done. Raises OSError, EOFError when the process has died."""
