@@ -196,16 +196,16 @@ def _workers(runner: RunnerProcess) -> list[psutil.Process]:
 
 def test_a_start_whose_worker_dies_is_refused_and_nothing_was_sent(runner: RunnerProcess) -> None:
     with runner.client() as client:
-        asked = order(sequence("again"), script=ENDLESS)
+        asked = order(sequence("again", 1_500), script=ENDLESS)  # takes a while to be looked at
         before = {run["id"] for run in client.get("/api/runs").json()}
-        for worker in _workers(runner):
-            worker.suspend()
         with ThreadPoolExecutor(1) as person:
             asking = person.submit(client.post, "/api/runs", content=body(asked))
-            time.sleep(0.5)  # it is being worked on, by one that does nothing
-            for worker in _workers(runner):
-                worker.kill()
-            answer = asking.result(30)
+            while not asking.done():
+                for worker in _workers(runner):
+                    with suppress(psutil.NoSuchProcess):
+                        worker.kill()
+                time.sleep(0.02)
+            answer = asking.result()
         assert answer.status_code == 503, answer.text
         assert "died" in answer.json()["detail"]
         assert {run["id"] for run in client.get("/api/runs").json()} == before
