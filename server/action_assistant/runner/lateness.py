@@ -5,21 +5,9 @@ of that already. Applied after it, the older states would look like further visi
 """
 
 from collections.abc import Sequence
-from typing import Final
 
 from action_assistant.runner.runs import Run, is_news, key_of
-from action_assistant.runner.seen import Snapshot
-
-_FAR: Final = {
-    "UNINITIALIZED": 0,
-    "INITIALIZED": 0,
-    "RUNNING": 1,
-    "PAUSE_REQUESTED": 1,
-    "PAUSED": 1,
-    "STOPPING": 2,
-    "FINISHED": 3,
-    "ERROR": 3,
-}
+from action_assistant.runner.seen import FAR, Snapshot
 
 
 def fresh(run: Run, snapshots: Sequence[Snapshot]) -> tuple[Snapshot, ...]:
@@ -41,7 +29,7 @@ def _behind(run: Run, shown: Snapshot) -> bool:
     less = False
     for node, state in shown.nodes.items():
         action = run.actions.get(key_of(run, shown.graph, node))
-        there, here = _FAR.get(action.state if action else "", 0), _FAR.get(state, 0)
+        there, here = FAR.get(action.state if action else "", 0), FAR.get(state, 0)
         if here > there:
             return False
         less = less or here < there

@@ -11,6 +11,17 @@ import msgspec
 
 #: States in which a node moves, or may move again without a new start.
 ACTIVE: Final = frozenset({"RUNNING", "STOPPING", "PAUSE_REQUESTED", "PAUSED"})
+#: How far an action has come in one execution, by its state.
+FAR: Final = {
+    "UNINITIALIZED": 0,
+    "INITIALIZED": 0,
+    "RUNNING": 1,
+    "PAUSE_REQUESTED": 1,
+    "PAUSED": 1,
+    "STOPPING": 2,
+    "FINISHED": 3,
+    "ERROR": 3,
+}
 #: States of a graph in which the engine starts nothing more by itself.
 TERMINAL: Final = frozenset({"FINISHED", "HALTED", "STOPPED", "ERROR"})
 

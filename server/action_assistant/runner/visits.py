@@ -30,7 +30,7 @@ from typing import Final, Literal, TypeAlias
 import msgspec
 from msgspec.structs import replace
 
-from action_assistant.runner.seen import ACTIVE, NodeResult
+from action_assistant.runner.seen import ACTIVE, FAR, NodeResult
 
 Outcome: TypeAlias = Literal["true", "false", "error", "stopped"]
 How: TypeAlias = Literal["observed", "inferred"]
@@ -50,16 +50,6 @@ _OUTCOMES: Final[dict[str, Outcome]] = {
     "on_false": "false",
     "on_error": "error",
     "on_stopped": "stopped",
-}
-_FAR: Final = {
-    "UNINITIALIZED": 0,
-    "INITIALIZED": 0,
-    "RUNNING": 1,
-    "PAUSE_REQUESTED": 1,
-    "PAUSED": 1,
-    "STOPPING": 2,
-    "FINISHED": 3,
-    "ERROR": 3,
 }
 
 
@@ -266,12 +256,12 @@ def _is_no_news(action: ActionRun, state: str, sight: Sight) -> bool:
     if sight.asked is not None:
         overtaken = action.by == "feedback" and sight.asked < action.changed_at
         return overtaken and not sight.once and state != action.state
-    told = sight.followed and action.by == "get" and _FAR.get(action.state, 0) > 0
+    told = sight.followed and action.by == "get" and FAR.get(action.state, 0) > 0
     return told and not sight.once and state not in ACTIVE
 
 
 def _goes_back(action: ActionRun, state: str) -> bool:
-    return _FAR.get(state, 0) < _FAR.get(action.state, 0)
+    return FAR.get(state, 0) < FAR.get(action.state, 0)
 
 
 def _confirmed(action: ActionRun, sight: Sight) -> ActionRun:
@@ -316,7 +306,7 @@ def _closed(action: ActionRun, state: str, sight: Sight) -> ActionRun:
 def _ran_meanwhile(action: ActionRun, sight: Sight) -> bool:
     """Whether one state of rest after another says that it ran in between. Feedback that was older
     than an answer may have told the first."""
-    return sight.once or action.by != "feedback" or _FAR.get(action.state, 0) == 0
+    return sight.once or action.by != "feedback" or FAR.get(action.state, 0) == 0
 
 
 def _missed(action: ActionRun, state: str, sight: Sight) -> ActionRun:
