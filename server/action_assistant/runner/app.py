@@ -58,7 +58,9 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
         recordings = Recordings(folder, on_disk, prunes=prunes)
         shelf = Shelf(journal, keep.folder, on_disk)
         async with Workers.opened() as workers:
-            house.asked = Asked(workers.looks, Place(_file(settings), keep.folder), shelf)
+            place = Place(_file(settings), keep.folder)
+            house.asked = Asked(workers.looks, place, shelf)
+            ours = Asked(workers.ours, place, shelf)  # what moves again waits behind nobody
             house.aside = workers.looks
             reach = ros2_reach(wall_clock)
             robots = Robots(reach=reach, recordings=recordings)
@@ -70,10 +72,10 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
                     wall=wall_clock,
                     aside=workers.starts,
                     simulator=Simulators(),
-                    past=house.asked.past,
+                    past=lambda run, whole: (ours if whole else house.asked).past(run, whole),
                 ) as control,
             ):
-                house.asked.opened = control.open
+                house.asked.opened = ours.opened = control.open
                 house.control, house.hub = control, Hub(control, wall_clock)
                 house.crowd = Crowd(limits=settings.limits, keeps_one=True)
                 house.journal = journal

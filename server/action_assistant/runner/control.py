@@ -10,7 +10,6 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any, Final
 
 import anyio
-import msgspec
 from anyio.abc import TaskGroup
 from sqlalchemy import Row
 
@@ -26,7 +25,7 @@ from action_assistant.runner.history import Aside, History, Ledger, Past
 from action_assistant.runner.links.absent import AbsentLink
 from action_assistant.runner.links.port import ForeignCommand, Link, Order, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
-from action_assistant.runner.preflight import Preflight
+from action_assistant.runner.preflight import Preflight, Settled, check_items, of_taken
 from action_assistant.runner.registered import Robot
 from action_assistant.runner.robots import Ground, Robots
 from action_assistant.runner.runs import Run
@@ -74,13 +73,14 @@ class Control:
             aside=aside,
             taken=self._taken,
             going=self._going,
-            is_settled=self._is_settled,
+            settled=self._settled_on,
             simulator=simulator,
         )
         self._stragglers = Stragglers(
             self.open, self.history, robots, self._tasks, wall=wall, reopen=self._reopen
         )
         self._robot_watchers: list[Callable[[], None]] = []
+        self._settled: dict[str, Settled] = {}
         self._number = 0
         self._stops = Stops()
 
@@ -196,15 +196,11 @@ class Control:
         """The run that an engine has from here."""
         return next((each.run for each in self._going(engine).values()), None)
 
-    async def _is_settled(self, run: str) -> bool:
-        """Whether somebody has seen a run of ours at rest that its engine calls ERROR. A start that
-        others played again is theirs."""
-        try:
-            return not self._stragglers.is_of_others(run) and (
-                (await self.find(run)).at_rest is not None
-            )
-        except Refused:
-            return False
+    def _settled_on(self, engine: str) -> list[Settled]:
+        """What somebody has seen at rest there since this process began. A start that others have
+        played again is theirs, and was not seen."""
+        found = [each for each in self._settled.values() if each.engine == engine]
+        return [each for each in found if not self._stragglers.is_of_others(each.run)]
 
     def _going(self, engine: str) -> dict[str, OpenRun]:
         """The runs that go on there. Whatever else carries the mark of one was sent by others."""
@@ -221,9 +217,14 @@ class Control:
     ) -> Run:
         number, at = self.next_number(), self._wall()
         requested, order = booked(asked, cleared, author, at=at, number=number, group=group)
+        if not cleared.own:  # a run that was over may have moved again since it was looked at
+            check_items([of_taken(asked.engine, self._taken(asked.engine))], ())
         with anyio.CancelScope(shield=True):
             run = await self._book.store(requested)
+            other = None if cleared.own else self._taken(asked.engine)
             opened = self._opened(run, cleared.link, own=cleared.own, seq=1)
+            if other is not None:
+                opened.end("refused", of_taken(asked.engine, other).text)
             if pressed := self._stops.since(stops, asked.engine, group or ""):
                 opened.stop(*pressed)
             self._tasks.start_soon(self._drive, opened, order, cleared.incarnation)
@@ -324,7 +325,10 @@ class Control:
     async def confirm_rest(self, run: str, asked: steering.RestRequest, author: Author) -> Run:
         """Take somebody's word that a run is at rest, where its engine's is none. Raises NotFound,
         BadInput, Conflict."""
-        return steering.confirm_rest(await self._movable(run), asked, author)
+        opened = await self._movable(run)
+        told = steering.confirm_rest(opened, asked, author)
+        self._settled[run] = Settled(told.engine, run, told.incarnation or "", opened.doubted)
+        return told
 
     async def _movable(self, run: str) -> OpenRun:
         opened = self.open.get(run)
@@ -425,15 +429,11 @@ class Control:
                 )
             )
         for row in await self._ledger.query(archive.open_runs()):
-            try:
-                run, seq = await self.history.replayed(row.id)
-            except msgspec.DecodeError:
-                log.exception("run %s cannot be read; it is left as it is", row.id)
-                continue
+            run, seq, is_whole = await self.history.left(row.id)
             if run is None or run.end is not None:
                 log.error("run %s: table and events differ; `rebuild` mends the table", row.id)
                 continue
-            self._adopt(run, seq)
+            self._adopt(run, seq, is_whole=is_whole)
 
     def _reopen(self, run: Run, seq: int, event: MovesAgain) -> None:
         """A run that was over and stored moves again."""
@@ -442,9 +442,12 @@ class Control:
         opened.tell(event)
         self._tasks.start_soon(self._drive, opened, None)
 
-    def _adopt(self, run: Run, seq: int) -> None:
+    def _adopt(self, run: Run, seq: int, *, is_whole: bool) -> None:
         link = self.robots.link(run.engine) or AbsentLink("there is no link to this robot any more")
         opened = self._opened(run, link, own=False, seq=seq)
         if run.simulated:
             opened.tell(Ended(self._wall(), "lost", None, _LOST))
+        elif not is_whole:
+            log.error("run %s: some of its events cannot be read", run.id)
+            opened.lose("Some of what was recorded of this run cannot be read.")
         self._tasks.start_soon(self._drive, opened, None)

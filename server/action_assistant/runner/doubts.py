@@ -29,11 +29,16 @@ class Doubts:
         """From now on a stop, a pause or a change may reach the graph."""
         self._reached = True
 
+    @property
+    def places(self) -> frozenset[tuple[str, str]]:
+        """The doubtful actions: running names of graphs, and full names."""
+        return frozenset(self._open)
+
     def look(self, shown: Sequence[Snapshot]) -> str:
         """After one more answer that shows a graph and its sub-graphs: why the code of an action may
         still run; "" when nothing speaks for that."""
         for each in shown:
-            failed = [node for node, state in each.nodes.items() if state == "ERROR"]
+            failed = failed_in(each)
             self._thrown -= {
                 (each.graph, node) for node, state in each.nodes.items() if state != "ERROR"
             }
@@ -54,6 +59,11 @@ class Doubts:
             self._open[place] = None
         else:
             self._thrown.add(place)
+
+
+def failed_in(shown: Snapshot) -> list[str]:
+    """The actions that an engine calls ERROR."""
+    return [node for node, state in shown.nodes.items() if state == "ERROR"]
 
 
 def did_not_obey(names: Sequence[str]) -> str:

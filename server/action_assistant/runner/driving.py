@@ -110,6 +110,11 @@ class OpenRun:
         self._stopping.press(author, stop_id)
         self._handing.cancel()
 
+    @property
+    def doubted(self) -> frozenset[tuple[str, str]]:
+        """Actions whose code may go on although the engine calls them ERROR."""
+        return self._doubts.places
+
     async def pause(self, author: Author) -> None:
         """Want the run paused. Raises NotSent."""
         self._doubts.reach()
@@ -183,6 +188,7 @@ class OpenRun:
         self.recorder.put(event, author or self.run.engine)
         if self.run.end is not None:
             self._over.set()
+        self._stopping.notice()
         self._touch()
 
     def _touch(self) -> None:

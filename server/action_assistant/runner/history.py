@@ -3,11 +3,12 @@
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any, Protocol, TypeAlias, TypeVar
 
+import msgspec
 from sqlalchemy import Row, Select
 
 from action_assistant.errors import NotFound
 from action_assistant.journal.events import Event
-from action_assistant.runner.events import ModifyRequested, Requested, decode
+from action_assistant.runner.events import ModifyRequested, Requested, RunEvent, decode
 from action_assistant.runner.recorder import Store, stream_of
 from action_assistant.runner.runs import Run, replay
 
@@ -56,6 +57,14 @@ class History:
         found = replay(decode(each.kind, each.body) for each in events)
         return found, events[-1].seq if events else 0
 
+    async def left(self, run: str) -> tuple[Run | None, int, bool]:
+        """A run that an earlier process left, the seq of its last event, and whether all of them could
+        be read; those that cannot are passed over."""
+        events = await self._ledger.read(stream_of(run))
+        read = [_decoded(each) for each in events]
+        told = [event for event in read if event is not None]
+        return replay(told), events[-1].seq if events else 0, len(told) == len(read)
+
     async def run(self, run: str) -> Run:
         """A run. Raises NotFound."""
         if self._past is not None:
@@ -80,6 +89,13 @@ class History:
     async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
         """Rows of the tables."""
         return await self._ledger.query(statement)
+
+
+def _decoded(event: Event) -> RunEvent | None:
+    try:
+        return decode(event.kind, event.body)
+    except msgspec.DecodeError:
+        return None
 
 
 async def sent_of(store: Store, run: Run) -> str | None:

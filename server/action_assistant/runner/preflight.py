@@ -11,10 +11,12 @@ import msgspec
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.admission import Admitted, Prepared
+from action_assistant.runner.doubts import failed_in
 from action_assistant.runner.engines import Index
 from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.proof import strangers
 from action_assistant.runner.runs import Run
+from action_assistant.runner.seen import Snapshot
 from action_assistant.umrf import codec
 from action_assistant.umrf.check import STRUCTURAL, check
 from action_assistant.umrf.facts import EngineFacts
@@ -55,9 +57,19 @@ class Preflight(msgspec.Struct, frozen=True, kw_only=True):
     never: bool
 
 
+class Settled(msgspec.Struct, frozen=True):
+    """A run of ours that somebody has seen at rest: the actions that were doubtful then, by running
+    name of their graph and full name, in this life of the engine."""
+
+    engine: str
+    run: str
+    incarnation: str
+    places: frozenset[tuple[str, str]]
+
+
 class Sight(msgspec.Struct, frozen=True, kw_only=True):
     """An engine at the moment of a pre-flight. `took_ms`: until it answered a get sent for it;
-    `open_runs`: runs of ours that go on there; `settled`: those whose rest somebody has seen."""
+    `open_runs`: runs of ours that go on there; `settled`: those that somebody has seen at rest."""
 
     name: str
     facts: EngineFacts
@@ -66,7 +78,7 @@ class Sight(msgspec.Struct, frozen=True, kw_only=True):
     index: Index
     took_ms: float
     open_runs: Collection[str] = ()
-    settled: Collection[str] = ()
+    settled: tuple[Settled, ...] = ()
 
 
 def summed(engine: str, items: Sequence[Item], digest: str = "") -> Preflight:
@@ -304,12 +316,13 @@ def _quiet(sight: Sight, graph: Graph) -> Item:
 def _rest(sight: Sight) -> Item:
     """Nothing there may still move that its engine calls ERROR. Runs of ours stand in the way as runs,
     until somebody has seen them at rest."""
-    graphs = [
-        each
+    doubted = sorted(
+        each.graph
         for each in sight.answer.graphs
-        if each.run is None or each.run not in {*sight.open_runs, *sight.settled}
-    ]
-    doubted = sorted({each.graph for each in graphs if each.state == "ERROR" or each.stoppable})
+        if (each.state == "ERROR" or each.stoppable)
+        and each.run not in sight.open_runs
+        and not _is_settled(sight, each)
+    )
     if not doubted:
         text = f"No action on {sight.name} is known to have been given up by its engine."
         return Item(code="rest", verdict="passed", text=text)
@@ -318,6 +331,19 @@ def _rest(sight: Sight) -> Item:
         "the engine says ERROR, but the code may still run. Look at the robot; restart its engine."
     )
     return Item(code="rest", verdict="blocked", text=text, codes=("rest",), overridable=True)
+
+
+def _is_settled(sight: Sight, shown: Snapshot) -> bool:
+    """Whether somebody has seen at rest just what is in doubt here: the graph of that run or a part of
+    it, in the same life of the engine, with no other action in ERROR."""
+    marks = {each.graph: each.run for each in sight.answer.graphs if each.run is not None}
+    for each in sight.settled:
+        top = next((name for name, run in marks.items() if run == each.run), None)
+        is_part = top is not None and f"{shown.graph}__".startswith(f"{top}__")
+        places = {(shown.graph, node) for node in failed_in(shown) or [shown.graph]}
+        if is_part and each.incarnation == sight.answer.incarnation and places <= each.places:
+            return True
+    return False
 
 
 def _others(sight: Sight) -> Item:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final, TypeAlias, assert_never
 
 import msgspec
+from msgspec.structs import replace
 
 from action_assistant.runner.runs import Run
 from action_assistant.runner.seen import ACTIVE, Snapshot
@@ -103,9 +104,18 @@ class Standstill:
         return self._looks >= _LOOKS and asked - self._since >= _AFTER_S
 
 
-def told_of(run: Run, umrf: str | None) -> str:
-    """As `told`, of a graph as it was sent. For workers."""
-    return told(run, None if umrf is None else _read(umrf))
+def packed(run: Run) -> bytes:
+    """What `told_of` needs of a run: the whole of a large one takes long to send."""
+    actions = {
+        name: replace(each, visits=each.visits[-1:], messages=())
+        for name, each in run.actions.items()
+    }
+    return msgspec.msgpack.encode(replace(run, actions=actions, log=(), alarms=()))
+
+
+def told_of(run: bytes, umrf: str | None) -> str:
+    """As `told`, of a packed run and its graph as it was sent. For workers."""
+    return told(msgspec.msgpack.decode(run, type=Run), None if umrf is None else _read(umrf))
 
 
 def lacking_in_words(umrf: str) -> str:

@@ -1,7 +1,7 @@
 """What must be true before a start is stored and sent, found out for each engine it shall go to."""
 
 import secrets
-from collections.abc import Awaitable, Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from typing import Annotated, Final
 
@@ -17,7 +17,7 @@ from action_assistant.runner.events import Overridden, Override
 from action_assistant.runner.history import Aside
 from action_assistant.runner.links.port import Answer, Link, NoAnswer
 from action_assistant.runner.links.simulator import Simulator
-from action_assistant.runner.preflight import Item, Preflight, Sight
+from action_assistant.runner.preflight import Item, Preflight, Settled, Sight
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
@@ -95,8 +95,8 @@ class Grouped(msgspec.Struct, frozen=True):
 
 class Starting:
     """Looks before starts. `taken(engine)` is the run that an engine has from here, if any;
-    `going(engine)` the ids of all that go on there; `is_settled(run)` whether a run is over as it was
-    started from here, and with nothing of it left to move."""
+    `going(engine)` the ids of all that go on there; `settled(engine)` what somebody has seen at rest
+    there."""
 
     def __init__(
         self,
@@ -106,7 +106,7 @@ class Starting:
         aside: Aside,
         taken: Callable[[str], Run | None],
         going: Callable[[str], Collection[str]],
-        is_settled: Callable[[str], Awaitable[bool]],
+        settled: Callable[[str], Sequence[Settled]],
         simulator: Simulator,
     ) -> None:
         self._robots = robots
@@ -114,7 +114,7 @@ class Starting:
         self._aside = aside
         self._taken = taken
         self._going = going
-        self._is_settled = is_settled
+        self._settled = settled
         self._simulator = simulator
 
     async def cleared(self, asked: StartRequest) -> Cleared:
@@ -149,6 +149,7 @@ class Starting:
                 nothing
             )
         items = await self._aside(preflight.of_text, sight, ready.umrf)
+        preflight.check_items([preflight.of_taken(asked.engine, self._taken(asked.engine))], ())
         preflight.check_items(items, asked.override.codes if asked.override else ())
         return Cleared(
             ready=ready,
@@ -227,7 +228,8 @@ class Starting:
     async def _sight(self, robot: KnownEngine) -> Sight:
         """The engine as it answers a get sent now, on the path that would confirm a stop. Raises
         NoAnswer."""
-        began = anyio.current_time()
+        name, began = robot.registration.name, anyio.current_time()
+        going = frozenset(self._going(name))  # what is taken back later on is in nobody's hand yet
         answer: Answer
         try:
             with anyio.fail_after(_PREFLIGHT_S):
@@ -236,14 +238,14 @@ class Starting:
             raise NoAnswer(f"Asked for {_PREFLIGHT_S:.0f} s. {robot.standing.why}") from late
         took = 1000 * (anyio.current_time() - began)
         return Sight(
-            name=robot.registration.name,
+            name=name,
             facts=robot.facts,
             standing=robot.standing,
             answer=answer,
             index=await robot.index(self._aside),
             took_ms=took,
-            open_runs=self._going(robot.registration.name),
-            settled=[each for each in _given_up(answer) if await self._is_settled(each)],
+            open_runs=going,
+            settled=tuple(self._settled(name)),
         )
 
     def _simulated(self, asked: StartRequest) -> EngineFacts:
@@ -252,12 +254,6 @@ class Starting:
             return _ITSELF
         facts = facts_of(self._robots.registration(asked.like).profile)
         return msgspec.structs.replace(facts, simulated=True)
-
-
-def _given_up(answer: Answer) -> set[str]:
-    """The runs whose marks graphs in doubt carry."""
-    doubted = (each for each in answer.graphs if each.state == "ERROR" or each.stoppable)
-    return {each.run for each in doubted if each.run is not None}
 
 
 def _despite(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:

@@ -55,6 +55,8 @@ class StopLoop:
         self._wall = wall
         self._wanted = anyio.Event()
         self._pressed = anyio.Event()
+        self._news = anyio.Event()
+        self._vain = False  # the last message could bring nothing more
         self._ids: set[str] = {""}
         self._asked: tuple[str, float] = ("", 0.0)
         if it.run.desired == "stopped":
@@ -70,6 +72,12 @@ class StopLoop:
         self._ids.add(stop_id)
         self._wanted.set()
         self._pressed.set()
+        self._news.set()
+
+    def notice(self) -> None:
+        """Something is known that was not: where a Stop was in vain it may not be any more."""
+        if self._vain and not _is_vain(self._it.run):
+            self._news.set()
 
     async def run(self) -> None:
         """Send until cancelled; a simulated engine that does not obey is given up."""
@@ -90,9 +98,13 @@ class StopLoop:
                 why = self.hung or f"It does not obey: {self._it.watch.trouble}."
                 self._it.end("lost", f"{why} The simulated engine was switched off.")
                 return
-            with anyio.move_on_after(gap):
-                await self._pressed.wait()
-            gap = min(gap * 1.5, _VAIN_GAP_S if _is_vain(self._it.run) else _GAP_S)
+            self._vain = _is_vain(self._it.run)
+            self._news = anyio.Event()
+            with anyio.move_on_after(gap) as quiet:
+                await self._news.wait()
+            gap = min(gap * 1.5, _VAIN_GAP_S if self._vain else _GAP_S)
+            if not quiet.cancelled_caught:
+                gap = _FIRST_GAP_S
 
     async def _turn(self) -> None:
         """An engine that does not hold the run any more is told once for each press, and not again: a

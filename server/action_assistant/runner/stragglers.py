@@ -13,7 +13,7 @@ import anyio
 import msgspec
 from anyio.abc import TaskGroup
 
-from action_assistant.errors import Refused
+from action_assistant.errors import NotFound, Refused
 from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.events import MovesAgain
@@ -137,6 +137,8 @@ class Stragglers:
             try:
                 told = await self._robots.flight.newest(robot, _TOLD)
                 found, seq = await self._history.followed(run)
+            except NotFound:
+                return None
             except Refused:
                 await anyio.sleep(_AGAIN_S)
             except msgspec.DecodeError:

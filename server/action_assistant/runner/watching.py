@@ -352,7 +352,7 @@ class Watch:
     async def _tell_stall(self) -> None:
         run = self._it.run
         try:
-            text = await self._aside(stall.told_of, run, self.umrf)
+            text = await self._aside(stall.told_of, stall.packed(run), self.umrf)
         except Refused:  # nobody can read the graph now; what is known must be said all the same
             text = stall.told(run, None)
         if self._it.run.end is None and self._standstill.lasts:

@@ -176,12 +176,14 @@ class Lane:
 
 class Workers:
     """The lanes of a runner. `starts`: what stands between a person and a start, and what goes on
-    with runs. `looks`: everything that is looked back on, which may take long."""
+    with runs. `looks`: everything that is looked back on, which may take long. `ours`: what the runner
+    itself has to know, behind nobody."""
 
     def __init__(self) -> None:
         threads = CapacityLimiter(8)
         self.starts: Final = Lane("starts", 2, 20.0, _NICE, threads)
         self.looks: Final = Lane("looks", 2, 60.0, _NICER, threads)
+        self.ours: Final = Lane("ours", 1, 60.0, 0, CapacityLimiter(2))
 
     @classmethod
     @asynccontextmanager
@@ -189,14 +191,18 @@ class Workers:
         """Workers, as long as you are inside. The first ones are made meanwhile."""
         workers = cls()
         async with anyio.create_task_group() as tasks:
-            for lane in (workers.starts, workers.looks):
+            for lane in workers._all:
                 tasks.start_soon(workers._keep_warm, lane)
             try:
                 yield workers
             finally:
                 tasks.cancel_scope.cancel()
-                for lane in (workers.starts, workers.looks):
+                for lane in workers._all:
                     lane.close()
+
+    @property
+    def _all(self) -> tuple[Lane, ...]:
+        return self.starts, self.looks, self.ours
 
     async def _keep_warm(self, lane: Lane) -> None:
         """Whoever comes next shall not have to wait for a worker to be made."""
