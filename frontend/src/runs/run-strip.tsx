@@ -18,6 +18,9 @@ import { PauseButton } from "./pause-button";
 import { RestButton } from "./rest-button";
 import style from "./run-strip.module.css";
 
+/** What the notice shouts on every page already. */
+const SHOUTED: ReadonlySet<string> = new Set(["stop_unconfirmed", "moves_again"]);
+
 interface Props {
   /** Undefined until it is known. */
   run: Run | null | undefined;
@@ -113,6 +116,7 @@ export function RunStrip(props: Props) {
   const started = when === "today" ? `at ${clock(start)}` : `${when} ${clock(start)}`;
   const { tone, word } = runWord(run);
   const told = toldOf(run);
+  const announces = goes && !SHOUTED.has(alarmNow(run)?.code ?? "");
   const inLine = folded === true || told.length < SHORT;
   const unsure = down && goes;
   const silent = goes ? instant(run.unknown_since) : null;
@@ -139,7 +143,7 @@ export function RunStrip(props: Props) {
         </Text>
         <span className={style.gap} />
         {inLine && told !== "" && (
-          <span className={style.alarm} role={goes ? "alert" : undefined} title={told}>
+          <span className={style.alarm} role={announces ? "alert" : undefined} title={told}>
             {told}
           </span>
         )}
@@ -158,7 +162,11 @@ export function RunStrip(props: Props) {
         {folded !== null && <FoldButton folded={folded} onFold={onFold} />}
       </header>
       {!inLine && (
-        <p className={style.told} role={goes ? "alert" : undefined} data-alarm={goes || undefined}>
+        <p
+          className={style.told}
+          role={announces ? "alert" : undefined}
+          data-alarm={goes || undefined}
+        >
           {told}
         </p>
       )}
