@@ -150,6 +150,22 @@ async def test_after_that_the_engine_s_own_error_of_this_run_stands_in_nobody_s_
 
 
 @virtual
+async def test_an_action_that_had_thrown_by_itself_does_not_keep_a_confirmed_run_in_doubt() -> None:
+    thrower = {"patrol/Work_0": [{"after_s": 1, "result": "on_error"}]}
+    stubborn = {"patrol/Work_1": [{"never": True, "ignores_stop": True}]}
+    scene = Scene(5, script=thrower | stubborn | {"*": [{"after_s": 1}]}, quirks=Quirks(loss=0.0))
+    async with scene.played() as control:
+        run = (await control.start(asked(), ANN)).run.id
+        await until(lambda: "Work_1" in control.open[run].run.active)
+        await anyio.sleep(3)
+        await control.stop(run, BEN)
+        await until(lambda: bool(shown(control, run).unconfirmed))
+        await control.confirm_rest(run, LOOKED, BEN)
+        await until(lambda: run not in control.open)
+        assert (await control.start(order(sequence("other"), engine="David"), ANN)).fresh
+
+
+@virtual
 async def test_what_a_stranger_s_graph_left_blocks_a_start_until_somebody_answers_for_it() -> None:
     scene = Scene(5, script=STUBBORN | {"patrol/Work_0": [{"after_s": 1}]}, quirks=Quirks(loss=0.0))
     async with scene.played() as control:

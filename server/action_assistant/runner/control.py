@@ -327,7 +327,7 @@ class Control:
         BadInput, Conflict."""
         opened = await self._movable(run)
         told = steering.confirm_rest(opened, asked, author)
-        self._settled[run] = Settled(told.engine, run, told.incarnation or "", opened.doubted)
+        self._settled[run] = Settled(told.engine, run, told.incarnation or "", opened.failed)
         return told
 
     async def _movable(self, run: str) -> OpenRun:

@@ -31,8 +31,8 @@ class Doubts:
 
     @property
     def places(self) -> frozenset[tuple[str, str]]:
-        """The doubtful actions: running names of graphs, and full names."""
-        return frozenset(self._open)
+        """All actions in ERROR, doubtful and over: running names of graphs, and full names."""
+        return frozenset({*self._open, *self._thrown})
 
     def look(self, shown: Sequence[Snapshot]) -> str:
         """After one more answer that shows a graph and its sub-graphs: why the code of an action may

@@ -111,8 +111,8 @@ class OpenRun:
         self._handing.cancel()
 
     @property
-    def doubted(self) -> frozenset[tuple[str, str]]:
-        """Actions whose code may go on although the engine calls them ERROR."""
+    def failed(self) -> frozenset[tuple[str, str]]:
+        """What its engine calls ERROR, as far as was seen: running names of graphs, and full names."""
         return self._doubts.places
 
     async def pause(self, author: Author) -> None:

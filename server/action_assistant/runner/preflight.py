@@ -58,8 +58,8 @@ class Preflight(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Settled(msgspec.Struct, frozen=True):
-    """A run of ours that somebody has seen at rest: the actions that were doubtful then, by running
-    name of their graph and full name, in this life of the engine."""
+    """A run of ours that somebody has seen at rest: the actions that were in ERROR then, by running name
+    of their graph and full name, in this life of the engine."""
 
     engine: str
     run: str
