@@ -1,7 +1,9 @@
 """Commands against a running server: import, export, graphs, runs, run, stop."""
 
 import json
+import socket
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,8 @@ from httpx_ws import aconnect_ws
 from pycrdt import Doc, Map, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
-from action_assistant.commands.remote import verdict
+from action_assistant.commands.client import Server
+from action_assistant.commands.remote import insisting, verdict
 from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
 from support.product import TOKEN, Product, running
@@ -115,6 +118,26 @@ async def until(true: Callable[[], bool]) -> None:
     with anyio.fail_after(20):
         while not true():  # noqa: ASYNC110 - what it waits for is in other processes
             await anyio.sleep(0.05)
+
+
+def test_a_stop_insists_where_connections_break() -> None:
+    """The first two are closed without an answer."""
+    answer = b'HTTP/1.1 200 OK\r\ncontent-length: 11\r\n\r\n{"runs":[]}'
+
+    def serve() -> None:
+        for number in range(3):
+            connection, _ = listener.accept()
+            with connection:
+                connection.recv(65_536)
+                if number == 2:
+                    connection.sendall(answer)
+
+    with socket.create_server(("127.0.0.1", 0)) as listener, ThreadPoolExecutor(1) as runner:
+        serving = runner.submit(serve)
+        with httpx.Client(trust_env=False) as client:
+            url = f"http://127.0.0.1:{listener.getsockname()[1]}"
+            assert insisting(Server(client, url), "POST", "/api/stop") == {"runs": []}
+        serving.result(5)
 
 
 def test_a_run_is_stopped_and_that_is_proven(product: Product, files: dict[str, str]) -> None:

@@ -15,6 +15,7 @@ from action_assistant.errors import CannotStart
 
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _POLL: Final = 0.2  # seconds
+_INSIST_S: Final = 5.0
 
 Run: TypeAlias = dict[str, Any]
 
@@ -249,15 +250,28 @@ def verdict(run: dict[str, Any]) -> tuple[int, str]:
     return 0, "finished; nothing is known to have failed, but the robot does not tell the result"
 
 
+def insisting(server: Server, method: str, path: str) -> Any:
+    """An answer about a Stop, also when a connection breaks: it may come several times. Raises No,
+    CannotStart after some seconds without one."""
+    deadline = time.monotonic() + _INSIST_S
+    while True:
+        try:
+            return server.runner(method, path).json()
+        except CannotStart:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(_POLL)
+
+
 def _stop(options: argparse.Namespace) -> int:
     """Want it stopped, then wait for what proves that nothing moves."""
     with running(options) as server:
         try:
             path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
-            stopping: list[str] = server.runner("POST", path).json()["runs"]
+            stopping: list[str] = insisting(server, "POST", path)["runs"]
             deadline = time.monotonic() + options.wait
             while True:
-                runs = [server.runner("GET", f"/api/runs/{run}").json() for run in stopping]
+                runs = [insisting(server, "GET", f"/api/runs/{run}") for run in stopping]
                 unproven = [run for run in runs if not _is_at_rest(run)]
                 if all(_is_at_rest(run) or run["unconfirmed"] for run in runs):
                     break

@@ -160,6 +160,8 @@ def changed(
     if state in ACTIVE:
         if not is_open(action):
             visits, older = _kept(visits, older, Visit(start=at, not_before=at, inputs=inputs))
+        elif inputs is not None and visits[-1].inputs is None:  # an answer had shown it before
+            visits = (*visits[:-1], replace(visits[-1], inputs=inputs))
     elif is_open(action):
         result = visits[-1].result or _implied(action.state, state)
         after = None if state == "ERROR" and action.state == "STOPPING" else at  # its code goes on
