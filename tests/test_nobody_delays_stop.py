@@ -200,12 +200,16 @@ def test_a_start_whose_worker_dies_is_refused_and_nothing_was_sent(runner: Runne
         before = {run["id"] for run in client.get("/api/runs").json()}
         with ThreadPoolExecutor(1) as person:
             asking = person.submit(client.post, "/api/runs", content=body(asked))
+            killed: list[psutil.Process] = []
             while not asking.done():
                 for worker in _workers(runner):
                     with suppress(psutil.NoSuchProcess):
                         worker.kill()
+                        killed.append(worker)
                 time.sleep(0.02)
             answer = asking.result()
+        # The next question may not find one that is about to die.
+        psutil.wait_procs(killed, timeout=10)
         assert answer.status_code == 503, answer.text
         assert "died" in answer.json()["detail"]
         assert {run["id"] for run in client.get("/api/runs").json()} == before
