@@ -80,7 +80,7 @@ class RunnerProcess:
     def client(self) -> httpx.Client:
         """A client with the token."""
         return httpx.Client(
-            base_url=f"http://127.0.0.1:{self.port}", headers=BEARER, trust_env=False, timeout=20
+            base_url=f"http://127.0.0.1:{self.port}", headers=BEARER, trust_env=False, timeout=60
         )
 
     def live(self) -> ClientConnection:
