@@ -39,7 +39,8 @@ def hide() -> None:
 
     Folders that are there anyway stay, after the others, and so does the one that holds this program.
     """
-    listed = {_real(each) for each in os.environ.pop("PYTHONPATH", "").split(os.pathsep) if each}
+    named = os.environ.pop("PYTHONPATH", "")
+    listed = {_real(each) for each in named.split(os.pathsep) if named}  # "" is where we are
     program = Path(__file__).resolve().parents[1]
     if program in listed:
         listed.remove(program)
@@ -71,7 +72,8 @@ class Workspace(MetaPathFinder):
         """What this environment names. `system` is where numpy may be: the distribution's first, since
         messages were compiled for its generation."""
         named = environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
-        return cls(tuple(Path(each) for each in named if each), system)
+        prefixes = tuple(each for each in map(Path, named) if each.is_absolute())
+        return cls(prefixes, system)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Workspace) and other.prefixes == self.prefixes

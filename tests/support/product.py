@@ -16,6 +16,8 @@ import psutil
 
 TOKEN = "test-token-" + "0123456789abcdef" * 2
 COMMAND = (sys.executable, "-m", "action_assistant")
+#: As it is installed: what people and services start.
+PROGRAM = (str(Path(sys.executable).with_name("action-assistant")),)
 
 
 def free_ports() -> int:
@@ -35,8 +37,17 @@ def free_ports() -> int:
 class Product:
     """A running editor and runner. `kill` and `start` may be called in turn."""
 
-    def __init__(self, data: Path, *flags: str, hosts: str = "") -> None:
+    def __init__(
+        self,
+        data: Path,
+        *flags: str,
+        hosts: str = "",
+        program: tuple[str, ...] = COMMAND,
+        folder: Path | None = None,
+    ) -> None:
         self.data = data
+        self._program = program
+        self._folder = folder  # the working folder
         self._flags = flags
         self._hosts = hosts
         self._scheme = "https" if "--tls" in flags else "http"
@@ -69,7 +80,7 @@ class Product:
         with self.log.open("ab") as log:
             self._process = subprocess.Popen(
                 [
-                    *COMMAND,
+                    *self._program,
                     "serve",
                     "--data",
                     str(self.data),
@@ -79,6 +90,7 @@ class Product:
                     *self._flags,
                 ],
                 env=self.environment,
+                cwd=self._folder,
                 stderr=log,
                 stdout=log,
                 start_new_session=True,
@@ -128,8 +140,9 @@ class Product:
     def cli(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run a command against this server."""
         return subprocess.run(
-            [*COMMAND, *arguments],
+            [*self._program, *arguments],
             env=self.environment,
+            cwd=self._folder,
             capture_output=True,
             text=True,
             timeout=60,
