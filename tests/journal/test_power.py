@@ -4,8 +4,7 @@ import asyncio
 import os
 import random
 import sqlite3
-import subprocess
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, closing
 from pathlib import Path
 
@@ -133,25 +132,12 @@ async def test_whichever_write_fails_edits_are_refused_and_go_on_afterwards(
         assert [e.body for e in await again.read("a")] == stored
 
 
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system of 2 MB."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(place)]
-    try:
-        subprocess.run(mount, check=True, capture_output=True)
-    except (OSError, subprocess.CalledProcessError):
-        pytest.skip("mounting a small file system needs root")
-    yield place
-    subprocess.run(["umount", str(place)], check=True)
-
-
-async def test_a_full_disk_refuses_edits_until_there_is_room_again(small_disk: Path) -> None:
-    ballast = small_disk / "ballast"
-    journal = await Journal.open(
-        f"sqlite:///{small_disk / 'editor.db'}", branch="editor", fold=nothing
-    )
+async def test_a_full_disk_refuses_edits_until_there_is_room_again(
+    small_disk: Callable[[str], Path],
+) -> None:
+    disk = small_disk("2m")
+    ballast = disk / "ballast"
+    journal = await Journal.open(f"sqlite:///{disk / 'editor.db'}", branch="editor", fold=nothing)
     await journal.append("a", [draft()])
     ballast.write_bytes(bytes(1_000_000))
     acknowledged = 1

@@ -26,6 +26,7 @@ from action_assistant.web.listen import bound
 from action_assistant.web.revoked import Revoked
 from action_assistant.web.roles import Role
 from action_assistant.web.sessions import Invited, session_routes
+from action_assistant.web.signed_in import SignedInBrowsers
 
 KEYS = Keys("k" * 43)
 BEARER = {"authorization": f"Bearer {KEYS.token}"}
@@ -72,7 +73,7 @@ async def live(socket: WebSocket[Any, Any, Any]) -> None:
 class Nobody:
     """A reception that knows no invitations."""
 
-    async def look(self, proof: str) -> Invited:
+    def look(self, proof: str) -> Invited:
         raise Unauthenticated(f"{proof} is not known.")
 
     async def welcome(self, invitation: str, person: Author) -> None:
@@ -86,11 +87,14 @@ def served(folder: Path) -> Iterator[int]:
     for other in others:  # on another free port of the other family
         other.close()
     port: int = listener.getsockname()[1]
+    revoked = Revoked(folder)
+    browsers = SignedInBrowsers(folder, revoked)
+    sessions = session_routes(KEYS, port, reception=Nobody, revoked=revoked, browsers=browsers)
     app = application(
-        [me, stop, start, novelty, broken, live, *session_routes(KEYS, port, reception=Nobody)],
+        [me, stop, start, novelty, broken, live, *sessions],
         title="test",
         keys=KEYS,
-        revoked=Revoked(folder),
+        revoked=revoked,
         addresses=Addresses(host="127.0.0.1", page_port=port),
         page_port=port,
         page=folder,

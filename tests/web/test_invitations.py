@@ -380,4 +380,4 @@ def test_what_is_no_id_marks_nothing(tmp_path: Path, name: str) -> None:
     with pytest.raises(ValueError, match="no id"):
         Revoked(tmp_path).add(name)
     assert Revoked(tmp_path).holds(name)
-    assert not list(tmp_path.iterdir())
+    assert [path.name for path in tmp_path.rglob("*")] == ["revoked"]

@@ -102,4 +102,6 @@ def _revoke_at(server: Server, invitation: str) -> int:
             No(f"Revoked, but a runner with a data folder of its own has not been told: {error}")
         )
     print(f"{gone['id']}  {gone['role']} is revoked; {len(gone['guests'])} came in by it.")
+    if gone.get("unrecorded"):
+        print("The log could not take that up yet; the server tries again until it can.")
     return 0

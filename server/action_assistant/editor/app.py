@@ -24,23 +24,27 @@ from action_assistant.web.asgi import Readiness, application
 from action_assistant.web.keys import Keys
 from action_assistant.web.revoked import Revoked
 from action_assistant.web.sessions import session_routes
+from action_assistant.web.signed_in import SignedInBrowsers
 
 log: Final = logging.getLogger(__name__)
 
 
 @asynccontextmanager
-async def open_house(settings: EditorSettings) -> AsyncIterator[House]:
+async def open_house(
+    settings: EditorSettings, revoked: Revoked | None = None
+) -> AsyncIterator[House]:
     """The editor without its HTTP side. Raises CannotStart."""
+    revoked = revoked or Revoked(settings.data)
     journal = await Journal.open(settings.database, branch="editor", fold=h.fold)
     try:
         new = await journal.position() == 0
         async with epochs.living_in(journal, settings.data) as epoch:
-            house = House(settings, journal, await People.known(journal), epoch)
+            house = House(settings, journal, await People.known(journal), epoch, revoked)
             try:
-                await house.invitations.agree()
-                if new:
-                    await _greet(house, places.examples())
-                yield house
+                async with house.invitations.opened():
+                    if new:
+                        await _greet(house, places.examples())
+                    yield house
             finally:
                 await house.rooms.close()
     finally:
@@ -52,6 +56,8 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     Journal.prepare(settings.database, "editor")
     keys = Keys.of(settings.data)
     door = Door()
+    revoked = Revoked(settings.data)
+    browsers = SignedInBrowsers(settings.data, revoked)
     addresses = addresses_of(
         host=settings.host,
         page_port=settings.port,
@@ -62,7 +68,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_house(settings) as house:
+        async with open_house(settings, revoked) as house:
             door.open(house)
             yield
 
@@ -77,8 +83,10 @@ def create_app(settings: EditorSettings) -> ASGIApp:
                 secure=settings.tls,
                 limits=settings.limits,
                 reception=lambda: door.house.invitations,
+                revoked=revoked,
+                browsers=browsers,
             ),
-            *invitations.routes(door, addresses),
+            *invitations.routes(door, addresses, browsers),
             *about.routes(door),
             *graphs.routes(door),
             *versions.routes(door),
@@ -87,7 +95,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         ],
         title="TeMoto Action Assistant: editor",
         keys=keys,
-        revoked=Revoked(settings.data),
+        revoked=revoked,
         addresses=addresses,
         page_port=settings.port,
         lifespan=[lifespan],

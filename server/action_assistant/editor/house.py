@@ -20,7 +20,12 @@ class House:
     """The parts, put together around a journal that is open."""
 
     def __init__(
-        self, settings: EditorSettings, journal: Journal, people: People, epoch: str
+        self,
+        settings: EditorSettings,
+        journal: Journal,
+        people: People,
+        epoch: str,
+        revoked: Revoked,
     ) -> None:
         self.settings = settings
         self.journal = journal
@@ -33,9 +38,7 @@ class House:
         self.catalogue = Catalogue(journal, self.rooms, self.sights)
         self.versions = Versions(journal, self.sights)
         self.library = Library(journal, self.sights)
-        self.invitations = Invitations(
-            journal, people, Keys.of(settings.data), Revoked(settings.data)
-        )
+        self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)
         self.history = History(journal, people, self.versions)
 
 

@@ -3,6 +3,7 @@
 from sqlalchemy import select
 
 from action_assistant.editor.happenings import EXAMPLES, NAMED, PEOPLE, SERVER, Named, draft
+from action_assistant.errors import Unavailable
 from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
 from action_assistant.web.keys import Author
@@ -27,8 +28,15 @@ class People:
         """Somebody acts: remember the name, if it is new."""
         if self._names.get(person.id) == person.name:
             return
+        before = self._names.get(person.id)
         self._names[person.id] = person.name
-        await self._journal.append(PEOPLE, [draft(NAMED, person.id, Named(person.name))])
+        try:
+            await self._journal.append(PEOPLE, [draft(NAMED, person.id, Named(person.name))])
+        except Unavailable:  # it is told when they act next
+            self._names.pop(person.id)
+            if before is not None:
+                self._names[person.id] = before
+            raise
 
     def person(self, author: str) -> Author:
         """Who the author of an event is."""

@@ -144,7 +144,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         }
 
     return application(
-        [*routes(house), revocation(revoked)],
+        [*routes(house), *revocation(revoked)],
         title="TeMoto Action Assistant: runner",
         keys=Keys.of(settings.data),
         revoked=revoked,

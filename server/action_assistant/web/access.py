@@ -223,7 +223,8 @@ class Access:
         if scope["type"] == ScopeType.WEBSOCKET:
             last = {"type": "websocket.close", "code": SESSION_ENDED, "reason": "session ended"}
         elif not begun:
-            await refuse(scope, receive, send, _ended(session))
+            signed_out = self._revoked.ended(session)
+            await refuse(scope, receive, send, _ended(session, signed_out=signed_out))
             return
         if not over:
             with anyio.move_on_after(_GOODBYE):
@@ -257,8 +258,8 @@ class Access:
             state["person"] = self._local
             return
         session = self._session(headers)
-        revoked = session is not None and self._revoked.holds(session.invitation)
-        if session is not None and not revoked and (not session.expired or _is_stop(method, path)):
+        ended = session is not None and self._revoked.ends(session)
+        if session is not None and not ended and (not session.expired or _is_stop(method, path)):
             if origin is None and method not in _SAFE:
                 raise WrongOrigin("A browser says which page is asking; this request does not.")
             if headers.get("sec-fetch-site") == "cross-site" and path.startswith("/api/"):
@@ -266,9 +267,10 @@ class Access:
             state["person"] = session.person
             state["session"] = session
             return
-        if session is not None:  # genuine, yet good for nothing but being the same person again
-            state["expired"] = session
-        state["ended"] = _ended(session)
+        signed_out = session is not None and self._revoked.ended(session)
+        if session is not None and not signed_out:
+            state["expired"] = session  # good for nothing but being the same person again
+        state["ended"] = _ended(session, signed_out=signed_out)
         if not self._is_open(path, "text/html" in headers.get("accept", "")):
             raise state["ended"]
 
@@ -276,7 +278,8 @@ class Access:
         """The first one that lasts of those whose seal is ours, else the first of these."""
         tried = map(self._keys.session, cookies.values(headers.get("cookie", ""), self._cookie))
         genuine = [each for each in tried if each is not None]
-        return next((each for each in genuine if not each.expired), genuine[0] if genuine else None)
+        lasting = (each for each in genuine if not (each.expired or self._revoked.ends(each)))
+        return next(lasting, genuine[0] if genuine else None)
 
     def _dressed(self, headers: dict[str, str], send: Send) -> Send:
         """Add the headers that every answer carries, also refusals."""
@@ -307,12 +310,14 @@ def _nobody(_: str) -> None:
     """Nobody wants to know."""
 
 
-def _ended(session: Session | None) -> Refused:
+def _ended(session: Session | None, *, signed_out: bool = False) -> Refused:
     """Why somebody without a session that lasts is not let in."""
     if session is None:
         return Unauthenticated(
             "Open the link that the server printed, or send its token as a Bearer token."
         )
+    if signed_out:
+        return Unauthenticated("This session was ended: come in by a link again.")
     if session.expired:
         return Unauthenticated("Your session has ended: open the link that the server printed.")
     return Withdrawn("The link that you came in by was revoked. Ask for another one.")

@@ -92,11 +92,13 @@ class Keys:
         role: Role = OWNER,
         invitation: str | None = None,
         person_id: str | None = None,
+        session_id: str | None = None,
     ) -> Session:
-        """A fresh session; with `person_id` for somebody who is known already."""
+        """A session from now on; with `person_id` for somebody who is known already, with
+        `session_id` for a browser whose session goes on, so that one end ends all cookies of it."""
         person = Person(person_id or secrets.token_urlsafe(9), name, role)
         expires = time.time() + SESSION_SECONDS
-        return Session(secrets.token_urlsafe(12), person, expires, invitation)
+        return Session(session_id or secrets.token_urlsafe(12), person, expires, invitation)
 
     def secret_of(self, invitation: str) -> str:
         """The secret of a link (256 bit): only who knows the token can tell it from the id."""

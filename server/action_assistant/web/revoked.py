@@ -1,7 +1,10 @@
-"""Which invitations were revoked, as either process sees it by itself; and what that ends.
+"""Which invitations were revoked and which sessions have ended, as either process sees it by itself;
+and what that ends.
 
-`revoked/` in the data folder holds one empty file for each: made at once or not at all, never
-changed, and it needs neither the other process nor a database to be read.
+`revoked/` in the data folder holds one empty file for each: `ID` for an invitation, `session-ID` for a
+session. It is made at once or not at all, never changed, and needs neither the other process nor a
+database to be read. What this process was told itself it also keeps in mind, whatever becomes of the
+disk.
 """
 
 import asyncio
@@ -22,34 +25,67 @@ FOLDER: Final = "revoked"
 SESSION_ENDED: Final = 4401  # close code of sockets
 _LOOK_S: Final = 0.2
 _ID: Final = re.compile(r"[A-Za-z0-9]{1,40}")
+_SESSION: Final = "session-"
+_SESSION_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 
 class Revoked:
-    """The invitations that open nothing any more."""
+    """The invitations that open nothing any more, and the sessions that have ended."""
 
     def __init__(self, data: Path) -> None:
         self._folder = data / FOLDER
+        self._unwritten: set[str] = set()
+        try:
+            self._folder.mkdir(
+                mode=0o700, parents=True, exist_ok=True
+            )  # a full disk has no room for it
+            self._marks = {entry.name for entry in self._folder.iterdir()}
+        except OSError as error:
+            log.error("%s cannot be read: %s", self._folder, error.strerror)
+            self._marks = set()
 
     def holds(self, invitation: str | None) -> bool:
         """Whether a session that came in by this invitation has ended. None: by the token."""
         if invitation is None:
             return False
-        return _ID.fullmatch(invitation) is None or (self._folder / invitation).exists()
+        return _ID.fullmatch(invitation) is None or self._is_marked(invitation)
+
+    def ended(self, session: Session) -> bool:
+        """Whether somebody ended this one session."""
+        return _SESSION_ID.fullmatch(session.id) is None or self._is_marked(_SESSION + session.id)
+
+    def ends(self, session: Session) -> bool:
+        """Whether it opens nothing any more, also no Stop."""
+        return self.holds(session.invitation) or self.ended(session)
 
     def every(self) -> frozenset[str]:
-        """All of them."""
-        try:
-            return frozenset(entry.name for entry in self._folder.iterdir())
-        except FileNotFoundError:
-            return frozenset()
+        """All invitations."""
+        return frozenset(name for name in tuple(self._names()) if _ID.fullmatch(name))
 
     def add(self, invitation: str) -> None:
-        """Revoke one. On disk when it returns. Raises Unavailable, ValueError."""
+        """Revoke one. Holds at once; is on disk when this returns. Raises Unavailable, when it holds
+        for this process and only until it ends; ValueError."""
         if _ID.fullmatch(invitation) is None:
             raise ValueError(f"{invitation!r} is no id of an invitation")
+        self._mark(invitation)
+
+    def end(self, session: str) -> None:
+        """End a session. As `add`."""
+        if _SESSION_ID.fullmatch(session) is None:
+            raise ValueError(f"{session!r} is no id of a session")
+        self._mark(_SESSION + session)
+
+    def write_again(self) -> None:
+        """What could not be written. Raises Unavailable when it still cannot."""
+        for mark in tuple(self._unwritten):
+            self._mark(mark)
+
+    def _mark(self, mark: str) -> None:
+        self._marks.add(mark)
+        self._unwritten.add(mark)
         try:
             self._folder.mkdir(mode=0o700, exist_ok=True)
-            (self._folder / invitation).touch(mode=0o600)
+            (self._folder / mark).touch(mode=0o600)
             folder = os.open(self._folder, os.O_RDONLY)
             try:
                 os.fsync(folder)
@@ -57,8 +93,27 @@ class Revoked:
                 os.close(folder)
         except OSError as error:
             raise Unavailable(
-                f"The invitation could not be revoked in {self._folder}: {error.strerror}."
+                f"It holds here and now, but could not be written to {self._folder}: "
+                f"{error.strerror}. It is forgotten when this process ends."
             ) from error
+        self._unwritten.discard(mark)
+
+    def _is_marked(self, mark: str) -> bool:
+        if mark in self._marks:
+            return True
+        try:
+            (self._folder / mark).stat()
+        except OSError:  # it is not there; or the disk is gone, for which nobody is put out
+            return False
+        self._marks.add(mark)
+        return True
+
+    def _names(self) -> set[str]:
+        try:
+            self._marks |= {entry.name for entry in self._folder.iterdir()}
+        except OSError as error:
+            log.error("%s cannot be read: %s", self._folder, error.strerror)
+        return self._marks
 
 
 class Leash:
@@ -72,7 +127,7 @@ class Leash:
 
     def look(self, revoked: Revoked) -> None:
         """Cut it if the session has ended."""
-        over = revoked.holds(self._session.invitation)
+        over = revoked.ends(self._session)
         over = over or (self._session.expired and not self._outlives)
         if over and not self.is_cut:
             self.is_cut = True

@@ -4,17 +4,20 @@ from collections.abc import Callable
 from typing import Annotated, Any, Final, Protocol
 
 import msgspec
+from anyio import to_thread
 from litestar import Request, Response, delete, get, post
 from litestar.datastructures import Cookie
 from litestar.params import JSONBody
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.errors import BadInput, TooMany, Unauthenticated
+from action_assistant.errors import BadInput, TooMany, Unauthenticated, Unavailable
 from action_assistant.web.access import Needs, cookie_name, known_person, live_session, session_of
 from action_assistant.web.crowd import Pace
 from action_assistant.web.keys import SESSION_SECONDS, Author, Keys, Person, Session
+from action_assistant.web.problems import PROBLEM_JSON, problem_of
 from action_assistant.web.revoked import Revoked
 from action_assistant.web.roles import Role, rank
+from action_assistant.web.signed_in import SignedInBrowsers
 
 _BODY: Final = 10_000  # bytes; strangers send it
 _NAME: Final = 60  # characters
@@ -54,15 +57,16 @@ class Invited(msgspec.Struct, frozen=True):
 
 
 class Revocation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An invitation that lets nobody in any more."""
+    """An invitation that lets nobody in any more, or a session that has ended: one of the two."""
 
-    invitation: str
+    invitation: str | None = None
+    session: str | None = None
 
 
 class Reception(Protocol):
     """Knows invitations."""
 
-    async def look(self, proof: str) -> Invited:
+    def look(self, proof: str) -> Invited:
         """What a link invites to. Raises Unauthenticated."""
 
     async def welcome(self, invitation: str, person: Author) -> None:
@@ -87,10 +91,10 @@ class Desk:
         self._secure = secure
         self._pace = Pace(_TRIES_AT_ONCE, _TRIES_PER_MINUTE) if limits else None
 
-    async def look(self, invitation: str, request: _Asking) -> Invited:
+    def look(self, invitation: str, request: _Asking) -> Invited:
         """What a link leads to. Raises Unauthenticated, TooMany."""
         self._admit(request)
-        return await self._reception().look(invitation)
+        return self._reception().look(invitation)
 
     async def session(self, data: SignIn, request: _Asking) -> Session:
         """What somebody gets who signs in. Raises Unauthenticated, TooMany, BadInput."""
@@ -104,9 +108,12 @@ class Desk:
                     raise Unauthenticated("This is not the token of this server.")
                 # The link again, in a browser that is or was signed in: the same person, since what
                 # older tabs have written belongs to them.
-                known = known_person(request)
-                id_ = known.id if known else None
-                return self._keys.new_session(name or _name(known), person_id=id_)
+                known, now = known_person(request), session_of(request)
+                return self._keys.new_session(
+                    name or _name(known),
+                    person_id=known.id if known else None,
+                    session_id=now.id if now else None,
+                )
             case SignIn(token=None, invitation=str(proof)):
                 self._admit(request)
                 return await _invited(self._keys, self._reception(), proof, name, request)
@@ -126,9 +133,14 @@ class Desk:
         )
         return Response(_signed_in(session), status_code=200, cookies=[cookie])
 
-    def farewell(self) -> Response[None]:
-        """No cookie any more."""
-        response: Response[None] = Response(None, status_code=204)
+    def farewell(self, unwritten: Unavailable | None = None) -> Response[None]:
+        """No cookie any more. `unwritten`: why other processes may not know of it."""
+        content: Any = None if unwritten is None else problem_of(unwritten)
+        response: Response[None] = Response(
+            content,
+            status_code=204 if unwritten is None else unwritten.status,
+            media_type=None if unwritten is None else PROBLEM_JSON,
+        )
         response.delete_cookie(self._cookie, path="/")
         return response
 
@@ -143,6 +155,8 @@ def session_routes(
     page_port: int,
     *,
     reception: Callable[[], Reception],
+    revoked: Revoked,
+    browsers: SignedInBrowsers,
     secure: bool = False,
     limits: bool = True,
 ) -> list[ControllerRouterHandler]:
@@ -151,7 +165,9 @@ def session_routes(
 
     @get("/api/session", summary="Who is signed in")
     async def who(request: _Asking) -> SignedIn:
-        return _signed_in(live_session(request))
+        session = live_session(request)
+        await to_thread.run_sync(browsers.note, session)
+        return _signed_in(session)
 
     @post(
         "/api/session",
@@ -160,7 +176,9 @@ def session_routes(
         request_max_body_size=_BODY,
     )
     async def sign_in(data: JSONBody[SignIn], request: _Asking) -> Response[SignedIn]:
-        return desk.answer(await desk.session(data, request))
+        session = await desk.session(data, request)
+        await to_thread.run_sync(browsers.note, session)
+        return desk.answer(session)
 
     @post(
         "/api/session/invitation",
@@ -169,31 +187,53 @@ def session_routes(
         request_max_body_size=_BODY,
     )
     async def look(data: JSONBody[Looking], request: _Asking) -> Invited:
-        return await desk.look(data.invitation, request)
+        return desk.look(data.invitation, request)
 
-    @delete("/api/session", summary="Sign out")
-    async def sign_out() -> Response[None]:
+    @delete("/api/session", status_code=204, summary="Sign out: this session ends, everywhere")
+    async def sign_out(request: _Asking) -> Response[None]:
+        try:
+            await _end(revoked, request)
+        except Unavailable as unwritten:
+            return desk.farewell(unwritten)
         return desk.farewell()
 
     return [who, sign_in, look, sign_out]
 
 
-def revocation(revoked: Revoked) -> ControllerRouterHandler:
+def revocation(revoked: Revoked) -> list[ControllerRouterHandler]:
     """For a process that knows no invitations: the runner, which may be on another computer."""
 
     @post(
         "/api/revocations",
         status_code=204,
-        summary="End every session that came in by an invitation",
+        summary="End every session that came in by an invitation, or one session",
         guards=[Needs("share")],
     )
     async def revoke(data: JSONBody[Revocation]) -> None:
         try:
-            revoked.add(data.invitation)
+            match data:
+                case Revocation(invitation=str(invitation), session=None):
+                    await to_thread.run_sync(revoked.add, invitation)
+                case Revocation(invitation=None, session=str(session)):
+                    await to_thread.run_sync(revoked.end, session)
+                case _:
+                    raise BadInput("Name an invitation or a session, one of the two.")
         except ValueError as error:
             raise BadInput(f"{error}.", where={"path": "/invitation"}) from error
 
-    return revoke
+    @delete("/api/session", status_code=204, summary="Sign out: this session ends, everywhere")
+    async def sign_out(request: _Asking) -> None:
+        await _end(revoked, request)
+
+    return [revoke, sign_out]
+
+
+async def _end(revoked: Revoked, request: _Asking) -> None:
+    """The session of whoever asks, also one that has expired. Raises Unavailable."""
+    state = request.scope["state"]
+    session: Session | None = state.get("session") or state.get("expired")
+    if session is not None:
+        await to_thread.run_sync(revoked.end, session.id)
 
 
 async def _invited(
@@ -201,7 +241,7 @@ async def _invited(
 ) -> Session:
     """A session for who comes by a link. Who may do more already keeps that: a link takes nothing
     away."""
-    invited = await reception.look(proof)
+    invited = reception.look(proof)
     now = session_of(request)
     if now is not None and rank(now.person.role) >= rank(invited.role):
         return _renamed(keys, now, name)
@@ -211,6 +251,7 @@ async def _invited(
         role=invited.role,
         invitation=invited.id,
         person_id=known.id if known is not None else None,
+        session_id=now.id if now is not None else None,
     )
     await reception.welcome(invited.id, session.person)
     return session
@@ -227,6 +268,7 @@ def _renamed(keys: Keys, session: Session, name: str) -> Session:
         role=person.role,
         invitation=session.invitation,
         person_id=person.id,
+        session_id=session.id,
     )
 
 

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 import segno
+from anyio import to_thread
 from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
@@ -13,6 +14,8 @@ from action_assistant.editor.invitations import Invitation
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.web.access import Needs, person_of
 from action_assistant.web.addresses import Addresses
+from action_assistant.web.keys import Author
+from action_assistant.web.signed_in import OpenSession, SignedInBrowsers
 
 
 class Sharing(msgspec.Struct, frozen=True):
@@ -34,9 +37,34 @@ class Inviting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     label: Annotated[str, msgspec.Meta(max_length=200)] = ""
 
 
-def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
-    """Everything under `/api/invitations`."""
-    return [*_links(door, addresses), *_one(door, addresses)]
+def routes(
+    door: Door, addresses: Addresses, browsers: SignedInBrowsers
+) -> list[ControllerRouterHandler]:
+    """Everything under `/api/invitations` and `/api/sessions`."""
+    return [*_links(door, addresses), *_one(door, addresses), *_sessions(browsers)]
+
+
+def _sessions(browsers: SignedInBrowsers) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/sessions",
+        summary="Browsers that are signed in, the newest first",
+        operation_id="listSessions",
+        guards=[Needs("share")],
+    )
+    async def list_sessions() -> list[OpenSession]:
+        return await to_thread.run_sync(browsers.every)
+
+    @post(
+        "/api/sessions/{session:str}/end",
+        status_code=204,
+        summary="Sign a browser out",
+        operation_id="endSession",
+        guards=[Needs("share")],
+    )
+    async def end(session: str) -> None:
+        await to_thread.run_sync(browsers.end, session)
+
+    return [list_sessions, end]
 
 
 def _links(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
@@ -48,7 +76,7 @@ def _links(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
     )
     async def list_invitations() -> Sharing:
         secure = door.house.settings.tls
-        return Sharing(addresses.origins(), secure, await door.house.invitations.all())
+        return Sharing(addresses.origins(), secure, door.house.invitations.all())
 
     @post(
         "/api/invitations",
@@ -75,9 +103,8 @@ def _one(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         guards=[Needs("share")],
     )
     async def revoke(invitation: str, request: Request[Any, Any, Any]) -> Invitation:
-        house, person = door.house, person_of(request)
-        await house.people.seen(person)
-        return await house.invitations.revoke(invitation, person.id)
+        person = person_of(request)
+        return await door.house.invitations.revoke(invitation, Author(person.id, person.name))
 
     @get(
         "/api/invitations/{invitation:str}/qr",
@@ -88,7 +115,7 @@ def _one(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
     async def code(invitation: str, origin: str) -> Response[bytes]:
         if not addresses.allows_origin(origin):
             raise BadInput("The page is not to be found there.", where={"path": "/origin"})
-        found = await door.house.invitations.get(invitation)
+        found = door.house.invitations.get(invitation)
         if found.path is None:
             raise Conflict("This link was revoked.")
         headers = {"cache-control": "no-store"}
