@@ -116,15 +116,3 @@ def check_host(host: str, hosts: tuple[str, ...], *, share: bool = False) -> Non
             "Use --share to do that on purpose, or name the addresses that people may use in "
             "ACTION_ASSISTANT_HOSTS."
         )
-
-
-def writable_folder(path: Path) -> Path:
-    """The folder, made if need be and proven writable."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        probe = path / f".probe-{os.getpid()}"
-        probe.write_bytes(b"")
-        probe.unlink()
-    except OSError as error:
-        raise CannotStart(f"Cannot write to the data folder {path}: {error.strerror}.") from error
-    return path

@@ -21,6 +21,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Fold
 from action_assistant.journal.journal import Journal
+from action_assistant.private import own_folder
 from action_assistant.version import VERSION
 
 _FORMAT: Final = 1
@@ -89,7 +90,7 @@ def _backup(options: argparse.Namespace) -> int:
 
 def _restore(options: argparse.Namespace) -> int:
     data, source = options.data.resolve(), options.file.resolve()
-    data.mkdir(parents=True, exist_ok=True)
+    own_folder(data)
     with _workshop(data) as folder, ExitStack() as locks:
         about = _unpack(source, folder)
         for branch in about.journals:
@@ -99,7 +100,7 @@ def _restore(options: argparse.Namespace) -> int:
                 raise CannotStart(f"{source} is damaged: {branch}.db is not what was written.")
             _checked(folder, branch, anew=True)
         aside = data / time.strftime("before-restore-%Y%m%d-%H%M%S")
-        aside.mkdir()
+        aside.mkdir(mode=0o700)
         for branch in about.journals:
             _exchange(folder / f"{branch}.db", data / f"{branch}.db", aside)
         (data / _mark()).unlink(missing_ok=True)
@@ -218,6 +219,7 @@ def _exchange(new: Path, old: Path, aside: Path) -> None:
     # What an old log still holds must not be applied to the new file.
     for suffix in ("-wal", "-shm"):
         old.with_name(f"{old.name}{suffix}").unlink(missing_ok=True)
+    new.chmod(0o600)
     _sync(new)
     new.replace(old)
     _sync(old.parent)

@@ -23,11 +23,11 @@ from action_assistant.commands.processes import port_number
 from action_assistant.errors import CannotStart
 from action_assistant.interpreter import for_runner
 from action_assistant.journal.database import cause_of, database_of
+from action_assistant.private import holds_nothing_else, open_to_others, prove_writable
 from action_assistant.runner import archive
 from action_assistant.runner.links.findings import Finding, Verdict
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2_checkup import look
-from action_assistant.settings import writable_folder
 from action_assistant.version import VERSION
 from action_assistant.web.listen import bound
 
@@ -111,13 +111,28 @@ def _folder(path: Path) -> Finding:
             topic="data folder", verdict="note", what=f"{path} is not there yet; serve makes it."
         )
     try:
-        writable_folder(path)
+        prove_writable(path)
+        found = open_to_others(path)
     except CannotStart as error:
         return _wrong("data folder", str(error), "Choose another with --data, or mend its rights.")
+    if found:
+        advice = "The next start of this program closes them."
+        if path in found and not holds_nothing_else(path):
+            advice += f" The folder has other things in it, too: `chmod 700 {path}`, or move them."
+        return _wrong(
+            "data folder", f"Other users of this computer can read {_listed(path, found)}.", advice
+        )
     free = shutil.disk_usage(path).free // 2**20
     if free < 100:
         return _wrong("data folder", f"{path} has {free} MiB left.", "Make room: edits need it.")
-    return _fine("data folder", f"{path} can be written; {free} MiB are free.")
+    return _fine("data folder", f"{path} can be written, by you alone read; {free} MiB are free.")
+
+
+def _listed(data: Path, paths: list[Path]) -> str:
+    """Some of them, by their names in the folder."""
+    names = [str(path.relative_to(data)) if path != data else str(data) for path in paths]
+    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+    return ", ".join(names[:5]) + more
 
 
 def _database(topic: str, url: str) -> Finding:

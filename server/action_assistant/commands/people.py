@@ -3,9 +3,9 @@
 import argparse
 from typing import Any
 
-from action_assistant import settings
 from action_assistant.commands.client import No, Server, command, print_json, refused, running
 from action_assistant.errors import CannotStart, Refused
+from action_assistant.private import own_folder
 from action_assistant.web.revoked import Revoked
 
 
@@ -84,7 +84,7 @@ def _revoke(options: argparse.Namespace) -> int:
         if options.url:
             raise
         try:
-            Revoked(settings.writable_folder(options.data.resolve())).add(options.id)
+            Revoked(own_folder(options.data.resolve())).add(options.id)
         except (ValueError, Refused) as error:
             raise CannotStart(f"{silent} {error}") from error
         print("No server answers; the link is marked as revoked in the data folder.")

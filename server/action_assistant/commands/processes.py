@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from action_assistant import places, settings
 from action_assistant.errors import CannotStart
+from action_assistant.private import own_folder
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     from action_assistant.web.listen import Identity
@@ -152,7 +153,7 @@ def _serve(options: argparse.Namespace) -> int:
     if options.port == 65535:
         raise CannotStart("The runner needs the port after --port; 65535 has none.")
     host = _host(options)
-    data = settings.writable_folder(options.data.resolve())
+    data = own_folder(options.data.resolve())
     return serve(
         Plan(
             data=data,
@@ -171,7 +172,7 @@ def _editor(options: argparse.Namespace) -> int:
     from action_assistant.web.listen import serve as listen
 
     _log()
-    chosen = _editor_settings(options, settings.writable_folder(options.data.resolve()))
+    chosen = _editor_settings(options, own_folder(options.data.resolve()))
     listen(
         lambda: create_app(chosen),
         host=chosen.host,
@@ -186,7 +187,7 @@ def _runner(options: argparse.Namespace) -> int:
     from action_assistant.web.listen import serve as listen
 
     _log()
-    data = settings.writable_folder(options.data.resolve())
+    data = own_folder(options.data.resolve())
     chosen = settings.RunnerSettings(
         data=data,
         host=_host(options),
@@ -210,7 +211,7 @@ def _runner(options: argparse.Namespace) -> int:
 def _migrate(options: argparse.Namespace) -> int:
     from action_assistant.journal.migrate import Branch, migrate
 
-    data = settings.writable_folder(options.data.resolve())
+    data = own_folder(options.data.resolve())
     database = options.database or f"sqlite:///{data / 'editor.db'}"
     urls: dict[Branch, str] = {"editor": database, "runner": f"sqlite:///{data / 'runner.db'}"}
     for branch, url in urls.items():

@@ -20,6 +20,7 @@ from action_assistant.editor import happenings as h
 from action_assistant.errors import Unavailable
 from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
+from action_assistant.private import opener
 
 log: Final = logging.getLogger(__name__)
 
@@ -119,5 +120,6 @@ async def _remember(journal: Journal, mark: Path) -> None:
 
 def _replace(path: Path, content: bytes) -> None:
     part = path.with_name(f"{path.name}.part")
-    part.write_bytes(content)
+    with open(part, "wb", opener=opener) as out:
+        out.write(content)
     part.replace(path)

@@ -1,7 +1,6 @@
 """A journal in one SQLite file: WAL, every commit on the disk before anyone hears of it."""
 
 import asyncio
-import fcntl
 import os
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
@@ -23,7 +22,9 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Head
 from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.events import Event
+from action_assistant.journal.lock import own as own
 from action_assistant.journal.migrate import upgrade_to
+from action_assistant.private import opener
 
 T = TypeVar("T")
 
@@ -142,6 +143,7 @@ class Sqlite:
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
         """Run a change of the schema in one transaction. Raises CannotStart."""
+        self._make()
         engine = sqlite_engine(self._path, wait=2 * _WAIT, module=self._driver)
         try:
             with engine.begin() as connection:
@@ -150,6 +152,13 @@ class Sqlite:
             raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
         finally:
             engine.dispose()
+
+    def _make(self) -> None:
+        """An empty file, if there is none: what lies beside it gets the same rights."""
+        try:
+            os.close(opener(str(self._path), os.O_RDWR | os.O_CREAT))
+        except OSError as error:
+            raise CannotStart(f"Cannot open {self._the}: {error.strerror}.") from error
 
     def connect(self) -> SqliteSession:
         """Connect again; a session that was closed left nothing unfinished."""
@@ -219,22 +228,6 @@ def sqlite_engine(path: Path, *, wait: float, **options: Any) -> Engine:
         connection.exec_driver_sql("BEGIN IMMEDIATE")
 
     return engine
-
-
-def own(path: Path) -> int:
-    """Lock a file for this process; closing the descriptor lets go. Raises CannotStart."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = path.with_name(f"{path.name}.lock").open("ab")
-    except OSError as error:
-        raise CannotStart(f"Cannot write to the folder {path.parent}: {error.strerror}.") from error
-    with file:
-        descriptor = file.fileno()
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise CannotStart(f"The database {path} is in use by another process.") from error
-        return os.dup(descriptor)
 
 
 def _reading(path: Path, driver: Any) -> Engine:

@@ -18,6 +18,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import NotFound
+from action_assistant.private import make_folder, opener
 from action_assistant.runner.history import Aside
 from action_assistant.runner.links.port import Answer, Feedback
 from action_assistant.runner.seen import Snapshot
@@ -118,8 +119,8 @@ class Recordings:
             files.setdefault(self._folder / robot / f"{hour}{_ENDING}", []).append(line)
         for path, found in files.items():
             is_new = not path.exists()
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with path.open("ab") as file:
+            make_folder(path.parent)
+            with open(path, "ab", opener=opener) as file:
                 file.write(gzip.compress(b"\n".join(found) + b"\n"))
             if is_new and self._prunes:
                 for each in self.due(self._kept_days):

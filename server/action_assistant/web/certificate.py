@@ -21,6 +21,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from action_assistant.errors import CannotStart
+from action_assistant.private import opener
 
 FOLDER: Final = "tls"
 _AUTHORITY_DAYS: Final = 3650
@@ -81,7 +82,7 @@ class Certificate:
     @contextlib.contextmanager
     def _alone(self) -> Iterator[None]:
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        with (self._folder / "lock").open("w") as lock:
+        with open(self._folder / "lock", "w", opener=opener) as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             yield
 
@@ -149,7 +150,7 @@ class Certificate:
             .sign(key, hashes.SHA256())
         )
         _write(self._folder / "ca-key.pem", _pem(key))
-        _write(self.authority, _text(certificate), mode=0o644)
+        _write(self.authority, _text(certificate))
         return certificate, key
 
 
@@ -232,11 +233,11 @@ def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
     )
 
 
-def _write(path: Path, content: bytes, mode: int = 0o600) -> None:
+def _write(path: Path, content: bytes) -> None:
     """Put it there at once, readable by those who may from its first moment."""
     fresh = path.with_suffix(".new")
     fresh.unlink(missing_ok=True)
-    with os.fdopen(os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as out:
+    with open(fresh, "xb", opener=opener) as out:
         out.write(content)
         os.fsync(out.fileno())
     fresh.replace(path)

@@ -19,6 +19,7 @@ import msgspec
 from action_assistant.errors import Refused
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.events import Event
+from action_assistant.private import make_folder, opener
 from action_assistant.version import VERSION
 
 _FORMAT: Final = 1
@@ -71,8 +72,8 @@ class Bundle:
         self._end = end
         self._seen = NOTHING
         self._hash = hashlib.sha256()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._raw = self._part.open("wb")
+        make_folder(path.parent)
+        self._raw = open(self._part, "wb", opener=opener)  # noqa: SIM115 - closed at its end
         self._file = gzip.GzipFile("", "wb", 6, self._raw, mtime=0)
         title = Title(
             format=_FORMAT,
@@ -163,10 +164,10 @@ def title_of(path: Path) -> Title:
 
 def put(source: Path, target: Path) -> str:
     """Copy a file so that it is either there as a whole or not at all; its SHA-256. Raises OSError."""
-    target.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(target.parent)
     part = target.with_name(f".{target.name}.part")
     try:
-        with source.open("rb") as there, part.open("wb") as here:
+        with source.open("rb") as there, open(part, "wb", opener=opener) as here:
             while block := there.read(1 << 20):
                 here.write(block)
             here.flush()

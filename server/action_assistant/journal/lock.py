@@ -1,0 +1,104 @@
+"""One process writes a journal: a lock beside its file, which no other user can take or keep from us."""
+
+import fcntl
+import os
+import pwd
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from action_assistant.errors import CannotStart
+from action_assistant.private import opener
+
+_LOCKS: Final = Path("/proc/locks")
+
+
+class Holder(NamedTuple):
+    """The process that holds a lock."""
+
+    pid: int
+    uid: int
+
+    def __str__(self) -> str:
+        try:
+            name = pwd.getpwuid(self.uid).pw_name
+        except KeyError:
+            name = str(self.uid)
+        return f"{self.pid} of {name}"
+
+
+def own(path: Path) -> int:
+    """Lock a database for this process; closing the descriptor lets go. Raises CannotStart.
+
+    Versions before this one made locks that others could open, and so hold. Such a lock is put aside:
+    a process of another user, root apart, cannot be one that writes files of ours.
+    """
+    lock = path.with_name(f"{path.name}.lock")
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        held = _taken(lock)
+        if held is None and _is_a_strangers(_holder(lock), path):
+            held = _taken_from_a_stranger(lock, path)
+    except OSError as error:
+        raise CannotStart(f"Cannot write to the folder {path.parent}: {error.strerror}.") from error
+    if held is None:
+        holder = _holder(lock)
+        who = f" ({holder})" if holder is not None else ""
+        raise CannotStart(f"The database {path} is in use by another process{who}.")
+    return held
+
+
+def _taken(lock: Path) -> int | None:
+    """The lock, or None when somebody holds it."""
+    while True:
+        descriptor = opener(str(lock), os.O_RDWR | os.O_CREAT)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(descriptor)
+            return None
+        try:
+            if os.path.samestat(os.fstat(descriptor), lock.stat()):
+                return descriptor
+        except FileNotFoundError:
+            pass  # put aside meanwhile: the one that counts is another
+        os.close(descriptor)
+
+
+def _taken_from_a_stranger(lock: Path, path: Path) -> int | None:
+    """A new lock in the place of theirs, by one process of ours at a time."""
+    guard = opener(str(lock.with_name(f"{lock.name}.new")), os.O_RDWR | os.O_CREAT)
+    try:
+        fcntl.flock(guard, fcntl.LOCK_EX)
+        if _is_a_strangers(_holder(lock), path):
+            lock.unlink()
+        return _taken(lock)
+    finally:
+        os.close(guard)
+
+
+def _is_a_strangers(holder: Holder | None, path: Path) -> bool:
+    if holder is None or holder.uid in {0, os.geteuid()}:
+        return False
+    return not path.exists() or path.stat().st_uid == os.geteuid()
+
+
+def _user_of(pid: int) -> int:
+    """The real user, also of a process that hides: raises OSError, ValueError, IndexError."""
+    told = Path(f"/proc/{pid}/status").read_text()
+    (uid,) = [line.split()[1] for line in told.splitlines() if line.startswith("Uid:")]
+    return int(uid)
+
+
+def _holder(lock: Path) -> Holder | None:
+    """Who holds it, where the system tells: Linux does, of processes that can be seen from here."""
+    try:
+        there = lock.stat()
+        place = f"{os.major(there.st_dev):02x}:{os.minor(there.st_dev):02x}:{there.st_ino}"
+        for line in _LOCKS.read_text().splitlines():
+            fields = line.split()
+            if fields[1] == "FLOCK" and place in fields:
+                pid = int(fields[fields.index(place) - 1])
+                return Holder(pid, _user_of(pid))
+    except (OSError, ValueError, IndexError):
+        return None
+    return None
