@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from action_assistant.errors import CannotStart
-from action_assistant.settings import check_environment
+from action_assistant.plain import make_streams_plain
+from action_assistant.settings import check_environment, hide_password
 from action_assistant.version import VERSION
 
 _MODULES: Final = (
@@ -52,6 +53,9 @@ def parser(command: str = "") -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code."""
+    make_streams_plain()
+    if arguments is None:
+        hide_password()
     asked = sys.argv[1:] if arguments is None else arguments
     options = parser(asked[0] if asked else "").parse_args(asked)
     try:

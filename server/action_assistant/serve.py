@@ -7,17 +7,18 @@ import subprocess
 import sys
 import threading
 import time
-import urllib.error
-import urllib.request
 import webbrowser
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 import msgspec
 
 from action_assistant.interpreter import Interpreter, for_runner
+from action_assistant.private import opener
 from action_assistant.settings import EVERYWHERE, more_hosts
-from action_assistant.sharing import invitations_as_text
+from action_assistant.sharing import invitations_as_text, is_ours
 from action_assistant.web.addresses import addresses_of
 from action_assistant.web.certificate import Certificate
 from action_assistant.web.keys import Keys
@@ -69,12 +70,18 @@ class Child:
     """One of the two processes, as often as it takes."""
 
     def __init__(
-        self, name: str, arguments: list[str], port: int, interpreter: Interpreter
+        self,
+        name: str,
+        arguments: list[str],
+        port: int,
+        interpreter: Interpreter,
+        secrets: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self.name = name
         self.port = port
         self._interpreter = interpreter
         self._arguments = arguments
+        self._secrets = secrets  # everybody may read arguments; environments are ours alone
         self._process: subprocess.Popen[bytes] | None = None
         self._deaths = 0
         self._born = 0.0
@@ -84,6 +91,7 @@ class Child:
         """Start it. `parent` is the reading end of a pipe that closes when we die."""
         environment = self._interpreter.environment(os.environ)
         environment["_ACTION_ASSISTANT_PARENT"] = str(parent)
+        environment |= self._secrets
         self._born = time.monotonic()
         self._process = subprocess.Popen(
             [self._interpreter.path, "-m", "action_assistant", *self._arguments],
@@ -159,7 +167,7 @@ def _children(plan: Plan) -> list[Child]:
     """The runner last: it is the last to end."""
     address = ["--data", str(plan.data), "--host", plan.host]
     address += [flag for flag, on in (("--share", plan.share), ("--tls", plan.tls)) if on]
-    database = ["--database", plan.database] if plan.database else []
+    database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}
     ports = str(plan.port), str(plan.port + 1)
     this = Interpreter(path=Path(sys.executable), origin="this")
     speaking = for_runner()
@@ -168,9 +176,10 @@ def _children(plan: Plan) -> list[Child]:
     return [
         Child(
             "editor",
-            ["editor", *address, "--port", ports[0], "--runner-port", ports[1], *database],
+            ["editor", *address, "--port", ports[0], "--runner-port", ports[1]],
             plan.port,
             this,
+            database,
         ),
         Child(
             "runner",
@@ -210,7 +219,7 @@ def _greet(
     scheme = "https" if plan.tls else "http"
     deadline = time.monotonic() + _PATIENCE
     for child in children:
-        while not _answers(f"{scheme}://{shown}:{child.port}/healthz", trust):
+        while not is_ours(f"{scheme}://{shown}:{child.port}", keys, trust):
             if enough.within(_TICK):
                 return
             if time.monotonic() > deadline:
@@ -218,23 +227,19 @@ def _greet(
                 deadline = float("inf")
     base = f"{scheme}://{shown}:{plan.port}"
     url = f"{base}/#t={keys.token}"
-    _say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {url}\n")
+    # Through a file that only this user can read: arguments of a browser are visible to all.
+    redirect = plan.data / "open.html"
+    with open(redirect, "w", opener=opener) as out:
+        out.write(f'<!doctype html><meta http-equiv="refresh" content="0;url={url}">')
+    at_terminal = sys.stderr.isatty()  # a log is kept, and read by others
+    if at_terminal:
+        _say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {url}\n")
+    else:
+        _say(f"ready at {base}. {redirect} signs you in; the link is shown at a terminal only.")
     if plan.share:
-        _say(invitations_as_text(base, keys, trust))
+        _say(invitations_as_text(base, keys, trust, secret=not at_terminal))
     if plan.opens and _has_screen():
-        # Through a file that only this user can read: arguments of a browser are visible to all.
-        redirect = plan.data / "open.html"
-        redirect.touch(mode=0o600)
-        redirect.write_text(f'<!doctype html><meta http-equiv="refresh" content="0;url={url}">')
         webbrowser.open(redirect.as_uri())
-
-
-def _answers(url: str, trust: ssl.SSLContext | None) -> bool:
-    try:
-        with urllib.request.urlopen(url, timeout=1, context=trust) as answer:
-            return bool(answer.status == 200)
-    except (urllib.error.URLError, OSError):
-        return False
 
 
 def _has_screen() -> bool:

@@ -1,9 +1,11 @@
 """What a process is told when it starts: command line first, then the environment."""
 
 import os
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
+from urllib.parse import urlsplit
 
 import msgspec
 
@@ -12,6 +14,8 @@ from action_assistant.errors import CannotStart
 #: Every variable that this program reads, and what it is for.
 VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_TOKEN": "the token programs present; instead of the file in the data folder",
+    "ACTION_ASSISTANT_DATABASE": "the editor's database; where --database would show its password to "
+    "everybody on this computer",
     "ACTION_ASSISTANT_URL": "where the command line finds the editor (http://127.0.0.1:8000)",
     "ACTION_ASSISTANT_HOSTS": "more host names that may stand in the address bar, comma separated",
     "ACTION_ASSISTANT_RUNNER_PYTHON": "the Python that has rclpy; `serve` runs the runner under it",
@@ -73,6 +77,34 @@ def check_environment(environ: Mapping[str, str] = os.environ) -> None:
     if unknown:
         known = ", ".join(VARIABLES)
         raise CannotStart(f"Unknown setting {', '.join(unknown)}. Known are: {known}.")
+
+
+def database(environ: Mapping[str, str] = os.environ) -> str | None:
+    """The editor's, when the command line names none."""
+    return environ.get("ACTION_ASSISTANT_DATABASE") or None
+
+
+def hide_password() -> None:
+    """Start this program anew with what --database says in the environment, if a password is in it:
+    every user of a computer may read the arguments of every process."""
+    for at, word in enumerate(sys.orig_argv):
+        name, sign, url = word.partition("=")
+        taken = 1 if sign else 2
+        if not sign:
+            url = next(iter(sys.orig_argv[at + 1 : at + 2]), "")
+        if name == "--database" and _has_password(url):
+            rest = [*sys.orig_argv[1:at], *sys.orig_argv[at + taken :]]
+            os.environ["ACTION_ASSISTANT_DATABASE"] = url
+            sys.stderr.flush()
+            os.execv(sys.executable, [sys.orig_argv[0], *rest])
+
+
+def _has_password(url: str) -> bool:
+    try:
+        parsed = urlsplit(url)
+    except ValueError:
+        return False
+    return parsed.password is not None or "password=" in parsed.query
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:

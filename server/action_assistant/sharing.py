@@ -1,19 +1,23 @@
 """What `serve --share` prints: a link and a QR code for each role."""
 
 import io
+import ipaddress
+import secrets
 import ssl
 import urllib.error
 import urllib.request
+from http.client import HTTPException
 from typing import Any, Final
 
 import msgspec
 import segno
 
-from action_assistant.web.keys import Keys
+from action_assistant.web.keys import Keys, Proof
 from action_assistant.web.roles import may
 
 _ROLES: Final = ("viewer", "editor", "operator")
 _PATIENCE_S: Final = 10.0
+_PROOF: Final = 10_000  # bytes
 
 
 class Link(msgspec.Struct, frozen=True):
@@ -31,8 +35,11 @@ class Links(msgspec.Struct, frozen=True):
     invitations: list[Link]
 
 
-def invitations_as_text(base: str, keys: Keys, trust: ssl.SSLContext | None = None) -> str:
-    """The links of a running editor, made where a role has none yet; or why there are none."""
+def invitations_as_text(
+    base: str, keys: Keys, trust: ssl.SSLContext | None = None, *, secret: bool = False
+) -> str:
+    """The links of a running editor, made where a role has none yet; or why there are none. If they
+    are `secret`, only where they are to be found."""
     try:
         links = msgspec.json.decode(_ask(base, keys, trust, "GET"), type=Links)
         if not links.origins:
@@ -48,6 +55,10 @@ def invitations_as_text(base: str, keys: Keys, trust: ssl.SSLContext | None = No
                 found[role] = msgspec.json.decode(made, type=Link)
     except (OSError, urllib.error.URLError, msgspec.DecodeError) as error:
         return f"the links for others could not be made: {error}"
+    if secret:
+        return (
+            f"others come in at {links.origins[0]} by the links of `action-assistant people list`."
+        )
     return "\n".join(
         [
             "others on this network come in by these links; whoever has one may use it:",
@@ -56,6 +67,28 @@ def invitations_as_text(base: str, keys: Keys, trust: ssl.SSLContext | None = No
             *_warning(links.origins[0]),
         ]
     )
+
+
+def is_ours(base: str, keys: Keys, trust: ssl.SSLContext | None = None) -> bool:
+    """Whether what answers there knows the token, and is to be told it."""
+    challenge = secrets.token_urlsafe(32)
+    url = f"{base}/api/server?challenge={challenge}"
+    try:
+        with urllib.request.urlopen(url, timeout=1, context=trust) as answer:
+            proof = msgspec.json.decode(answer.read(_PROOF), type=Proof)
+    except (OSError, urllib.error.URLError, msgspec.DecodeError, HTTPException):
+        return False
+    host, _, port = base.partition("://")[2].rpartition(":")
+    at = f"{host.strip('[]')}:{port}"
+    return keys.proven(challenge, proof, at=at if _is_address(host.strip("[]")) else None)
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True
 
 
 def _warning(origin: str) -> list[str]:

@@ -18,6 +18,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from action_assistant.sharing import invitations_as_text
 from action_assistant.web.crowd import Pace
 from action_assistant.web.keys import Keys
 from action_assistant.web.revoked import Revoked
@@ -147,13 +148,24 @@ def closed(socket: ClientConnection) -> int | None:
     return socket.close_code
 
 
-def test_serve_prints_a_link_and_a_code_for_each_role(product: Product) -> None:
-    eventually(lambda: "Revoke a link" in product.log.read_text())
-    text = product.log.read_text()
+def test_serve_makes_a_link_for_each_role_and_says_where_they_are(product: Product) -> None:
+    """At a terminal it shows them; what else it writes to is kept, and read by others."""
+    eventually(lambda: "people list" in product.log.read_text())
     with product.editor() as editor:
         sharing = editor.get("/api/invitations").json()
     assert sharing["origins"] == [f"http://{LAB}:{product.port}"]
     assert sharing["secure"] is False
+    made = {each["role"]: each for each in sharing["invitations"]}
+    listed = product.cli("people", "list").stdout
+    for role in ("viewer", "editor", "operator"):
+        assert f"http://{LAB}:{product.port}{made[role]['path']}" in listed
+    assert "#i=" not in product.log.read_text()
+
+
+def test_links_are_shown_with_a_code_for_each_role(product: Product) -> None:
+    text = invitations_as_text(product.url, Keys(TOKEN))
+    with product.editor() as editor:
+        sharing = editor.get("/api/invitations").json()
     printed = {each["role"]: each for each in reversed(sharing["invitations"])}
     for role in ("viewer", "editor", "operator"):
         assert f"{role}: may " in text

@@ -16,7 +16,7 @@ import msgspec
 from action_assistant import places
 from action_assistant.errors import CannotStart
 from action_assistant.web.certificate import Certificate
-from action_assistant.web.keys import TOKEN_FILE
+from action_assistant.web.keys import Keys
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     import httpx
@@ -82,7 +82,7 @@ def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "http
         answer = client.request(method, path, **body)
     except httpx.HTTPError as error:
         raise CannotStart(
-            f"No answer from {error.request.url.copy_with(path='/', query=None)} ({error}). "
+            f"No answer from {error.request.url.copy_with(path='/', query=None, userinfo=b'')} ({error}). "
             "Is it running? Start it with `action-assistant serve`."
         ) from error
     if answer.is_error:
@@ -99,30 +99,20 @@ def _sentence(answer: "httpx.Response") -> str:
         return f"{answer.request.url} answered {answer.status_code}."
 
 
-def _token(data: Path) -> str:
-    token = os.environ.get("ACTION_ASSISTANT_TOKEN")
-    if token:
-        return token
-    try:
-        return (data / TOKEN_FILE).read_text().strip()
-    except OSError as error:
-        raise CannotStart(
-            f"No token in {data} ({error.strerror}); name the data folder of the server with "
-            "--data, or set ACTION_ASSISTANT_TOKEN."
-        ) from error
-
-
 @contextmanager
 def running(options: argparse.Namespace) -> Iterator[Server]:
     """The server that a command speaks to, with the token. Raises CannotStart, No."""
     import httpx
 
+    from action_assistant.commands.proven import AfterProof
+
     data = options.data.resolve()
     trust = Certificate(data).trusting_too()
-    headers = {"authorization": f"Bearer {_token(data)}"}
-    base = options.url or os.environ.get("ACTION_ASSISTANT_URL") or _here(trust)
+    named = options.url or os.environ.get("ACTION_ASSISTANT_URL")
+    token = AfterProof(Keys.known(data), supposed=not named)
+    base = named or _here(trust)
     with httpx.Client(
-        base_url=base, headers=headers, timeout=30, trust_env=False, verify=trust
+        base_url=base, auth=token, timeout=30, trust_env=False, verify=trust
     ) as client:
         config = _asked(client, "GET", "/api/config").json()
         yield Server(client, config["runner_url"])
@@ -140,7 +130,7 @@ def _here(trust: ssl.SSLContext) -> str:
 
 
 def print_json(value: object) -> None:
-    sys.stdout.buffer.write(msgspec.json.format(msgspec.json.encode(value)) + b"\n")
+    sys.stdout.write(msgspec.json.format(msgspec.json.encode(value)).decode() + "\n")
 
 
 def refused(error: No) -> int:

@@ -18,11 +18,12 @@ import msgspec
 from sqlalchemy import create_engine
 from sqlalchemy.exc import DBAPIError
 
-from action_assistant import places
+from action_assistant import places, settings
 from action_assistant.commands.processes import port_number
 from action_assistant.errors import CannotStart
 from action_assistant.interpreter import for_runner
 from action_assistant.journal.database import cause_of, database_of
+from action_assistant.plain import one_line
 from action_assistant.private import holds_nothing_else, open_to_others, prove_writable
 from action_assistant.runner import archive
 from action_assistant.runner.links.findings import Finding, Verdict
@@ -47,7 +48,10 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
     )
     doctor.add_argument(
-        "--database", metavar="URL", help="of the editor; default: sqlite, in the data folder"
+        "--database",
+        metavar="URL",
+        default=settings.database(),
+        help="of the editor; default: sqlite, in the data folder",
     )
     doctor.add_argument("--host", default="127.0.0.1", metavar="H", help="default: %(default)s")
     doctor.add_argument("--port", type=port_number, default=8000, metavar="N", help="default: 8000")
@@ -69,7 +73,7 @@ def _doctor(options: argparse.Namespace) -> int:
         print(msgspec.json.encode(found).decode())
     else:
         for each in found:
-            print(f"{_SIGNS[each.verdict]} {each.topic}: {each.what}")
+            print(one_line(f"{_SIGNS[each.verdict]} {each.topic}: {each.what}"))
             if each.advice:
                 print(f"    {each.advice}")
     return 1 if any(each.verdict == "wrong" for each in found) else 0

@@ -109,7 +109,7 @@ def _check(options: argparse.Namespace) -> int:
     graphs = _library(options.graphs) if options.graphs else None
     verdicts = [_verdict(path, facts, actions, graphs) for path in options.files]
     if options.json:
-        sys.stdout.buffer.write(msgspec.json.format(msgspec.json.encode(verdicts)) + b"\n")
+        sys.stdout.write(msgspec.json.format(msgspec.json.encode(verdicts)).decode() + "\n")
     else:
         for verdict in verdicts:
             _print(verdict)

@@ -5,7 +5,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
-from action_assistant import places
+from action_assistant import places, settings
 from action_assistant.errors import CannotStart, Unavailable
 from action_assistant.journal.chain import Damage
 from action_assistant.journal.database import Branch
@@ -37,7 +37,10 @@ def _where(parser: argparse.ArgumentParser) -> None:
         "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
     )
     parser.add_argument(
-        "--database", metavar="URL", help="of the editor; default: sqlite, in the data folder"
+        "--database",
+        metavar="URL",
+        default=settings.database(),
+        help="of the editor; default: sqlite, in the data folder",
     )
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from action_assistant.commands.client import No, Server, command, print_json, refused, running
 from action_assistant.errors import CannotStart, Refused
+from action_assistant.plain import one_line
 from action_assistant.private import own_folder
 from action_assistant.web.revoked import Revoked
 
@@ -67,9 +68,10 @@ def _invite(options: argparse.Namespace) -> int:
 def _show(origins: list[str], invitation: dict[str, Any]) -> None:
     label = f"  {invitation['label']}" if invitation["label"] else ""
     over = "  (revoked)" if "revoked_at" in invitation else ""
-    print(f"{invitation['id']}  {invitation['role']}{label}{over}")
+    print(one_line(f"{invitation['id']}  {invitation['role']}{label}{over}"))
     for guest in invitation["guests"]:
-        print(f"    {guest['person']['name'] or 'somebody without a name'}, since {guest['at']}")
+        who = one_line(guest["person"]["name"]) or "somebody without a name"
+        print(f"    {who}, since {guest['at']}")
     if "path" in invitation:
         for origin in origins[:1]:
             print(f"    {origin}{invitation['path']}")

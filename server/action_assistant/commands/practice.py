@@ -12,6 +12,7 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.errors import CannotStart
+from action_assistant.plain import one_line
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Gone, Index, Line, Quirks, Said, index_of
 from action_assistant.umrf.facts import PINNED, facts_for
@@ -117,7 +118,7 @@ def _simulate_robot(options: argparse.Namespace) -> int:
 def _tell(said: Said) -> None:
     match said:
         case Line(at_ms=at, text=text):
-            print(f"{at / 1000:10.3f} s  {text.rstrip()}", flush=True)
+            print(f"{at / 1000:10.3f} s  {one_line(text.rstrip())}", flush=True)
         case Gone(why=why):
             print(f"The engine has ended: {why}.", file=sys.stderr, flush=True)
         case _:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from action_assistant import places, settings
 from action_assistant.errors import CannotStart
+from action_assistant.plain import PlainLog
 from action_assistant.private import own_folder
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
@@ -85,7 +86,10 @@ def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
 
 def _database(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--database", metavar="URL", help="of the editor; default: sqlite, in the data folder"
+        "--database",
+        metavar="URL",
+        default=settings.database(),
+        help="of the editor; default: sqlite, in the data folder",
     )
 
 
@@ -123,12 +127,12 @@ def _identity(
     return Identity(Certificate(chosen.data), addresses.certified)
 
 
-def _log() -> None:
-    logging.basicConfig(
-        level=logging.INFO,
-        stream=sys.stderr,
-        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
-    )
+def _log(data: Path) -> None:
+    from action_assistant.web.keys import Keys
+
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(PlainLog(Keys.of(data).token))
+    logging.basicConfig(level=logging.INFO, handlers=[handler])
     logging.getLogger("uvicorn.error").setLevel(logging.WARNING)
     logging.getLogger("httpx").setLevel(logging.WARNING)
 
@@ -171,8 +175,9 @@ def _editor(options: argparse.Namespace) -> int:
     from action_assistant.editor.app import create_app
     from action_assistant.web.listen import serve as listen
 
-    _log()
-    chosen = _editor_settings(options, own_folder(options.data.resolve()))
+    data = own_folder(options.data.resolve())
+    _log(data)
+    chosen = _editor_settings(options, data)
     listen(
         lambda: create_app(chosen),
         host=chosen.host,
@@ -186,8 +191,8 @@ def _runner(options: argparse.Namespace) -> int:
     from action_assistant.runner.app import create_app
     from action_assistant.web.listen import serve as listen
 
-    _log()
     data = own_folder(options.data.resolve())
+    _log(data)
     chosen = settings.RunnerSettings(
         data=data,
         host=_host(options),
@@ -209,6 +214,7 @@ def _runner(options: argparse.Namespace) -> int:
 
 
 def _migrate(options: argparse.Namespace) -> int:
+    from action_assistant.journal.database import database_of
     from action_assistant.journal.migrate import Branch, migrate
 
     data = own_folder(options.data.resolve())
@@ -216,5 +222,6 @@ def _migrate(options: argparse.Namespace) -> int:
     urls: dict[Branch, str] = {"editor": database, "runner": f"sqlite:///{data / 'runner.db'}"}
     for branch, url in urls.items():
         revision = migrate(url, branch)
-        print(f"{branch}: {url} is at revision {revision}")
+        name = database_of(url).name.removeprefix("The database ")
+        print(f"{branch}: {name} is at revision {revision}")
     return 0

@@ -12,6 +12,7 @@ import msgspec
 from action_assistant.commands import archives
 from action_assistant.commands.client import No, Server, command, print_json, refused, running
 from action_assistant.errors import CannotStart
+from action_assistant.plain import one_line
 
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _POLL: Final = 0.2  # seconds
@@ -108,7 +109,7 @@ def _import(options: argparse.Namespace) -> int:
             except No as error:
                 code = refused(No(f"{path}: {error}"))
                 continue
-            print(f"{made['id']}  {made['name']}")
+            print(one_line(f"{made['id']}  {made['name']}"))
     return code
 
 
@@ -134,7 +135,7 @@ def _graphs(options: argparse.Namespace) -> int:
         print_json(graphs)
         return 0
     for graph in graphs:
-        print(f"{graph['id']}  {graph['updated_at'][:19]}  {graph['name']}")
+        print(one_line(f"{graph['id']}  {graph['updated_at'][:19]}  {graph['name']}"))
     return 0
 
 
@@ -167,7 +168,7 @@ def _runs(options: argparse.Namespace) -> int:
     for run in runs:
         what = run["state"] + (f" ({run['result']})" if run["result"] else "")
         when = (run["started_at"] or "")[:19]
-        print(f"{run['id']}  {when}  {run['graph_name']}  {run['engine']}  {what}")
+        print(one_line(f"{run['id']}  {when}  {run['graph_name']}  {run['engine']}  {what}"))
     return 0
 
 
@@ -208,7 +209,7 @@ def _watch(server: Server, run: str) -> int:
         for name, action in now["actions"].items():
             if seen.get(name) != action["state"]:
                 seen[name] = action["state"]
-                print(f"{name}: {action['state']}", flush=True)
+                print(one_line(f"{name}: {action['state']}"), flush=True)
         if now["state"] in _ENDED:
             code, words = verdict(now)
             print(words)
@@ -234,7 +235,7 @@ def _at_rest(options: argparse.Namespace) -> int:
             run = server.runner("POST", path, json={"how": options.how}).json()
         except No as error:
             return refused(error)
-    print(f"run {run['number']} of {run['graph_name']} is over: {run['state']}")
+    print(one_line(f"run {run['number']} of {run['graph_name']} is over: {run['state']}"))
     return 0
 
 
@@ -281,11 +282,11 @@ def _stop(options: argparse.Namespace) -> int:
         except No as error:
             return refused(error)
     for run in unproven:
-        print(
+        said = (
             f"STOP UNCONFIRMED for run {run['number']} of {run['graph_name']}: it is "
-            f"{run['state']}. {_why(run)}Look at the robot; use its hardware stop.",
-            file=sys.stderr,
+            f"{run['state']}. {_why(run)}Look at the robot; use its hardware stop."
         )
+        print(one_line(said), file=sys.stderr)
     if not unproven:
         print("stopped" if stopping else "nothing was running")
     return 1 if unproven else 0

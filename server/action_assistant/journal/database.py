@@ -88,7 +88,8 @@ def database_of(url: str) -> Database:
     try:
         parsed = make_url(url)
     except ArgumentError as error:
-        raise CannotStart(f"{url!r} is not a database URL such as sqlite:///editor.db.") from error
+        # Not quoted: a password may be what is wrong with it.
+        raise CannotStart("--database is not a URL such as sqlite:////data/editor.db.") from error
     if parsed.drivername in {"postgresql", "postgres"} and parsed.database:
         from action_assistant.journal.postgres import Postgres
 

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import msgspec
 from litestar import Litestar, MediaType, Request, Response, get
@@ -13,13 +13,14 @@ from litestar.handlers.base import BaseRouteHandler
 from litestar.openapi import OpenAPIConfig
 from litestar.openapi.plugins import JsonRenderPlugin
 from litestar.openapi.spec import Components, SecurityScheme
+from litestar.params import Parameter
 from litestar.routes import HTTPRoute
 from litestar.types import ASGIApp, ControllerRouterHandler, Receive, Scope, Send
 
 from action_assistant.version import VERSION
 from action_assistant.web.access import Access, Needs, require
 from action_assistant.web.addresses import Addresses, host_name
-from action_assistant.web.keys import Keys
+from action_assistant.web.keys import Keys, Proof
 from action_assistant.web.page import Page
 from action_assistant.web.problems import problem_handlers
 from action_assistant.web.revoked import Revoked
@@ -28,7 +29,9 @@ from action_assistant.web.roles import Deed
 log: Final = logging.getLogger(__name__)
 
 BODY_LIMIT: Final = 10_000_000  # bytes; a graph file of 10 MB is refused with 413
-_OPEN: Final = frozenset({"/healthz", "/readyz", "/api/session", "/api/session/invitation"})
+_OPEN: Final = frozenset(
+    {"/healthz", "/readyz", "/api/session", "/api/session/invitation", "/api/server"}
+)
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
@@ -64,7 +67,7 @@ def application(
     decisions: dict[tuple[str, str], Deed] = {}
     api = _OpenApiText(decisions)
     inner = Litestar(
-        [*route_handlers, *_health(ready, measures)],
+        [*route_handlers, *_health(ready, measures), _proving(keys)],
         guards=[_undecided],
         exception_handlers=problem_handlers(),
         lifespan=list(lifespan),
@@ -190,6 +193,21 @@ def _openapi(title: str, api: _OpenApiText) -> OpenAPIConfig:
         components=Components(security_schemes=schemes),
         security=[{"token": []}],
     )
+
+
+def _proving(keys: Keys) -> ControllerRouterHandler:
+    keys.prove("", "")  # takes a moment, once
+
+    @get("/api/server", summary="That this server knows the token, before anybody shows it")
+    async def prove(
+        request: Request[Any, Any, Any],
+        challenge: Annotated[str, Parameter(min_length=20, max_length=100)],
+    ) -> Response[Proof]:
+        host, port = request.scope.get("server") or ("", 0)
+        proof = keys.prove(challenge, f"{host}:{port}")
+        return Response(proof, headers={"cache-control": "no-store"})
+
+    return prove
 
 
 def _health(ready: Check | None, measures: Measures | None) -> list[ControllerRouterHandler]:

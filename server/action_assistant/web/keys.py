@@ -12,6 +12,7 @@ import hmac
 import os
 import secrets
 import time
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
@@ -66,20 +67,51 @@ class Sealed(msgspec.Struct, frozen=True, array_like=True):
     invitation: str | None = None
 
 
-class Keys:
-    """Checks tokens and seals sessions."""
+class Proof(msgspec.Struct, frozen=True):
+    """That a server knows the token: an HMAC over a challenge and the address, `HOST:PORT`, at which
+    the connection was taken."""
 
-    def __init__(self, token: str) -> None:
+    address: str
+    proof: str
+
+
+class Keys:
+    """Checks tokens and seals sessions. `origin` is where a token was found, for people."""
+
+    def __init__(self, token: str, origin: str = "The token") -> None:
         if len(token) < _MIN_TOKEN:
-            raise CannotStart(f"The token must have at least {_MIN_TOKEN} characters.")
+            what = "is empty" if not token else f"has {len(token)} characters"
+            raise CannotStart(
+                f"{origin} {what}; a token must have at least {_MIN_TOKEN} characters. Without one, "
+                "the next start makes it; links and sessions of another one end."
+            )
         self.token: Final = token
         self._seal: Final = hashlib.sha256(b"action-assistant session\0" + token.encode()).digest()
 
     @classmethod
     def of(cls, data: Path) -> "Keys":
         """The keys of a data folder; made when it has none. The environment's token wins."""
+        return cls._given() or cls(_token_in(data), _named(data))
+
+    @classmethod
+    def known(cls, data: Path) -> "Keys":
+        """The keys of a data folder that has some, as `of` would find them. Raises CannotStart."""
+        given = cls._given()
+        if given is not None:
+            return given
+        try:
+            return cls((data / TOKEN_FILE).read_text().strip(), _named(data))
+        except (OSError, UnicodeDecodeError) as error:
+            why = error.strerror if isinstance(error, OSError) else "it is no text"
+            raise CannotStart(
+                f"No token in {data} ({why}); name the data folder of the server with --data, or "
+                "set ACTION_ASSISTANT_TOKEN."
+            ) from error
+
+    @classmethod
+    def _given(cls) -> "Keys | None":
         given = os.environ.get("ACTION_ASSISTANT_TOKEN")
-        return cls(given or _token_in(data))
+        return cls(given, "ACTION_ASSISTANT_TOKEN") if given else None
 
     def opens(self, token: str) -> bool:
         """Whether this is the token."""
@@ -103,6 +135,27 @@ class Keys:
     def secret_of(self, invitation: str) -> str:
         """The secret of a link (256 bit): only who knows the token can tell it from the id."""
         return _text(hmac.digest(self._seal, b"invitation\0" + invitation.encode(), "sha256"))
+
+    def prove(self, challenge: str, address: str) -> Proof:
+        """For a client that is to show us the token."""
+        return Proof(address, self._proof(challenge, address))
+
+    def proven(self, challenge: str, proof: Proof, *, at: str | None = None) -> bool:
+        """Whether somebody else knows the token; `at` which address, if it has to be that one."""
+        if at is not None and proof.address != at:
+            return False
+        expected = self._proof(challenge, proof.address)
+        return hmac.compare_digest(expected.encode(), proof.proof.encode(errors="replace"))
+
+    def _proof(self, challenge: str, address: str) -> str:
+        text = f"{challenge}\0{address}".encode(errors="replace")
+        return _text(hmac.digest(self._proving, text, "sha256"))
+
+    @cached_property
+    def _proving(self) -> bytes:
+        """Strangers may ask for proofs: a token that somebody thought of must be slow to guess."""
+        salt = b"action-assistant server"
+        return hashlib.scrypt(self.token.encode(), salt=salt, n=1 << 14, r=8, p=1, dklen=32)
 
     def sealed(self, session: Session) -> str:
         """The cookie's value."""
@@ -134,6 +187,10 @@ def _text(raw: bytes) -> str:
     return base64.urlsafe_b64encode(raw).rstrip(b"=").decode()
 
 
+def _named(data: Path) -> str:
+    return f"The token in {data / TOKEN_FILE}"
+
+
 def _token_in(data: Path) -> str:
     """The token kept in a folder. Two processes may ask at once: the first file to appear wins."""
     file = data / TOKEN_FILE
@@ -150,5 +207,6 @@ def _token_in(data: Path) -> str:
             finally:
                 fresh.unlink()
         return file.read_text().strip()
-    except OSError as error:
-        raise CannotStart(f"Cannot keep the token in {data}: {error.strerror}.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else f"{file} is no text"
+        raise CannotStart(f"Cannot keep the token in {data}: {why}.") from error
