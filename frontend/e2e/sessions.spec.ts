@@ -93,3 +93,19 @@ test("the pasted link signs in again in place", async ({ browser }) => {
   expect(await page.evaluate(() => Reflect.get(window, "samePage"))).toBe(true);
   await context.close();
 });
+
+test("signing out ends the session everywhere, also for a copy of its cookie", async ({
+  browser,
+}) => {
+  const { page, context } = await product.person(browser, "Ada");
+  const cookies = (await context.cookies()).map((each) => `${each.name}=${each.value}`).join("; ");
+  const asked = (url: string) => fetch(url, { headers: { cookie: cookies } });
+  const places = [`${product.url}/api/graphs`, `${product.runnerUrl}/api/runs`];
+  for (const place of places) expect((await asked(place)).status).toBe(200);
+  await page.getByRole("button", { name: /^You are Ada/ }).click();
+  await page.getByRole("button", { name: "Sign out" }).click();
+  await expect(page.getByLabel("Link or token")).toBeVisible();
+  expect((await context.cookies()).filter((each) => each.name.startsWith("aa_"))).toEqual([]);
+  for (const place of places) expect((await asked(place)).status).toBe(401);
+  await context.close();
+});

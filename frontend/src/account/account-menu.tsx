@@ -11,11 +11,12 @@ import {
   UnstyledButton,
   useMantineColorScheme,
 } from "@mantine/core";
-import { IconDeviceDesktop, IconMoon, IconShare, IconSun } from "@tabler/icons-react";
+import { IconDeviceDesktop, IconLogout, IconMoon, IconShare, IconSun } from "@tabler/icons-react";
 import { useState } from "react";
 import { sentence } from "../api/http";
 import { usePerson } from "../api/person";
-import { ROLE_WORDS, rememberedName } from "../api/session";
+import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
+import { useLive } from "../api/use-live";
 import { initials, personColor } from "../ui/robot";
 
 const schemes = [
@@ -27,6 +28,7 @@ const schemes = [
 /** `onShare` for who may: the bar of a narrow screen has no room for a button of its own. */
 export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
   const { person, rename } = usePerson();
+  const { runner } = useLive();
   const [open, setOpen] = useState(false);
   const [name, setName] = useState(rememberedName() || person.name);
   const [problem, setProblem] = useState("");
@@ -35,6 +37,14 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
     try {
       await rename(name.trim());
       setOpen(false);
+    } catch (error) {
+      setProblem(sentence(error));
+    }
+  };
+  const leave = async () => {
+    try {
+      await signOut(runner);
+      location.reload();
     } catch (error) {
       setProblem(sentence(error));
     }
@@ -110,6 +120,13 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
                 onChange={(value) => setColorScheme(value as "light" | "dark" | "auto")}
               />
             </div>
+            <Button
+              variant="default"
+              leftSection={<IconLogout size={15} aria-hidden />}
+              onClick={() => void leave()}
+            >
+              Sign out
+            </Button>
           </Stack>
         </form>
       </Popover.Dropdown>

@@ -69,6 +69,16 @@ export async function currentPerson(): Promise<Person> {
   return (await ask<SessionAnswer>("/api/session")).person;
 }
 
+/** Ends the session at the editor, and at a runner that has a data folder of its own: each ends it by
+ * itself, so one that cannot be reached is told by the other. Throws when neither could. */
+export async function signOut(runner: string | undefined): Promise<void> {
+  const places = ["", ...(runner === undefined ? [] : [runner])];
+  const told = places.map((place) => ask(`${place}/api/session`, { method: "DELETE" }));
+  const outcomes = await Promise.allSettled(told);
+  const failed = outcomes.find((each) => each.status === "rejected");
+  if (failed && !outcomes.some((each) => each.status === "fulfilled")) throw failed.reason;
+}
+
 /** The same session under another name. */
 export async function rename(name: string): Promise<Person> {
   const answer = await ask<SessionAnswer>("/api/session", { method: "POST", body: { name } });
