@@ -58,6 +58,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     door = Door()
     revoked = Revoked(settings.data)
     browsers = SignedInBrowsers(settings.data, revoked)
+    browsers.every()  # forgets those that are over
     addresses = addresses_of(
         host=settings.host,
         page_port=settings.port,

@@ -26,6 +26,7 @@ import anyio
 from anyio import CapacityLimiter, to_thread
 
 from action_assistant.errors import TooLarge, TooMany, Unavailable
+from action_assistant.plain import make_streams_plain
 from action_assistant.web.access import Caller, caller
 
 log: Final = logging.getLogger(__name__)
@@ -257,6 +258,7 @@ def child(work: Callable[..., None], *args: Any, name: str, nice: int) -> ForkSe
 
 def _humbly(work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
     """In the process: others first, when time or memory runs short."""
+    make_streams_plain()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the runner, which ends us
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(OSError):

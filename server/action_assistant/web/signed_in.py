@@ -22,6 +22,7 @@ from action_assistant.web.revoked import Revoked
 log: Final = logging.getLogger(__name__)
 
 FOLDER: Final = "sessions"
+_MOST: Final = 5000  # that one process notes: somebody may sign in again and again
 
 
 class OpenSession(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -45,7 +46,7 @@ class SignedInBrowsers:
 
     def note(self, session: Session) -> None:
         """Remember one. Without room for that nothing fails."""
-        if self._noted.get(session.id) == session:
+        if self._noted.get(session.id) == session or len(self._noted) >= _MOST:
             return
         path = self._path(session.id)
         part = path.with_suffix(".part")
