@@ -58,6 +58,9 @@ class Database(Protocol):
     def open(self, branch: Branch) -> Session:
         """Become the only writer, migrate, connect. Raises CannotStart."""
 
+    def look(self, question: Callable[[Connection], object]) -> None:
+        """Ask what is there already, before anything is made or altered. Raises CannotStart."""
+
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
         """Run a change of the schema in one transaction. Raises CannotStart."""
 

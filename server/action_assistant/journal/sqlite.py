@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final, TypeVar
+from urllib.parse import quote
 
 from sqlalchemy import Connection, Engine, NullPool, QueuePool, create_engine, event
 from sqlalchemy.exc import (
@@ -23,7 +24,7 @@ from action_assistant.journal.chain import Head
 from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.events import Event
 from action_assistant.journal.lock import own as own
-from action_assistant.journal.migrate import upgrade_to
+from action_assistant.journal.migrate import recognize, upgrade_to
 from action_assistant.private import opener
 
 T = TypeVar("T")
@@ -134,12 +135,27 @@ class Sqlite:
 
     def open(self, branch: Branch) -> SqliteSession:
         """Lock the file for this process, since two writers of one log would tear it; migrate."""
+        self.look(recognize)
         self._lock = own(self._path)
         self.migrate(upgrade_to(branch))
         try:
             return self.connect()
         except self.faults as error:
             raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
+
+    def look(self, question: Callable[[Connection], object]) -> None:
+        """Ask what is in the file, if there is one. To open one as ours would already change it: its
+        log is another one from then on."""
+        if not self._path.exists():
+            return
+        engine = create_engine(unchanged(self._path), module=self._driver, poolclass=NullPool)
+        try:
+            with engine.connect() as connection:
+                question(connection)
+        except self.faults as error:
+            raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
+        finally:
+            engine.dispose()
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
         """Run a change of the schema in one transaction. Raises CannotStart."""
@@ -228,6 +244,14 @@ def sqlite_engine(path: Path, *, wait: float, **options: Any) -> Engine:
         connection.exec_driver_sql("BEGIN IMMEDIATE")
 
     return engine
+
+
+def unchanged(path: Path) -> str:
+    """The URL of a file that is only read. Where nothing waits in a log beside it, no lock and no
+    index of a log is made either."""
+    log = path.with_name(f"{path.name}-wal")
+    waits = log.exists() and log.stat().st_size > 0
+    return f"sqlite:///file:{quote(str(path))}?uri=true&" + ("mode=ro" if waits else "immutable=1")
 
 
 def _reading(path: Path, driver: Any) -> Engine:
