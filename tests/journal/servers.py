@@ -74,6 +74,23 @@ class Server:
         self._run("psql", "-q", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(self.port),
                   "-U", "aa", "-d", database, "-c", text)  # fmt: skip
 
+    @property
+    def binaries(self) -> Path:
+        """Where this server's programs are."""
+        return self._bin
+
+    @property
+    def home(self) -> Path:
+        """A folder that this server can read."""
+        return self._home
+
+    def load(self, dump: Path) -> str:
+        """The URL of a new database with what a dump holds."""
+        url = self.new_database()
+        self._run("psql", "-q", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(self.port),
+                  "-U", "aa", "-d", url.rpartition("/")[2], "-f", str(dump))  # fmt: skip
+        return url
+
     def _ctl(self, command: str, *options: str) -> None:
         self._run("pg_ctl", command, "-w", "-s", "-t", "60", "-D", str(self._data), *options)
 

@@ -93,6 +93,11 @@ class Inspector:
         self._gone += max(0, end.seq - here.seq)
         self._heads[stream] = end
 
+    @property
+    def damage(self) -> Damage | None:
+        """Something that is wrong with what was seen so far; None when nothing is."""
+        return next(iter(self._damages.values()), None)
+
     def findings(self, heads: Mapping[str, Head] | None) -> list[Damage]:
         """The first damage of each stream. `heads`: what the database says their ends are."""
         if self._missing != self._gone and self._gap is not None and not self._damages:

@@ -73,6 +73,10 @@ class Database(Protocol):
     async def ask(self, question: Callable[[Connection], T]) -> T:
         """Read, without waiting for the writer."""
 
+    async def at_one_moment(self, question: Callable[[Connection], T]) -> T:
+        """Read much of it, all as it was at one moment, while others write. Changes nothing, also
+        nothing of an older version."""
+
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
         """Some stored events with their chain as they stand, and from where to go on."""
 

@@ -17,7 +17,7 @@ from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.follower import Follower
 from action_assistant.journal.migrate import BRANCHES
 from action_assistant.journal.reader import Reader, body_of, following, seal_of
-from action_assistant.journal.removal import STREAM, Removed, delete_some
+from action_assistant.journal.removal import STREAM, Removed, delete_some, taken_out
 from action_assistant.journal.tables import LOG, editor_head, editor_snapshot
 from action_assistant.journal.writer import Job, Outcome, Pen, Writer
 
@@ -134,18 +134,20 @@ class Journal(Reader):
 
         return await self._write(again)
 
-    async def verify(self) -> list[Damage]:
+    async def verify(self, tell: Callable[[int], None] = lambda _: None) -> list[Damage]:
         """What is wrong with the log: the first damaged event of each stream, none when all is well.
 
-        Finds every change of a stored event and every one that is missing. Raises Unavailable.
+        Finds every change of a stored event and every one that is missing. `tell` hears how many
+        events have been looked at. Raises Unavailable.
         """
-        inspector = Inspector(_taken_out)
+        inspector = Inspector(taken_out)
         after = 0
         try:
             while True:
                 rows, after = await self._ask(partial(self._database.scan, after=after))
                 for row in rows:
                     inspector.see(row)
+                tell(inspector.seen)
                 if not rows:
                     break
             ends = await self.query(select(_head.stream, _head.seq, _head.chain))
@@ -236,10 +238,3 @@ class Journal(Reader):
                 if each.position > last:
                     last = each.position
                     yield each
-
-
-def _taken_out(event: Event) -> tuple[str, Head] | None:
-    if event.stream != STREAM or event.kind != Removed.kind:
-        return None
-    removed = msgspec.json.decode(event.body, type=Removed)
-    return removed.stream, removed.end

@@ -18,7 +18,7 @@ from action_assistant.journal.database import Branch as Branch
 from action_assistant.journal.database import database_of
 from action_assistant.journal.events import Event
 
-BRANCHES: Final[dict[str, MetaData]] = {"editor": tables.EDITOR, "runner": tables.RUNNER}
+BRANCHES: Final[dict[Branch, MetaData]] = {"editor": tables.EDITOR, "runner": tables.RUNNER}
 #: How our revisions are named, also those of versions to come.
 _OURS: Final = re.compile(rf"({'|'.join(BRANCHES)})_\d+")
 _VERSIONS: Final = "alembic_version"

@@ -216,6 +216,14 @@ class Postgres:
         async with self._readers.connect() as connection:
             return await connection.run_sync(question)
 
+    async def at_one_moment(self, question: Callable[[Connection], T]) -> T:
+        """Read in one transaction, which sees nothing of what others commit meanwhile."""
+        async with self._readers.connect() as connection:
+            await connection.execution_options(
+                isolation_level="REPEATABLE READ", postgresql_readonly=True
+            )
+            return await connection.run_sync(question)
+
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
         """Stored events with their chain."""
         columns = editor_event.c

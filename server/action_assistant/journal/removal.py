@@ -12,6 +12,7 @@ from sqlalchemy import Connection, delete, func, select
 
 from action_assistant.errors import Conflict
 from action_assistant.journal.chain import Head
+from action_assistant.journal.events import Event
 from action_assistant.journal.tables import editor_event, editor_snapshot
 
 #: The stream of all removals.
@@ -34,6 +35,14 @@ class Removed(msgspec.Struct, frozen=True):
     def end(self) -> Head:
         """Where the stream ended."""
         return Head(self.seq, bytes.fromhex(self.chain))
+
+
+def taken_out(event: Event) -> tuple[str, Head] | None:
+    """Which stream an event says was taken out, and where that ended."""
+    if event.stream != STREAM or event.kind != Removed.kind:
+        return None
+    removed = msgspec.json.decode(event.body, type=Removed)
+    return removed.stream, removed.end
 
 
 def delete_some(connection: Connection, stream: str, by: int) -> bool:

@@ -196,6 +196,18 @@ class Sqlite:
 
         return await asyncio.get_running_loop().run_in_executor(self._threads, asked)
 
+    async def at_one_moment(self, question: Callable[[Connection], T]) -> T:
+        """Read in one transaction."""
+
+        def asked(connection: Connection) -> T:
+            connection.exec_driver_sql("BEGIN")
+            try:
+                return question(connection)
+            finally:
+                connection.exec_driver_sql("ROLLBACK")
+
+        return await self.ask(asked)
+
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
         """Stored events as they stand, also where text has become unreadable."""
         raw: Any = connection.connection.dbapi_connection
