@@ -11,7 +11,7 @@ from action_assistant.errors import CannotStart
 
 #: What this program puts into a data folder.
 _OURS: Final = re.compile(
-    r"(editor|runner)\.(db|mark).*|token|\.token-.*|\.probe-.*|open\.html"
+    r"(editor|runner)\.(database|db|mark).*|restore\.unfinished|token|\.token-.*|\.probe-.*|open\.html"
     r"|revoked|sessions|tls|archive|recordings|before-restore-.*|\.backup-.*"
 )
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO

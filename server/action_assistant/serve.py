@@ -36,6 +36,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 
     data: Path
     database: str | None
+    switch_database: bool
     host: str
     port: int
     share: bool
@@ -168,6 +169,7 @@ def _children(plan: Plan) -> list[Child]:
     address = ["--data", str(plan.data), "--host", plan.host]
     address += [flag for flag, on in (("--share", plan.share), ("--tls", plan.tls)) if on]
     database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}
+    switch = ["--switch-database"] if plan.switch_database else []
     ports = str(plan.port), str(plan.port + 1)
     this = Interpreter(path=Path(sys.executable), origin="this")
     speaking = for_runner()
@@ -176,7 +178,7 @@ def _children(plan: Plan) -> list[Child]:
     return [
         Child(
             "editor",
-            ["editor", *address, "--port", ports[0], "--runner-port", ports[1]],
+            ["editor", *address, *switch, "--port", ports[0], "--runner-port", ports[1]],
             plan.port,
             this,
             database,

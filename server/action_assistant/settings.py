@@ -10,6 +10,7 @@ from urllib.parse import urlsplit
 import msgspec
 
 from action_assistant.errors import CannotStart
+from action_assistant.private import own_folder
 
 #: Every variable that this program reads, and what it is for.
 VARIABLES: Final[Mapping[str, str]] = {
@@ -27,6 +28,8 @@ VARIABLES: Final[Mapping[str, str]] = {
 }
 #: The folder of archives, inside the data folder.
 ARCHIVE: Final = "archive"
+#: Stands in a data folder while `restore` puts things into it.
+RESTORING: Final = "restore.unfinished"
 #: The host that stands for every address of this computer, of both families.
 EVERYWHERE: Final = "*"
 LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
@@ -44,6 +47,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     limits: bool = True
     share: bool = False
     tls: bool = False
+    switch_database: bool = False
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -147,4 +151,19 @@ def check_host(host: str, hosts: tuple[str, ...], *, share: bool = False) -> Non
             f"Listening on {host} would show this computer's graphs and robots to the network. "
             "Use --share to do that on purpose, or name the addresses that people may use in "
             "ACTION_ASSISTANT_HOSTS."
+        )
+
+
+def data_folder(path: Path) -> Path:
+    """A data folder, made if need be, proven writable and closed to other users. Raises CannotStart."""
+    settled(path)
+    return own_folder(path)
+
+
+def settled(path: Path) -> None:
+    """Raise CannotStart for a folder that holds half of a backup."""
+    if (path / RESTORING).exists():
+        raise CannotStart(
+            f"A restore into {path} was interrupted, so that it holds parts of a backup: run "
+            "`action-assistant restore` again."
         )

@@ -133,7 +133,7 @@ async def test_a_damaged_journal_is_not_copied(ways: tuple[str, str], harm: str)
     source, target = ways
     await filled(source)
     await asyncio.to_thread(database_of(source).migrate, lambda c: c.execute(text(harm)))
-    with pytest.raises(CannotStart, match="The journal is damaged: .*event [0-9]+"):
+    with pytest.raises(CannotStart, match=r"The journal is damaged: .*event [0-9]+"):
         await asyncio.to_thread(copied, source, target)
     assert (await everything(target))[0] == []
 

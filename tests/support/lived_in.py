@@ -4,6 +4,7 @@ archives. And what it answers about all of that, so that it can be asked again l
 import contextlib
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
+from functools import partial
 from typing import Any, Final, Self
 
 import httpx
@@ -22,14 +23,20 @@ _PATROL: Final[dict[str, Any]] = {
     "graph_exit": [{"name": "Back", "instance_id": 0}],
     "actions": [
         {
-            **{"name": "Go", "instance_id": 0, "type": "sync"},
+            "name": "Go",
+            "instance_id": 0,
+            "type": "sync",
             "children": [{"name": "Back", "instance_id": 0}],
         },
         {
-            **{"name": "Back", "instance_id": 0, "type": "sync"},
+            "name": "Back",
+            "instance_id": 0,
+            "type": "sync",
             "parents": [
                 {
-                    **{"name": "Go", "instance_id": 0, "required": True},
+                    "name": "Go",
+                    "instance_id": 0,
+                    "required": True,
                     "conditions": ["on_true -> run", "on_false -> run"],
                 }
             ],
@@ -90,16 +97,20 @@ async def live(product: Product, token: str) -> list[str]:
             Guest(product, "Eve", {"invitation": proofs["gone"]}),
         ):
             editor.post(f"/api/invitations/{links['gone']['id']}/revoke").raise_for_status()
-            await _draw(editor, ann, ben)
+            graphs = _made(editor)
+            await _draw(editor, graphs, ann, ben)
+            _published(editor, graphs, ann, ben)
         _run(editor, runner)
     return [proofs["team"], proofs["visitors"]]
 
 
-async def _draw(editor: httpx.Client, ann: Guest, ben: Guest) -> None:
-    graphs = [
-        editor.post("/api/graphs", json=body).json()["id"]
-        for body in (_PATROL, {"name": "dock 🤖"}, {"name": "forgotten"})
-    ]
+def _made(editor: httpx.Client) -> list[str]:
+    """Three graphs."""
+    bodies: tuple[dict[str, Any], ...] = (_PATROL, {"name": "dock 🤖"}, {"name": "forgotten"})
+    return [editor.post("/api/graphs", json=body).json()["id"] for body in bodies]
+
+
+async def _draw(editor: httpx.Client, graphs: list[str], ann: Guest, ben: Guest) -> None:
     for number, (guest, graph) in enumerate(((ann, graphs[0]), (ben, graphs[0]), (ben, graphs[1]))):
         async with guest.drawing(graph) as doc:
             actions = doc.get("actions", type=Map)
@@ -107,7 +118,11 @@ async def _draw(editor: httpx.Client, ann: Guest, ben: Guest) -> None:
                 aid = f"aid{number}{n}".ljust(12, "x")
                 actions[aid] = f"Work{number}"
                 doc.get("comments", type=Map)[f"t{number}/m{n}"] = f'"comment {n} of {number}"'
-        _eventually(lambda g=graph, n=number: _has(editor, g, f"Work{n}"))
+        _eventually(partial(_has, editor, graph, f"Work{number}"))
+
+
+def _published(editor: httpx.Client, graphs: list[str], ann: Guest, ben: Guest) -> None:
+    """Two versions, another name, and one graph less."""
     ann.http.post(f"/api/graphs/{graphs[0]}/versions", json={"label": "first"}).raise_for_status()
     editor.patch(f"/api/graphs/{graphs[0]}", json={"name": "patrol north"}).raise_for_status()
     ben.http.post(f"/api/graphs/{graphs[0]}/versions", json={"label": "second"}).raise_for_status()
@@ -131,17 +146,21 @@ def _run(editor: httpx.Client, runner: httpx.Client) -> None:
     runs = {}
     for name, behaviours in scripts.items():
         start = {
-            **{"version": version["id"], "digest": version["digest"], "umrf": version["umrf"]},
-            **{"engine": "simulator", "request_id": f"request-{name}", "graph": graph["id"]},
+            "version": version["id"],
+            "digest": version["digest"],
+            "umrf": version["umrf"],
+            "engine": "simulator",
+            "request_id": f"request-{name}",
+            "graph": graph["id"],
             "script": {"behaviours": behaviours},
         }
         started = runner.post("/api/runs", json=start)
         assert started.status_code == 201, started.text
-        runs[name] = started.json()["id"]
+        run = runs[name] = started.json()["id"]
         if name == "slow":
-            _eventually(lambda: runner.get(f"/api/runs/{runs['slow']}").json()["started_at"])
-            runner.post(f"/api/runs/{runs['slow']}/stop").raise_for_status()
-        _eventually(lambda: runner.get(f"/api/runs/{runs[name]}").json()["ended_at"])
+            _eventually(partial(_says, runner, run, "started_at"))
+            runner.post(f"/api/runs/{run}/stop").raise_for_status()
+        _eventually(partial(_says, runner, run, "ended_at"))
     marks = {"pinned": True, "note": "look here", "labels": ["demo"]}
     for name in _NOTED:
         runner.patch(f"/api/runs/{runs[name]}/marks", json=marks).raise_for_status()
@@ -150,6 +169,10 @@ def _run(editor: httpx.Client, runner: httpx.Client) -> None:
     robot = {"name": "Marian", "domain": 139}
     runner.post("/api/robots", json=robot).raise_for_status()
     _eventually(lambda: runner.post("/api/archive", json={"runs": _LONG_AGO}).json()["runs"] >= 2)
+
+
+def _says(runner: httpx.Client, run: str, what: str) -> bool:
+    return runner.get(f"/api/runs/{run}").json()[what] is not None
 
 
 def answers(product: Product, token: str) -> dict[str, Any]:

@@ -1,233 +1,199 @@
-"""Commands that keep a copy of the journals and bring it back: backup, restore."""
+"""Commands that keep a copy of everything and bring it back: backup; restore is beside it."""
 
 import argparse
-import asyncio
-import hashlib
 import os
-import shutil
-import sqlite3
-import tempfile
+import sys
 import time
-import zipfile
-from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
 
-import msgspec
+from sqlalchemy import make_url, select
 
-from action_assistant import places
+from action_assistant import places, settings
+from action_assistant.commands import restore
+from action_assistant.commands.backup_file import ARCHIVE, FILES, Copied, Packer, about_now
+from action_assistant.commands.data_folder import (
+    archived,
+    belongings,
+    checked,
+    fold_of,
+    is_database,
+    left_out,
+    rows_of,
+    tables_copied,
+    workshop,
+)
+from action_assistant.commands.progress import Progress
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import Branch
-from action_assistant.journal.events import Fold
-from action_assistant.journal.journal import Journal
-from action_assistant.private import own_folder
-from action_assistant.version import VERSION
-
-_FORMAT: Final = 1
-_ABOUT: Final = "about.json"
-_BRANCHES: Final[tuple[Branch, ...]] = ("editor", "runner")
-_CHUNK: Final = 1 << 20
-
-
-class Copied(msgspec.Struct, frozen=True):
-    """One journal in a backup: its last position, and the SHA-256 of the file."""
-
-    events: int
-    sha256: str
-
-
-class About(msgspec.Struct, frozen=True):
-    """What a backup says of itself."""
-
-    format: int
-    version: str
-    made_at: float
-    journals: dict[Branch, Copied]
+from action_assistant.journal.database import Branch, database_of
+from action_assistant.journal.tables import invitation
+from action_assistant.web.keys import TOKEN_FILE
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the commands of this module."""
     backup = commands.add_parser(
         "backup",
-        help="write a checked copy of all journals into one file, also while they are in use",
-        epilog="example: action-assistant backup monday.zip --data ./data",
+        help="write a checked copy of everything into one file, also while it is in use",
+        epilog="example: action-assistant backup monday.zip --data ./data; exit code 1 if something "
+        "is missing in it",
     )
-    restore = commands.add_parser(
+    back = commands.add_parser(
         "restore",
-        help="put a backup in the place of the journals; open pages notice and ask",
+        help="put a backup in the place of what is there; open pages notice and ask",
         epilog="example: action-assistant restore monday.zip --data ./data",
     )
-    for command in (backup, restore):
+    for command in (backup, back):
         command.add_argument("file", type=Path, metavar="FILE")
         command.add_argument(
             "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
         )
+    backup.add_argument(
+        "--database", metavar="URL", help="of the editor; default: the one that was served last"
+    )
+    back.add_argument(
+        "--database",
+        metavar="URL",
+        help="where the graphs shall be, an empty database; default: where those of the folder are",
+    )
     backup.set_defaults(deed=_backup)
-    restore.set_defaults(deed=_restore)
+    back.set_defaults(deed=restore.restore)
 
 
 def _backup(options: argparse.Namespace) -> int:
+    from action_assistant.editor import location
+
     data, target = options.data.resolve(), options.file.resolve()
-    found = [branch for branch in _BRANCHES if (data / f"{branch}.db").is_file()]
-    if not found:
-        raise CannotStart(
-            f"There is no journal in {data}. A Postgres database is backed up with pg_dump."
-        )
-    with _workshop(target.parent) as folder:
-        copies = {}
-        for branch in found:
-            _copy(data / f"{branch}.db", folder / f"{branch}.db")
-            events = _checked(folder, branch)
-            copies[branch] = Copied(events, _sha256(folder / f"{branch}.db"))
-        about = About(_FORMAT, VERSION, time.time(), copies)
-        _pack(folder, about, target)
-    for branch, copy in copies.items():
-        print(f"{branch}: {copy.events} events, all of them sound")
-    print(f"written to {target}")
-    return 0
-
-
-def _restore(options: argparse.Namespace) -> int:
-    data, source = options.data.resolve(), options.file.resolve()
-    own_folder(data)
-    with _workshop(data) as folder, ExitStack() as locks:
-        about = _unpack(source, folder)
-        for branch in about.journals:
-            locks.callback(os.close, _locked(data, branch))
-        for branch, copy in about.journals.items():
-            if _sha256(folder / f"{branch}.db") != copy.sha256:
-                raise CannotStart(f"{source} is damaged: {branch}.db is not what was written.")
-            _checked(folder, branch, anew=True)
-        aside = data / time.strftime("before-restore-%Y%m%d-%H%M%S")
-        aside.mkdir(mode=0o700)
-        for branch in about.journals:
-            _exchange(folder / f"{branch}.db", data / f"{branch}.db", aside)
-        (data / _mark()).unlink(missing_ok=True)
-    for branch, copy in about.journals.items():
-        print(f"{branch}: as it was after {copy.events} events")
-    print(f"what was there before is in {aside}")
-    return 0
-
-
-@contextmanager
-def _workshop(parent: Path) -> Iterator[Path]:
-    """A folder for the work, on the disk where its result will lie."""
-    try:
-        with tempfile.TemporaryDirectory(prefix=".backup-", dir=parent) as folder:
-            yield Path(folder)
-    except (OSError, sqlite3.Error) as error:
-        text = error.strerror if isinstance(error, OSError) else str(error)
-        raise CannotStart(f"Cannot work in {parent}: {text}.") from error
-
-
-def _copy(source: Path, target: Path) -> None:
-    """The database as it is at one moment, while others may write."""
-    with (
-        closing(sqlite3.connect(f"{source.as_uri()}?mode=ro", uri=True)) as there,
-        closing(sqlite3.connect(target)) as here,
-    ):
-        there.backup(here)
-
-
-def _checked(folder: Path, branch: Branch, *, anew: bool = False) -> int:
-    """The number of events of a copy, each of which is sound. `anew`: it begins another epoch.
-
-    Raises CannotStart.
-    """
-    from action_assistant.editor import epochs
-    from action_assistant.editor.happenings import fold as editor_fold
-    from action_assistant.runner.archive import fold as runner_fold
-
-    folds: dict[Branch, Fold] = {"editor": editor_fold, "runner": runner_fold}
-
-    async def look() -> int:
-        url = f"sqlite:///{folder / f'{branch}.db'}"
-        journal = await Journal.open(url, branch=branch, fold=folds[branch])
+    settings.settled(data)
+    progress = Progress()
+    url = location.journal_of(data, options.database)
+    sources: dict[Branch, str] = {} if url is None else {"editor": url}
+    if (data / "runner.db").is_file():
+        sources["runner"] = f"sqlite:///{data / 'runner.db'}"
+    if not sources:
+        raise CannotStart(f"There is no journal in {data}.")
+    with workshop(target.parent, ".backup-") as folder:
+        events = {
+            branch: _copied(source, branch, folder / f"{branch}.db", progress)
+            for branch, source in sources.items()
+        }
+        packer = Packer(folder, progress)
         try:
-            for damage in await journal.verify():
-                raise CannotStart(
-                    f"The journal of the {branch} is damaged: {damage.stream or 'the file'}, "
-                    f"event {damage.seq}: {damage.why}. `verify` tells more."
-                )
-            events = await journal.position()
-            if anew and branch == "editor":
-                await epochs.begin(journal, "a backup was restored")
-            return events
+            journals = {
+                branch: packer.journal(branch, folder / f"{branch}.db", count)
+                for branch, count in events.items()
+            }
+            missing = _fill(packer, data, folder, progress)
+            about = about_now(
+                made_at=time.time(),
+                journals=journals,
+                files=packer.files,
+                database=None if url is None or location.is_own(data, url) else location.shown(url),
+                settings=_settings(),
+                missing=missing,
+            )
+            packer.close(about, target)
         finally:
-            await journal.close()
-
-    return asyncio.run(look())
-
-
-def _mark() -> str:
-    from action_assistant.editor.epochs import MARK
-
-    return MARK
+            packer.abandon()
+    progress.end()
+    _tell(journals, packer, target, data)
+    for each in missing:
+        print(f"missing: {each}")
+    return 1 if missing else 0
 
 
-def _locked(data: Path, branch: Branch) -> int:
-    """Keep everybody else out of a journal, also out of one that cannot be opened."""
-    from action_assistant.journal.sqlite import own
+def _copied(source: str, branch: Branch, target: Path, progress: Progress) -> int:
+    """A journal as it is at one moment, in a SQLite file; its events, all of which are sound."""
+    from action_assistant.journal.copying import copy
 
-    try:
-        return own(data / f"{branch}.db")
-    except CannotStart as error:
-        raise CannotStart(f"{error} End action-assistant first.") from error
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _pack(folder: Path, about: About, target: Path) -> None:
-    part = folder / "backup.zip"
-    with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        archive.writestr(_ABOUT, msgspec.json.format(msgspec.json.encode(about)))
-        for branch in about.journals:
-            archive.write(folder / f"{branch}.db", f"{branch}.db")
-    part.chmod(0o600)  # graphs and names are nobody else's business
-    _sync(part)
-    part.replace(target)
-    _sync(target.parent)
+    target.touch(mode=0o600)
+    if source.startswith("sqlite:"):
+        tables_copied(Path(make_url(source).database or ""), target, branch, progress)
+    else:
+        copy(
+            database_of(source),
+            database_of(f"sqlite:///{target}"),
+            branch=branch,
+            fold=fold_of(branch),
+            tell=lambda count: progress.tell(f"{branch}: {count} events read"),
+        )
+    return checked(target, branch, progress)
 
 
-def _unpack(source: Path, folder: Path) -> About:
-    """Its journals into the folder, under names of our own choice. Raises CannotStart."""
-    try:
-        with zipfile.ZipFile(source) as archive:
-            about = msgspec.json.decode(archive.read(_ABOUT), type=About)
-            if about.format != _FORMAT:
-                raise CannotStart(f"{source} was made by a newer version, {about.version}.")
-            for branch in about.journals:
-                path = folder / f"{branch}.db"
-                with archive.open(path.name) as packed, path.open("wb") as file:
-                    shutil.copyfileobj(packed, file, _CHUNK)
-    except FileNotFoundError as error:
-        raise CannotStart(f"There is no file {source}.") from error
-    except (zipfile.BadZipFile, KeyError, msgspec.DecodeError, EOFError) as error:
-        raise CannotStart(f"{source} is no backup of ours, or is damaged: {error}.") from error
-    return about
+def _fill(packer: Packer, data: Path, folder: Path, progress: Progress) -> tuple[str, ...]:
+    """Everything beside the journals, whose copies are in `folder`; what is missing, in sentences.
+    Archives come after the journals: a run that goes into one meanwhile is in both."""
+    missing = []
+    given = os.environ.get("ACTION_ASSISTANT_TOKEN")
+    for name, path in belongings(data):
+        if name == TOKEN_FILE and given:
+            continue
+        try:
+            if is_database(path):
+                copy = folder / "other.db"
+                tables_copied(path, copy, name, progress)
+                packer.file(f"{FILES}/{name}", copy)
+                copy.unlink()
+            else:
+                packer.file(f"{FILES}/{name}", path)
+        except FileNotFoundError:
+            continue  # it went into an archive, or was kept long enough
+    if given:
+        packer.text(f"{FILES}/{TOKEN_FILE}", f"{given}\n".encode())
+    if f"{FILES}/{TOKEN_FILE}" not in packer.files and _links(folder / "editor.db"):
+        missing.append(
+            f"the token, by which links sign in: there is none in {data}. Set "
+            "ACTION_ASSISTANT_TOKEN as for the server."
+        )
+    return (*missing, *_archives(packer, settings.keep(data).folder, folder / "runner.db"))
 
 
-def _exchange(new: Path, old: Path, aside: Path) -> None:
-    """Put a file in the place of another, which is kept. At no moment is there none."""
-    for path in (old, old.with_name(f"{old.name}-wal")):
-        if path.exists():
-            os.link(path, aside / path.name)
-    # What an old log still holds must not be applied to the new file.
-    for suffix in ("-wal", "-shm"):
-        old.with_name(f"{old.name}{suffix}").unlink(missing_ok=True)
-    new.chmod(0o600)
-    _sync(new)
-    new.replace(old)
-    _sync(old.parent)
+def _archives(packer: Packer, kept: Path, runner: Path) -> list[str]:
+    """Take in all archives; those that the journal names and that are not as it says."""
+    for path in sorted(kept.glob("r[ua][nw]*/**/*.gz")):
+        packer.file(f"{ARCHIVE}/{path.relative_to(kept).as_posix()}", path)
+    missing = []
+    for place, sha256 in archived(runner).items():
+        held = packer.files.get(f"{ARCHIVE}/{place}")
+        if held is None:
+            missing.append(f"{place}, an archive: it is not in {kept}")
+        elif held.sha256 != sha256:
+            missing.append(f"{place}, an archive: it is not what was put into it")
+    return missing
 
 
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+def _links(editor: Path) -> bool:
+    """Whether there are links that let people in."""
+    if not editor.exists():
+        return False
+    open_ = select(invitation.c.id).where(invitation.c.revoked_at.is_(None)).limit(1)
+    return bool(rows_of(editor, open_))
+
+
+def _settings() -> dict[str, str]:
+    """What the environment says, but for what is secret."""
+    return {
+        name: value
+        for name in settings.VARIABLES
+        if name != "ACTION_ASSISTANT_TOKEN" and (value := os.environ.get(name))
+    }
+
+
+def _tell(journals: Mapping[Branch, Copied], packer: Packer, target: Path, data: Path) -> None:
+    for branch, copied in journals.items():
+        print(f"{branch}: {copied.events} events, all of them sound")
+    if "editor" not in journals:
+        print(f"editor: {data} holds no graphs, and no other database is known to hold any")
+    for folder, what in ((ARCHIVE, "archives"), (FILES, "other files")):
+        found = [held for name, held in packer.files.items() if name.startswith(f"{folder}/")]
+        if found:
+            print(f"{what}: {len(found)}, {sum(held.bytes for held in found)} bytes")
+    print(f"written to {target}")
+    if f"{FILES}/{TOKEN_FILE}" in packer.files:
+        print(
+            "It holds the keys of this server: whoever reads it can sign in as its owner. "
+            "Only you can read it; keep it so."
+        )
+    for path in left_out(data):
+        if path != target:
+            print(f"left out, since it is not this program's: {path}", file=sys.stderr)

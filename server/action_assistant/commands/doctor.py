@@ -20,9 +20,11 @@ from sqlalchemy.exc import DBAPIError
 
 from action_assistant import places, settings
 from action_assistant.commands.processes import port_number
+from action_assistant.editor import location
 from action_assistant.errors import CannotStart
 from action_assistant.interpreter import for_runner
 from action_assistant.journal.database import cause_of, database_of
+from action_assistant.journal.migrate import recognize
 from action_assistant.plain import one_line
 from action_assistant.private import holds_nothing_else, open_to_others, prove_writable
 from action_assistant.runner import archive
@@ -51,7 +53,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "--database",
         metavar="URL",
         default=settings.database(),
-        help="of the editor; default: sqlite, in the data folder",
+        help="of the editor; default: the one that was served last",
     )
     doctor.add_argument("--host", default="127.0.0.1", metavar="H", help="default: %(default)s")
     doctor.add_argument("--port", type=port_number, default=8000, metavar="N", help="default: 8000")
@@ -84,7 +86,7 @@ def _machine(options: argparse.Namespace) -> Iterator[Finding]:
     yield _fine("program", f"Version {VERSION} on Python {python}.")
     yield _page()
     yield _folder(options.data)
-    yield _database("database", options.database or f"sqlite:///{options.data / 'editor.db'}")
+    yield _graphs(options)
     yield _database("runs", f"sqlite:///{options.data / 'runner.db'}")
     yield from _sqlite()
     yield _port("editor", options.host, options.port)
@@ -139,6 +141,13 @@ def _listed(data: Path, paths: list[Path]) -> str:
     return ", ".join(names[:5]) + more
 
 
+def _graphs(options: argparse.Namespace) -> Finding:
+    try:
+        return _database("database", options.database or location.of(options.data))
+    except CannotStart as error:
+        return _wrong("database", str(error))
+
+
 def _database(topic: str, url: str) -> Finding:
     """Whether a database can be read, without changing anything of it."""
     path = Path(url.removeprefix("sqlite:///"))
@@ -150,6 +159,7 @@ def _database(topic: str, url: str) -> Finding:
     try:
         name = database_of(url).name
         if url.startswith("sqlite:"):
+            database_of(url).look(recognize)
             _read_only(path).close()
         else:
             anyio.run(_reached, url)

@@ -11,6 +11,7 @@ from action_assistant.journal.chain import Damage
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Fold
 from action_assistant.journal.journal import Journal
+from action_assistant.settings import settled
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -40,7 +41,7 @@ def _where(parser: argparse.ArgumentParser) -> None:
         "--database",
         metavar="URL",
         default=settings.database(),
-        help="of the editor; default: sqlite, in the data folder",
+        help="of the editor; default: the one that was served last",
     )
 
 
@@ -69,13 +70,15 @@ def _for_each(
     options: argparse.Namespace, deed: Callable[[Branch, Journal], Awaitable[bool]]
 ) -> int:
     """Do it to every journal that there is; 1 unless all went well. Raises CannotStart."""
+    from action_assistant.editor import location
     from action_assistant.editor.happenings import fold as editor_fold
     from action_assistant.runner.archive import fold as runner_fold
 
     data = options.data.resolve()
+    settled(data)
     found: list[tuple[Branch, str, Fold]] = []
-    if options.database or (data / "editor.db").is_file():
-        url = options.database or f"sqlite:///{data / 'editor.db'}"
+    url = location.journal_of(data, options.database)
+    if url is not None:
         found.append(("editor", url, editor_fold))
     if (data / "runner.db").is_file():
         found.append(("runner", f"sqlite:///{data / 'runner.db'}", runner_fold))

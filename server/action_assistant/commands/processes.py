@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from action_assistant import places, settings
 from action_assistant.errors import CannotStart
 from action_assistant.plain import PlainLog
-from action_assistant.private import own_folder
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     from action_assistant.web.listen import Identity
@@ -23,7 +22,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         epilog="example: action-assistant serve --data ./data --port 8000",
     )
     _address(both, port=8000)
-    _database(both)
+    _database(both, switch=True)
     _sharing(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
     both.set_defaults(deed=_serve)
@@ -34,7 +33,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         epilog="example: action-assistant editor --port 8000 --runner-port 8001",
     )
     _address(editor, port=8000)
-    _database(editor)
+    _database(editor, switch=True)
     _sharing(editor)
     editor.add_argument(
         "--runner-port", type=port_number, metavar="N", help="default: the next port"
@@ -84,13 +83,19 @@ def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
     )
 
 
-def _database(parser: argparse.ArgumentParser) -> None:
+def _database(parser: argparse.ArgumentParser, *, switch: bool = False) -> None:
     parser.add_argument(
         "--database",
         metavar="URL",
         default=settings.database(),
         help="of the editor; default: sqlite, in the data folder",
     )
+    if switch:
+        parser.add_argument(
+            "--switch-database",
+            action="store_true",
+            help="begin with another database than before, and leave the graphs that are there",
+        )
 
 
 def _sharing(parser: argparse.ArgumentParser) -> None:
@@ -148,6 +153,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         limits=settings.limits(),
         share=options.share,
         tls=options.tls,
+        switch_database=options.switch_database,
     )
 
 
@@ -157,11 +163,12 @@ def _serve(options: argparse.Namespace) -> int:
     if options.port == 65535:
         raise CannotStart("The runner needs the port after --port; 65535 has none.")
     host = _host(options)
-    data = own_folder(options.data.resolve())
+    data = settings.data_folder(options.data.resolve())
     return serve(
         Plan(
             data=data,
             database=options.database,
+            switch_database=options.switch_database,
             host=host,
             port=options.port,
             share=options.share,
@@ -175,7 +182,7 @@ def _editor(options: argparse.Namespace) -> int:
     from action_assistant.editor.app import create_app
     from action_assistant.web.listen import serve as listen
 
-    data = own_folder(options.data.resolve())
+    data = settings.data_folder(options.data.resolve())
     _log(data)
     chosen = _editor_settings(options, data)
     listen(
@@ -191,7 +198,7 @@ def _runner(options: argparse.Namespace) -> int:
     from action_assistant.runner.app import create_app
     from action_assistant.web.listen import serve as listen
 
-    data = own_folder(options.data.resolve())
+    data = settings.data_folder(options.data.resolve())
     _log(data)
     chosen = settings.RunnerSettings(
         data=data,
@@ -214,11 +221,12 @@ def _runner(options: argparse.Namespace) -> int:
 
 
 def _migrate(options: argparse.Namespace) -> int:
+    from action_assistant.editor import location
     from action_assistant.journal.database import database_of
     from action_assistant.journal.migrate import Branch, migrate
 
-    data = own_folder(options.data.resolve())
-    database = options.database or f"sqlite:///{data / 'editor.db'}"
+    data = settings.data_folder(options.data.resolve())
+    database = options.database or location.of(data)
     urls: dict[Branch, str] = {"editor": database, "runner": f"sqlite:///{data / 'runner.db'}"}
     for branch, url in urls.items():
         revision = migrate(url, branch)

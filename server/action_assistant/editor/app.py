@@ -11,7 +11,7 @@ from litestar import Litestar
 from litestar.types import ASGIApp
 
 from action_assistant import places
-from action_assistant.editor import epochs
+from action_assistant.editor import epochs, location
 from action_assistant.editor import happenings as h
 from action_assistant.editor.api import about, drawing, graphs, invitations, room, versions
 from action_assistant.editor.house import Door, House
@@ -53,7 +53,9 @@ async def open_house(
 
 def create_app(settings: EditorSettings) -> ASGIApp:
     """The whole editor process. Raises CannotStart."""
+    location.check(settings.data, settings.database, switch=settings.switch_database)
     Journal.prepare(settings.database, "editor")
+    location.remember(settings.data, settings.database)
     keys = Keys.of(settings.data)
     door = Door()
     revoked = Revoked(settings.data)

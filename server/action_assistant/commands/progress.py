@@ -1,0 +1,32 @@
+"""How far something has come that takes a while, said on stderr."""
+
+import sys
+import time
+from typing import Final
+
+_EVERY: Final = 1.0  # seconds
+
+
+class Progress:
+    """Says nothing in the first second, and then one thing a second: over the last one on a terminal,
+    on a line of its own elsewhere."""
+
+    def __init__(self) -> None:
+        self._next = time.monotonic() + _EVERY
+        self._shown = False
+
+    def tell(self, text: str) -> None:
+        """It has come so far."""
+        if time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + _EVERY
+        self._shown = sys.stderr.isatty()
+        sys.stderr.write(f"\r\x1b[K{text} …" if self._shown else f"{text} …\n")
+        sys.stderr.flush()
+
+    def end(self) -> None:
+        """Something else is said next."""
+        if self._shown:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()
+        self._shown = False
