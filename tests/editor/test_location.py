@@ -1,0 +1,109 @@
+"""Graphs that are elsewhere are not passed over in silence: the folder remembers where they are."""
+
+import asyncio
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from action_assistant.editor import location
+from action_assistant.errors import CannotStart
+from editor.process import Editor, running
+from journal.servers import Server
+from support.product import COMMAND, Product
+
+
+def refused(data: Path, *flags: str) -> str:
+    """What an editor says that does not start."""
+    product = Product(data, *flags)
+    ended = subprocess.run(
+        [*COMMAND, "serve", "--data", data, "--port", str(product.port), "--no-open", *flags],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert ended.returncode == 2, ended.stderr
+    return ended.stderr
+
+
+def names(editor: Editor) -> set[str]:
+    with editor.client() as http:
+        return {each["name"] for each in http.get("/api/graphs").json()}
+
+
+def test_another_database_than_before_is_refused_unless_told(
+    tmp_path: Path, postgres: Server
+) -> None:
+    data, url = tmp_path / "data", postgres.new_database()
+    own = f"sqlite:///{data / 'editor.db'}"
+    with running(data) as editor, editor.client() as http:
+        http.post("/api/graphs", json={"name": "mine"}).raise_for_status()
+        count = len(names(editor))
+    said = refused(data, "--database", url)
+    assert f"{count} graphs" in said
+    assert str(data / "editor.db") in said
+    assert "backup FILE" in said
+    assert "--switch-database" in said
+    postgres.sql("CREATE TABLE event (nothing TEXT); DROP TABLE event", url.rpartition("/")[2])
+
+    location.check(data, url, switch=True)
+    product = Product(data, "--database", url, "--switch-database")
+    product.start()
+    product.end()
+    location.check(data, url, switch=False)  # told once
+    # The same server by another name has the same log.
+    location.check(data, url.replace("127.0.0.1", "localhost"), switch=False)
+    said = refused(data)
+    assert location.shown(url) in said
+    assert "without --database" in said
+    with pytest.raises(CannotStart, match="would not be seen"):
+        location.check(data, own, switch=False)
+    with pytest.raises(CannotStart, match="would not be seen"):
+        location.check(data, postgres.new_database(), switch=False)
+
+
+def test_a_folder_without_graphs_takes_any_database(tmp_path: Path, postgres: Server) -> None:
+    location.check(tmp_path, postgres.new_database(), switch=False)
+    from action_assistant.editor import happenings as h
+    from action_assistant.journal.journal import Journal
+
+    async def empty() -> None:
+        url = f"sqlite:///{tmp_path / 'editor.db'}"
+        await (await Journal.open(url, branch="editor", fold=h.fold)).close()
+
+    asyncio.run(empty())
+    location.check(tmp_path, postgres.new_database(), switch=False)
+
+
+def test_what_an_older_version_did_not_write_down_is_asked_for(
+    tmp_path: Path, postgres: Server
+) -> None:
+    url = postgres.new_database()
+    with running(tmp_path / "data", url):
+        pass
+    (tmp_path / "data" / location.FILE).unlink()
+    with pytest.raises(CannotStart, match="name it by --database URL, or begin without"):
+        location.check(tmp_path / "data", f"sqlite:///{tmp_path / 'data/editor.db'}", switch=False)
+    with pytest.raises(CannotStart, match="name it by --database"):
+        location.of(tmp_path / "data")
+    location.check(tmp_path / "data", url, switch=False)
+
+
+def test_what_the_folder_remembers_is_no_secret(tmp_path: Path) -> None:
+    url = "postgresql://ann:secret@db:5433/graphs?ssl=require&sslpassword=hidden"
+    location.remember(tmp_path, url)
+    kept = (tmp_path / location.FILE).read_text()
+    assert "secret" not in kept
+    assert "hidden" not in kept
+    assert location.of(tmp_path) == "postgresql://ann@db:5433/graphs?ssl=require"
+    assert (tmp_path / location.FILE).stat().st_mode & 0o777 == 0o600
+    location.remember(tmp_path, f"sqlite:///{tmp_path / 'editor.db'}")
+    assert location.of(tmp_path) == f"sqlite:///{tmp_path / 'editor.db'}"
+
+
+def test_a_database_that_does_not_answer_is_not_taken_for_another_one(tmp_path: Path) -> None:
+    with running(tmp_path / "data"):
+        pass
+    with pytest.raises(CannotStart, match=r"127\.0\.0\.1:1/graphs cannot be read"):
+        location.check(tmp_path / "data", "postgresql://ann:x@127.0.0.1:1/graphs", switch=False)
