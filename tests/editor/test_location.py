@@ -107,3 +107,18 @@ def test_a_database_that_does_not_answer_is_not_taken_for_another_one(tmp_path: 
         pass
     with pytest.raises(CannotStart, match=r"127\.0\.0\.1:1/graphs cannot be read"):
         location.check(tmp_path / "data", "postgresql://ann:x@127.0.0.1:1/graphs", switch=False)
+
+
+def test_a_file_elsewhere_that_is_not_there_now_is_no_empty_catalogue(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    location.remember(tmp_path, "sqlite:///mounted/graphs.db")
+    monkeypatch.chdir("/")
+    assert location.of(tmp_path) == f"sqlite:///{tmp_path / 'mounted/graphs.db'}"
+    with pytest.raises(CannotStart, match=r"There is no .*mounted/graphs.db, where"):
+        location.journal_of(tmp_path, None)
+    own = f"sqlite:///{tmp_path / 'editor.db'}"
+    with pytest.raises(CannotStart, match=r"The graphs of .* would not be seen without"):
+        location.check(tmp_path, own, switch=False)
+    location.check(tmp_path, location.of(tmp_path), switch=False)

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Final
 
 from sqlalchemy import make_url, select
 
@@ -28,6 +29,11 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch, database_of
 from action_assistant.journal.tables import invitation
 from action_assistant.web.keys import TOKEN_FILE
+
+#: What archives are of, in their folder.
+_ARCHIVES: Final = ("runs", "raw")
+#: Of the environment, and never in what a backup says of itself.
+_SECRET: Final = frozenset({"ACTION_ASSISTANT_TOKEN", "ACTION_ASSISTANT_DATABASE"})
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -150,7 +156,7 @@ def _fill(packer: Packer, data: Path, folder: Path, progress: Progress) -> tuple
 
 def _archives(packer: Packer, kept: Path, runner: Path) -> list[str]:
     """Take in all archives; those that the journal names and that are not as it says."""
-    for path in sorted(kept.glob("r[ua][nw]*/**/*.gz")):
+    for path in sorted(path for top in _ARCHIVES for path in (kept / top).rglob("*.gz")):
         packer.file(f"{ARCHIVE}/{path.relative_to(kept).as_posix()}", path)
     missing = []
     for place, sha256 in archived(runner).items():
@@ -175,7 +181,7 @@ def _settings() -> dict[str, str]:
     return {
         name: value
         for name in settings.VARIABLES
-        if name != "ACTION_ASSISTANT_TOKEN" and (value := os.environ.get(name))
+        if name not in _SECRET and (value := os.environ.get(name))
     }
 
 

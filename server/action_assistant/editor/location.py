@@ -56,7 +56,11 @@ def journal_of(data: Path, given: str | None) -> str | None:
     """The URL of the journal with the graphs of a folder; None when it has none. Raises CannotStart
     when it has one that is nowhere to be found."""
     url = given or of(data)
-    return None if _is_nowhere(url) else url
+    if not _is_nowhere(url):
+        return url
+    if given is None and is_own(data, url):
+        return None
+    raise CannotStart(f"There is no {make_url(url).database}, where the graphs of {data} are.")
 
 
 def is_own(data: Path, url: str) -> bool:
@@ -102,6 +106,9 @@ def check(data: Path, url: str, *, switch: bool) -> None:
 def remember(data: Path, url: str) -> None:
     """From now on the graphs are there."""
     path = data / FILE
+    parsed = make_url(url)
+    if parsed.get_backend_name() == "sqlite":  # wherever commands are started
+        url = f"sqlite:///{Path(parsed.database or '').resolve()}"
     try:
         if _same(url, _own(data)):
             path.unlink(missing_ok=True)
@@ -159,7 +166,7 @@ def _graphs(url: str) -> int | None:
         return connection.execute(counted).scalar_one()
 
     if _is_nowhere(url):
-        return 0
+        return None
     try:
         return _asked(url, count)
     except CannotStart:
