@@ -12,6 +12,7 @@
     ├── Conflict                    409  the thing is not in a state that allows it
     ├── TooLarge                    413  over a stated limit
     ├── TooMany                     429  too often
+    ├── Misrouted                   502  a proxy leads here what is the other process's
     └── Unavailable                 503  something this process needs does not answer
     CannotStart                          the process cannot begin its work; one sentence, exit 2
 
@@ -99,6 +100,12 @@ class TooMany(Refused):
     """Too many requests"""
 
     status = 429
+
+
+class Misrouted(Refused):
+    """A proxy leads to the wrong place"""
+
+    status = 502
 
 
 class Unavailable(Refused):

@@ -10,14 +10,13 @@ import time
 import webbrowser
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final
 
 import msgspec
 
 from action_assistant.interpreter import Interpreter, for_runner
 from action_assistant.private import opener
-from action_assistant.settings import EVERYWHERE, more_hosts
+from action_assistant.settings import EVERYWHERE, Reached, more_hosts
 from action_assistant.sharing import invitations_as_text, is_ours
 from action_assistant.web.addresses import addresses_of
 from action_assistant.web.certificate import Certificate
@@ -42,6 +41,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     share: bool
     tls: bool
     opens: bool
+    reached: Reached = Reached()
 
 
 class Enough:
@@ -76,13 +76,13 @@ class Child:
         arguments: list[str],
         port: int,
         interpreter: Interpreter,
-        secrets: Mapping[str, str] = MappingProxyType({}),
+        settings: Mapping[str, str],
     ) -> None:
         self.name = name
         self.port = port
+        self._settings = settings  # everybody may read arguments; environments are ours alone
         self._interpreter = interpreter
         self._arguments = arguments
-        self._secrets = secrets  # everybody may read arguments; environments are ours alone
         self._process: subprocess.Popen[bytes] | None = None
         self._deaths = 0
         self._born = 0.0
@@ -90,9 +90,8 @@ class Child:
 
     def start(self, parent: int) -> None:
         """Start it. `parent` is the reading end of a pipe that closes when we die."""
-        environment = self._interpreter.environment(os.environ)
+        environment = {**self._interpreter.environment(os.environ), **self._settings}
         environment["_ACTION_ASSISTANT_PARENT"] = str(parent)
-        environment |= self._secrets
         self._born = time.monotonic()
         self._process = subprocess.Popen(
             [self._interpreter.path, "-m", "action_assistant", *self._arguments],
@@ -171,6 +170,7 @@ def _children(plan: Plan) -> list[Child]:
     database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}
     switch = ["--switch-database"] if plan.switch_database else []
     ports = str(plan.port), str(plan.port + 1)
+    settings = _as_settings(plan.reached)
     this = Interpreter(path=Path(sys.executable), origin="this")
     speaking = for_runner()
     if speaking.remark:
@@ -181,15 +181,24 @@ def _children(plan: Plan) -> list[Child]:
             ["editor", *address, *switch, "--port", ports[0], "--runner-port", ports[1]],
             plan.port,
             this,
-            database,
+            {**settings, **database},
         ),
         Child(
             "runner",
             ["runner", *address, "--port", ports[1], "--page-port", ports[0]],
             plan.port + 1,
             speaking,
+            settings,
         ),
     ]
+
+
+def _as_settings(reached: Reached) -> dict[str, str]:
+    """For the environment of both: an argument might contain a word by which people find processes."""
+    return {
+        "ACTION_ASSISTANT_PUBLIC_URL": f"{reached.public.page}/" if reached.public else "",
+        "ACTION_ASSISTANT_TRUSTED_PROXIES": ",".join(str(each) for each in reached.proxies),
+    }
 
 
 def _certified(plan: Plan) -> ssl.SSLContext | None:
@@ -229,13 +238,16 @@ def _greet(
                 deadline = float("inf")
     base = f"{scheme}://{shown}:{plan.port}"
     url = f"{base}/#t={keys.token}"
+    shown_at = f"{plan.reached.public.page}/#t={keys.token}" if plan.reached.public else url
     # Through a file that only this user can read: arguments of a browser are visible to all.
     redirect = plan.data / "open.html"
     with open(redirect, "w", opener=opener) as out:
         out.write(f'<!doctype html><meta http-equiv="refresh" content="0;url={url}">')
     at_terminal = sys.stderr.isatty()  # a log is kept, and read by others
     if at_terminal:
-        _say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {url}\n")
+        _say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {shown_at}\n")
+        if shown_at != url:
+            _say(f"or, on this computer and without the proxy:\n\n    {url}\n")
     else:
         _say(f"ready at {base}. {redirect} signs you in; the link is shown at a terminal only.")
     if plan.share:

@@ -11,6 +11,7 @@ import msgspec
 
 from action_assistant.errors import CannotStart
 from action_assistant.private import own_folder
+from action_assistant.public import LOOPBACK_PROXIES, Network, Public, proxies, public_url
 
 #: Every variable that this program reads, and what it is for.
 VARIABLES: Final[Mapping[str, str]] = {
@@ -19,6 +20,9 @@ VARIABLES: Final[Mapping[str, str]] = {
     "everybody on this computer",
     "ACTION_ASSISTANT_URL": "where the command line finds the editor (http://127.0.0.1:8000)",
     "ACTION_ASSISTANT_HOSTS": "more host names that may stand in the address bar, comma separated",
+    "ACTION_ASSISTANT_PUBLIC_URL": "where a proxy shows the page to others, as --public-url",
+    "ACTION_ASSISTANT_TRUSTED_PROXIES": "addresses and networks of proxies that are believed about who "
+    "asks, as --trusted-proxies",
     "ACTION_ASSISTANT_RUNNER_PYTHON": "the Python that has rclpy; `serve` runs the runner under it",
     "ACTION_ASSISTANT_KEEP_RUNS": "days after which runs go into archives (for ever)",
     "ACTION_ASSISTANT_KEEP_RAW": "days after which raw messages of robots go into archives; without "
@@ -35,6 +39,14 @@ EVERYWHERE: Final = "*"
 LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
+class Reached(msgspec.Struct, frozen=True):
+    """How others come to us: by a public address that a proxy shows, if there is one. `proxies` are
+    believed about the address of whoever asks."""
+
+    public: Public | None = None
+    proxies: tuple[Network, ...] = ()
+
+
 class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How the editor runs. `database` is a URL such as `sqlite:////data/editor.db`."""
 
@@ -48,6 +60,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     share: bool = False
     tls: bool = False
     switch_database: bool = False
+    reached: Reached = Reached()
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -71,6 +84,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     share: bool = False
     tls: bool = False
     keep: Keep | None = None
+    reached: Reached = Reached()
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
@@ -144,13 +158,28 @@ def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
     return tuple(name.strip().lower() for name in names.split(",") if name.strip())
 
 
-def check_host(host: str, hosts: tuple[str, ...], *, share: bool = False) -> None:
+def reached(
+    url: str | None, trusted: str | None, environ: Mapping[str, str] = os.environ
+) -> Reached:
+    """What the command line says, else the environment. Behind a public address the proxies of this
+    computer are believed unless others are named. Raises CannotStart."""
+    written = url if url is not None else environ.get("ACTION_ASSISTANT_PUBLIC_URL", "")
+    public = public_url(written) if written.strip() else None
+    named = trusted if trusted is not None else environ.get("ACTION_ASSISTANT_TRUSTED_PROXIES", "")
+    if named.strip() or public is None:
+        return Reached(public, proxies(named))
+    return Reached(public, LOOPBACK_PROXIES)
+
+
+def check_host(
+    host: str, hosts: tuple[str, ...], *, share: bool = False, public: Public | None = None
+) -> None:
     """Refuse to listen where strangers are unless somebody said so, or by which names."""
-    if host not in LOOPBACK and not hosts and not share:
+    if host not in LOOPBACK and not hosts and not share and public is None:
         raise CannotStart(
             f"Listening on {host} would show this computer's graphs and robots to the network. "
             "Use --share to do that on purpose, or name the addresses that people may use in "
-            "ACTION_ASSISTANT_HOSTS."
+            "ACTION_ASSISTANT_HOSTS, or --public-url where a proxy stands before it."
         )
 
 

@@ -33,7 +33,12 @@ def command(
     """A command that needs a running server. `of` is the command that it belongs to."""
     words = " ".join(word for word in ("action-assistant", of, name, example) if word)
     parser = commands.add_parser(name, help=text, description=text, epilog=f"example: {words}")
-    parser.add_argument("--url", metavar="URL", help="of the editor (default: port 8000 here)")
+    parser.add_argument(
+        "--url",
+        "--server",
+        metavar="URL",
+        help="of the editor, or the public address of a server (default: port 8000 here)",
+    )
     parser.add_argument(
         "--data", type=Path, default=places.data(), metavar="DIR", help="that holds the token"
     )

@@ -105,6 +105,22 @@ def _sharing(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tls", action="store_true", help="encrypt, with a certificate that is made here"
     )
+    parser.add_argument(
+        "--public-url",
+        metavar="URL",
+        help="where a proxy shows the page, such as https://robots.example.org/temoto/; it leads "
+        "what is below runner/ to the runner's port, and the rest to the editor's",
+    )
+    parser.add_argument(
+        "--trusted-proxies",
+        metavar="LIST",
+        help="addresses and networks of proxies whose X-Forwarded-For is believed; default: with "
+        "--public-url those of this computer, else none",
+    )
+
+
+def _reached(options: argparse.Namespace) -> settings.Reached:
+    return settings.reached(options.public_url, options.trusted_proxies)
 
 
 def _host(options: argparse.Namespace) -> str:
@@ -112,7 +128,8 @@ def _host(options: argparse.Namespace) -> str:
     host: str = options.host or (settings.EVERYWHERE if options.share else "127.0.0.1")
     if options.share and host in {"0.0.0.0", "::"}:
         host = settings.EVERYWHERE
-    settings.check_host(host, settings.more_hosts(), share=options.share)
+    public = _reached(options).public
+    settings.check_host(host, settings.more_hosts(), share=options.share, public=public)
     return host
 
 
@@ -154,6 +171,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         share=options.share,
         tls=options.tls,
         switch_database=options.switch_database,
+        reached=_reached(options),
     )
 
 
@@ -173,6 +191,7 @@ def _serve(options: argparse.Namespace) -> int:
             port=options.port,
             share=options.share,
             tls=options.tls,
+            reached=_reached(options),
             opens=not options.no_open,
         )
     )
@@ -189,6 +208,7 @@ def _editor(options: argparse.Namespace) -> int:
         lambda: create_app(chosen),
         host=chosen.host,
         port=chosen.port,
+        proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.port),
     )
     return 0
@@ -210,11 +230,13 @@ def _runner(options: argparse.Namespace) -> int:
         share=options.share,
         tls=options.tls,
         keep=settings.keep(data),
+        reached=_reached(options),
     )
     listen(
         lambda: create_app(chosen),
         host=chosen.host,
         port=chosen.port,
+        proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.page_port),
     )
     return 0

@@ -67,6 +67,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         hosts=settings.hosts,
         share=settings.share,
         secure=settings.tls,
+        public=settings.reached.public,
     )
 
     @asynccontextmanager
@@ -83,14 +84,14 @@ def create_app(settings: EditorSettings) -> ASGIApp:
             *session_routes(
                 keys,
                 settings.port,
-                secure=settings.tls,
+                addresses=addresses,
                 limits=settings.limits,
                 reception=lambda: door.house.invitations,
                 revoked=revoked,
                 browsers=browsers,
             ),
             *invitations.routes(door, addresses, browsers),
-            *about.routes(door),
+            *about.routes(door, addresses),
             *graphs.routes(door),
             *versions.routes(door),
             *drawing.routes(door),
@@ -106,6 +107,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         measures=lambda: _measures(door.house),
         page=places.page(),
         runner_port=settings.runner_port,
+        mount=settings.reached.public.path if settings.reached.public is not None else "",
     )
 
 

@@ -13,6 +13,7 @@ from litestar.types import ASGIApp
 
 from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
+from action_assistant.public import RUNNER
 from action_assistant.runner import archive
 from action_assistant.runner.api import House, routes
 from action_assistant.runner.asking import SMALL
@@ -120,6 +121,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     Journal.prepare(_database(settings), "runner")
     revoked = Revoked(settings.data)
     house = House()
+    public = settings.reached.public
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
@@ -154,10 +156,12 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
             hosts=settings.hosts,
             share=settings.share,
             secure=settings.tls,
+            public=public,
         ),
         page_port=settings.page_port,
         lifespan=[lifespan],
         ready=ready,
         measures=measures,
+        mount=public.path + RUNNER if public is not None else "",
         body_limit=SMALL,
     )

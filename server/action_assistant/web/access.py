@@ -44,6 +44,8 @@ _HEADERS: Final = (
     (b"cross-origin-opener-policy", b"same-origin"),
     (b"x-frame-options", b"DENY"),
 )
+#: Or nginx would pass events on when it has some kilobytes of them.
+_UNBUFFERED: Final = (b"x-accel-buffering", b"no")
 
 
 def cookie_name(page_port: int) -> str:
@@ -237,6 +239,9 @@ class Access:
         origin = headers.get("origin")
         if origin is not None and not self._addresses.allows_origin(origin):
             raise WrongOrigin(f"Pages of {origin!r} may not talk to this server.")
+        replaced = origin and self._addresses.replaced_host(headers.get("host"), origin)
+        if replaced:
+            raise WrongHost(replaced)
         method = scope.get("method", "GET") if scope["type"] == ScopeType.HTTP else "WEBSOCKET"
         if method == "OPTIONS" and "access-control-request-method" in headers:
             return True
@@ -300,10 +305,15 @@ class Access:
 
         async def dressed(message: Message) -> None:
             if message["type"] in {"http.response.start", "websocket.http.response.start"}:
-                message["headers"] = [*message.get("headers", []), *extra]
+                fields = [*message.get("headers", []), *extra]
+                message["headers"] = [*fields, _UNBUFFERED] if _streams(fields) else fields
             await send(message)
 
         return dressed
+
+
+def _streams(fields: list[tuple[bytes, bytes]]) -> bool:
+    return any(n == b"content-type" and v.startswith(b"text/event-stream") for n, v in fields)
 
 
 def _nobody(_: str) -> None:

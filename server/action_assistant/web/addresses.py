@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 
 import ifaddr
 
+from action_assistant.public import Public
 from action_assistant.settings import EVERYWHERE, LOOPBACK
 
 _ANYWHERE: Final = frozenset({"0.0.0.0", "::", EVERYWHERE})
@@ -19,14 +20,18 @@ _INNER: Final = ("docker", "br-", "veth", "virbr", "cni", "podman", "lxc", "lxd"
 
 def host_name(host: str) -> str:
     """The name in a Host header or URL authority, without port, lower case; "" if it is none."""
+    return _host_and_port(host)[0]
+
+
+def _host_and_port(host: str) -> tuple[str, int | None]:
     try:
         parts = urlsplit(f"//{host.strip()}")
-        parts.port  # noqa: B018 - raises on a port that is no number
+        port = parts.port
     except ValueError:
-        return ""
+        return "", None
     if parts.username is not None or parts.path or parts.query or parts.fragment:
-        return ""
-    return parts.hostname or ""
+        return "", None
+    return parts.hostname or "", port
 
 
 def lan_names() -> tuple[str, ...]:
@@ -55,7 +60,9 @@ class Addresses:
 
     `page_port` is the port of the page. Where host names were given on purpose the page may stand
     behind a proxy, so for those any port and scheme are accepted. With `lan`, exactly the names that
-    it gives now are accepted too: it is asked again when an unknown one comes.
+    it gives now are accepted too: it is asked again when an unknown one comes. `public` is the address
+    under which a proxy shows the page; whoever names it is answered as at that address, and nobody
+    else is.
     """
 
     def __init__(
@@ -66,8 +73,10 @@ class Addresses:
         hosts: Iterable[str] = (),
         secure: bool = False,
         lan: Callable[[], tuple[str, ...]] | None = None,
+        public: Public | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        self._public = public
         self._named = tuple(name.lower() for name in hosts)
         self._hosts = LOOPBACK | set(self._named) | ({host.lower()} - _ANYWHERE)
         self._host = host.lower()
@@ -79,12 +88,21 @@ class Addresses:
         self._clock = clock
         self._looked = clock()
 
+    @property
+    def is_encrypted(self) -> bool:
+        """Whether what is sent to the address that others use first cannot be read on its way."""
+        return self.secure if self._public is None else self._public.is_secure
+
     def allows_host(self, header: str | None) -> bool:
         """Whether a request may name this host (DNS rebinding comes with another)."""
-        return header is not None and self._knows(host_name(header))
+        if header is None:
+            return False
+        return self.public_at(header) is not None or self._knows(host_name(header))
 
     def allows_origin(self, origin: str) -> bool:
         """Whether a page of this origin may talk to us."""
+        if self._public is not None and origin == self._public.origin:
+            return True
         try:
             parts = urlsplit(origin)
             port = parts.port
@@ -99,6 +117,40 @@ class Addresses:
             return False
         return (port or (443 if parts.scheme == "https" else 80)) == self._page_port
 
+    def public_at(self, header: str) -> Public | None:
+        """The public address, if this is what a Host header names; None for everything else."""
+        public = self._public
+        return public if public is not None and public.is_named(*_host_and_port(header)) else None
+
+    def replaced_host(self, header: str | None, origin: str) -> str | None:
+        """Why a page of an origin that may ask us cannot: a proxy in between told us another Host,
+        which would make of its page one of this computer. None if all is well."""
+        public = self._public
+        if public is None or origin != public.origin or self.public_at(header or ""):
+            return None
+        return (
+            f"The page is at {public.page}, and the proxy before it asked for {header or ''!r}: it has "
+            "to pass on the Host header (nginx: proxy_set_header Host $http_host)."
+        )
+
+    def runner_at(self, header: str, port: int) -> str:
+        """Where the runner is for whoever named this host; without a slash at the end."""
+        public = self.public_at(header)
+        return public.runner if public is not None else self.direct(header, port)
+
+    def direct(self, header: str, port: int) -> str:
+        """A port of ours under the name that somebody used; without a slash at the end."""
+        return f"{self._scheme}://{_shown(host_name(header) or '127.0.0.1')}:{port}"
+
+    def jar(self, header: str) -> tuple[bool, str]:
+        """Whether cookies are `Secure` for whoever named this host, and for which path they are."""
+        public = self.public_at(header)
+        return (self.secure, "/") if public is None else (public.is_secure, f"{public.path}/")
+
+    def is_page(self, url: str) -> bool:
+        """Whether the page can be found there."""
+        return self.allows_origin(url) or (self._public is not None and url == self._public.page)
+
     def names(self) -> tuple[str, ...]:
         """By which others reach this computer, the likeliest first; empty when they cannot."""
         own = {self._host} - _ANYWHERE - LOOPBACK
@@ -111,8 +163,10 @@ class Addresses:
         return tuple(dict.fromkeys((*sorted(LOOPBACK), *self.names())))
 
     def origins(self) -> tuple[str, ...]:
-        """Of the page, as others have to call it."""
-        return tuple(f"{self._scheme}://{_shown(name)}:{self._page_port}" for name in self.names())
+        """Of the page, as others have to call it; of a public address also the path to it."""
+        public = () if self._public is None else (self._public.page,)
+        direct = (f"{self._scheme}://{_shown(name)}:{self._page_port}" for name in self.names())
+        return (*public, *direct)
 
     def _knows(self, name: str) -> bool:
         if name in self._hosts or name in self._found:
@@ -130,9 +184,17 @@ def _shown(name: str) -> str:
 
 
 def addresses_of(
-    *, host: str, page_port: int, hosts: tuple[str, ...], share: bool, secure: bool
+    *,
+    host: str,
+    page_port: int,
+    hosts: tuple[str, ...],
+    share: bool,
+    secure: bool,
+    public: Public | None = None,
 ) -> Addresses:
     """What the settings of a process come to."""
     listens_everywhere = share and host in _ANYWHERE
     lan = lan_names if listens_everywhere else None
-    return Addresses(host=host, page_port=page_port, hosts=hosts, secure=secure, lan=lan)
+    return Addresses(
+        host=host, page_port=page_port, hosts=hosts, secure=secure, lan=lan, public=public
+    )

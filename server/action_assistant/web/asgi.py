@@ -15,11 +15,12 @@ from litestar.openapi.plugins import JsonRenderPlugin
 from litestar.openapi.spec import Components, SecurityScheme
 from litestar.params import Parameter
 from litestar.routes import HTTPRoute
-from litestar.types import ASGIApp, ControllerRouterHandler, Receive, Scope, Send
+from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive, Scope, Send
 
 from action_assistant.version import VERSION
 from action_assistant.web.access import Access, Needs, require
 from action_assistant.web.addresses import Addresses, host_name
+from action_assistant.web.behind import MOUNT, Mounted, misrouted
 from action_assistant.web.keys import Keys, Proof
 from action_assistant.web.page import Page
 from action_assistant.web.problems import problem_handlers
@@ -60,14 +61,21 @@ def application(
     measures: Measures | None = None,
     page: Path | None = None,
     runner_port: int | None = None,
+    mount: str = "",
     body_limit: int = BODY_LIMIT,
 ) -> ASGIApp:
-    """The whole application. Routes may read less or more than `body_limit` bytes. `page` and `runner_port` are the editor's: it serves the page, whose
-    Content-Security-Policy names the runner."""
+    """The whole application. Routes may read less or more than `body_limit` bytes. `page` and
+    `runner_port` are the editor's: it serves the page, whose Content-Security-Policy names the
+    runner. `mount` is the path at which a proxy shows this process."""
     decisions: dict[tuple[str, str], Deed] = {}
     api = _OpenApiText(decisions)
     inner = Litestar(
-        [*route_handlers, *_health(ready, measures), _proving(keys)],
+        [
+            *route_handlers,
+            *_health(ready, measures),
+            _proving(keys),
+            *([misrouted(runner_port)] if runner_port is not None else []),
+        ],
         guards=[_undecided],
         exception_handlers=problem_handlers(),
         lifespan=list(lifespan),
@@ -77,7 +85,13 @@ def application(
     )
     decisions.update(_decisions(inner))
     api.prepare(inner.openapi_schema.to_schema())
-    shown = Page(inner, page) if page is not None else None
+
+    def root_of(scope: HTTPScope) -> str:
+        state: dict[str, Any] = scope.get("state", {})
+        public = addresses.public_at(_host(scope))
+        return str(state.get(MOUNT) or (public.path if public is not None else ""))
+
+    shown = Page(inner, page, root_of) if page is not None else None
     outer: ASGIApp = Access(
         shown or inner,
         keys=keys,
@@ -86,10 +100,14 @@ def application(
         is_open=lambda path, html: (
             _answers_strangers(path) or (shown is not None and shown.knows(path, html))
         ),
-        policy=lambda host: _policy(host, page_port, runner_port, secure=addresses.secure),
+        policy=lambda host: _policy(addresses, host, page_port, runner_port),
         revoked=revoked,
     )
-    return _Named(outer, inner)
+    return _Named(Mounted(outer, mount), inner)
+
+
+def _host(scope: HTTPScope) -> str:
+    return dict(scope["headers"]).get(b"host", b"").decode("latin-1")
 
 
 def _answers_strangers(path: str) -> bool:
@@ -144,18 +162,23 @@ class _Named:
         await self._outer(scope, receive, send)
 
 
-def _policy(host: str, page_port: int, runner_port: int | None, *, secure: bool) -> str:
-    http, ws = ("https", "wss") if secure else ("http", "ws")
+def _policy(addresses: Addresses, host: str, page_port: int, runner_port: int | None) -> str:
     connect = "'self'"
-    name = host_name(host)
-    if runner_port is not None and name:
-        shown = f"[{name}]" if ":" in name else name
-        connect += f" {ws}://{shown}:{page_port} {http}://{shown}:{runner_port} {ws}://{shown}:{runner_port}"
+    public = addresses.public_at(host)
+    if runner_port is not None and public is not None:
+        connect += f" {_socket(public.origin)}"  # for older browsers it is not part of 'self'
+    elif runner_port is not None and host_name(host):
+        page, runner = (addresses.direct(host, port) for port in (page_port, runner_port))
+        connect += f" {_socket(page)} {runner} {_socket(runner)}"
     return (
         "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
         f"img-src 'self' data: blob:; font-src 'self'; connect-src {connect}; object-src 'none'; "
         "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
     )
+
+
+def _socket(url: str) -> str:
+    return url.replace("http", "ws", 1)
 
 
 class _OpenApiText(JsonRenderPlugin):

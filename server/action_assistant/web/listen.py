@@ -20,8 +20,10 @@ from litestar.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from action_assistant.errors import CannotStart
+from action_assistant.public import Network
 from action_assistant.settings import EVERYWHERE
 from action_assistant.web.access import KNOWN
+from action_assistant.web.behind import Forwarded
 from action_assistant.web.certificate import Certificate
 from action_assistant.web.connections import Connections, raise_limit
 
@@ -45,10 +47,15 @@ UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it 
 
 
 def serve(
-    make: Callable[[], ASGIApp], *, host: str, port: int, identity: "Identity | None" = None
+    make: Callable[[], ASGIApp],
+    *,
+    host: str,
+    port: int,
+    identity: "Identity | None" = None,
+    proxies: tuple[Network, ...] = (),
 ) -> None:
     """Serve what `make` makes until told to end; nothing is touched before the address is ours.
-    With an `identity` over TLS.
+    With an `identity` over TLS. `proxies` are believed about who asks.
 
     Raises CannotStart when the address is taken or unknown.
     """
@@ -63,7 +70,7 @@ def serve(
         raise
     connections = Connections(raise_limit())
     config = uvicorn.Config(
-        Watched(endings, connections),
+        Watched(Forwarded(endings, proxies), connections),
         http=_Http,
         h11_max_incomplete_event_size=HEAD_LIMIT,
         lifespan="on",

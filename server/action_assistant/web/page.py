@@ -3,6 +3,7 @@
 import gzip
 import hashlib
 import mimetypes
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,7 +11,7 @@ import msgspec
 from litestar.enums import ScopeType
 from litestar.types import ASGIApp, HTTPScope, Receive, Scope, Send
 
-_NOT_PAGES: Final = ("/api/", "/schema", "/healthz", "/readyz", "/metrics")
+_NOT_PAGES: Final = ("/api/", "/runner/", "/schema", "/healthz", "/readyz", "/metrics")
 _COMPRESSED: Final = frozenset({".html", ".js", ".css", ".svg", ".json", ".webmanifest"})
 _UNBUILT: Final = b"""<!doctype html><meta charset="utf-8"><title>Page not built</title>
 <p>The page has not been built. Run <code>make setup</code> in the folder of the source code.</p>
@@ -28,14 +29,21 @@ class File(msgspec.Struct, frozen=True):
 
 
 class Page:
-    """An ASGI middleware that answers for the page's own paths and passes on the rest."""
+    """An ASGI middleware that answers for the page's own paths and passes on the rest.
 
-    def __init__(self, app: ASGIApp, folder: Path) -> None:
+    `root_of(scope)` is the path at which the page lies for whoever asks: "" or as "/temoto".
+    """
+
+    def __init__(
+        self, app: ASGIApp, folder: Path, root_of: Callable[[HTTPScope], str] = lambda _: ""
+    ) -> None:
         self._app = app
         self._folder = folder
+        self._root_of = root_of
         self._built: float | None = None
         self._files: dict[str, File] = {}
         self._index = _file(_UNBUILT, ".html", lasting=False)
+        self._rooted: dict[str, File] = {}
         self._renew()
 
     def _renew(self) -> None:
@@ -47,6 +55,14 @@ class Page:
         if built != self._built:
             files = _load(self._folder)
             self._files, self._index, self._built = files, files["/index.html"], built
+            self._rooted = {}
+
+    def _index_at(self, root: str) -> File:
+        """The page itself. What it names beside it is at its root, whichever address it is opened by."""
+        if root not in self._rooted:
+            body = self._index.body.replace(b'="./', f'="{root}/'.encode())
+            self._rooted[root] = _file(body, ".html", lasting=False)
+        return self._rooted[root]
 
     def knows(self, path: str, accepts_html: bool) -> bool:
         """Whether this path is public: a file of the page, or one of its addresses."""
@@ -66,7 +82,7 @@ class Page:
         found = self._files.get(scope["path"])
         if found is None or found is self._index:
             self._renew()
-            found = self._index
+            found = self._index_at(self._root_of(scope))
         await _send_file(scope, send, found)
 
 

@@ -12,6 +12,7 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, TooMany, Unauthenticated, Unavailable
 from action_assistant.web.access import Needs, cookie_name, known_person, live_session, session_of
+from action_assistant.web.addresses import Addresses
 from action_assistant.web.crowd import Pace
 from action_assistant.web.keys import SESSION_SECONDS, Author, Keys, Person, Session
 from action_assistant.web.problems import PROBLEM_JSON, problem_of
@@ -82,13 +83,13 @@ class Desk:
         page_port: int,
         reception: Callable[[], Reception],
         *,
-        secure: bool,
+        addresses: Addresses | None,
         limits: bool,
     ) -> None:
         self._keys = keys
         self._cookie = cookie_name(page_port)
         self._reception = reception
-        self._secure = secure
+        self._addresses = addresses
         self._pace = Pace(_TRIES_AT_ONCE, _TRIES_PER_MINUTE) if limits else None
 
     def look(self, invitation: str, request: _Asking) -> Invited:
@@ -120,20 +121,21 @@ class Desk:
             case _:
                 raise BadInput("Send the token or an invitation, not both.")
 
-    def answer(self, session: Session) -> Response[SignedIn]:
+    def answer(self, session: Session, request: _Asking) -> Response[SignedIn]:
         """The session as a cookie."""
+        secure, path = self._jar(request)
         cookie = Cookie(
             key=self._cookie,
             value=self._keys.sealed(session),
             max_age=SESSION_SECONDS,
             httponly=True,
             samesite="strict",
-            secure=self._secure,
-            path="/",
+            secure=secure,
+            path=path,
         )
         return Response(_signed_in(session), status_code=200, cookies=[cookie])
 
-    def farewell(self, unwritten: Unavailable | None = None) -> Response[None]:
+    def farewell(self, request: _Asking, unwritten: Unavailable | None = None) -> Response[None]:
         """No cookie any more. `unwritten`: why other processes may not know of it."""
         content: Any = None if unwritten is None else problem_of(unwritten)
         response: Response[None] = Response(
@@ -141,8 +143,14 @@ class Desk:
             status_code=204 if unwritten is None else unwritten.status,
             media_type=None if unwritten is None else PROBLEM_JSON,
         )
-        response.delete_cookie(self._cookie, path="/")
+        response.delete_cookie(self._cookie, path=self._jar(request)[1])
         return response
+
+    def _jar(self, request: _Asking) -> tuple[bool, str]:
+        """Whether a cookie for whoever asks is `Secure`, and its path."""
+        if self._addresses is None:
+            return False, "/"
+        return self._addresses.jar(request.headers.get("host", ""))
 
     def _admit(self, request: _Asking) -> None:
         address = request.client.host if request.client is not None else ""
@@ -157,11 +165,11 @@ def session_routes(
     reception: Callable[[], Reception],
     revoked: Revoked,
     browsers: SignedInBrowsers,
-    secure: bool = False,
+    addresses: Addresses | None = None,
     limits: bool = True,
 ) -> list[ControllerRouterHandler]:
     """The routes under `/api/session`."""
-    desk = Desk(keys, page_port, reception, secure=secure, limits=limits)
+    desk = Desk(keys, page_port, reception, addresses=addresses, limits=limits)
 
     @get("/api/session", summary="Who is signed in")
     async def who(request: _Asking) -> SignedIn:
@@ -178,7 +186,7 @@ def session_routes(
     async def sign_in(data: JSONBody[SignIn], request: _Asking) -> Response[SignedIn]:
         session = await desk.session(data, request)
         await to_thread.run_sync(browsers.note, session)
-        return desk.answer(session)
+        return desk.answer(session, request)
 
     @post(
         "/api/session/invitation",
@@ -194,8 +202,8 @@ def session_routes(
         try:
             await _end(revoked, request)
         except Unavailable as unwritten:
-            return desk.farewell(unwritten)
-        return desk.farewell()
+            return desk.farewell(request, unwritten)
+        return desk.farewell(request)
 
     return [who, sign_in, look, sign_out]
 

@@ -19,7 +19,7 @@ from action_assistant.editor.presence import colour_of
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.version import VERSION
-from action_assistant.web.addresses import host_name
+from action_assistant.web.addresses import Addresses
 from action_assistant.web.keys import Author
 
 _SILENCE: Final = 10.0  # seconds after which a listener is told that we are still here
@@ -60,16 +60,15 @@ class Participant(msgspec.Struct, frozen=True):
     color: str
 
 
-def routes(door: Door) -> list[ControllerRouterHandler]:
+def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
     """Everything that is about no single graph."""
 
     @get("/api/config", summary="What a page has to know", operation_id="getConfig")
     async def get_config(request: Request[Any, Any, Any]) -> Config:
-        host = host_name(request.headers.get("host", "")) or "127.0.0.1"
-        shown = f"[{host}]" if ":" in host else host
-        settings = door.house.settings
-        scheme = "https" if settings.tls else "http"
-        return Config("local", VERSION, f"{scheme}://{shown}:{settings.runner_port}")
+        runner = addresses.runner_at(
+            request.headers.get("host", ""), door.house.settings.runner_port
+        )
+        return Config("local", VERSION, runner)
 
     @get("/api/people", summary="Everyone who acted here", operation_id="listPeople")
     async def list_people() -> list[Participant]:

@@ -75,8 +75,7 @@ def _links(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         guards=[Needs("share")],
     )
     async def list_invitations() -> Sharing:
-        secure = door.house.settings.tls
-        return Sharing(addresses.origins(), secure, door.house.invitations.all())
+        return Sharing(addresses.origins(), addresses.is_encrypted, door.house.invitations.all())
 
     @post(
         "/api/invitations",
@@ -113,7 +112,7 @@ def _one(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         guards=[Needs("share")],
     )
     async def code(invitation: str, origin: str) -> Response[bytes]:
-        if not addresses.allows_origin(origin):
+        if not addresses.is_page(origin):
             raise BadInput("The page is not to be found there.", where={"path": "/origin"})
         found = door.house.invitations.get(invitation)
         if found.path is None:
