@@ -14,6 +14,8 @@ const vendors: { name: string; test: RegExp }[] = [
 
 export default defineConfig({
   plugins: [react()],
+  // The server writes the path at which a proxy shows the page into index.html.
+  base: "./",
   build: {
     outDir: "dist",
     target: "es2022",

@@ -121,11 +121,19 @@ export function Gate({ children }: { children: ReactNode }) {
       void currentPerson().then(ended ? letIn : () => {}, (error) => {
         if (isWithdrawn(error)) setGate({ at: "outside", why: WITHDRAWN });
       });
-    if (ended) look();
-    const timer = setInterval(look, ended ? 3_000 : 30_000);
+    let wait = ended ? 3_000 : 30_000;
+    let timer: ReturnType<typeof setTimeout>;
+    const goOn = () => {
+      timer = setTimeout(goOn, wait);
+      // Nobody else may come for hours: whoever comes back to this page is let in at once.
+      if (ended) wait = Math.min(2 * wait, 60_000);
+      look();
+    };
+    if (ended) goOn();
+    else timer = setTimeout(goOn, wait);
     window.addEventListener("focus", look);
     return () => {
-      clearInterval(timer);
+      clearTimeout(timer);
       window.removeEventListener("focus", look);
     };
   }, [gate.at, ended, letIn]);

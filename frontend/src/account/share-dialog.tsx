@@ -4,6 +4,7 @@ import { useMediaQuery } from "@mantine/hooks";
 import { IconLock, IconLockOpen2, IconPlugConnectedX } from "@tabler/icons-react";
 import { useState } from "react";
 import { sentence } from "../api/http";
+import { pageUrl } from "../api/place";
 import { ROLE_WORDS, type Role } from "../api/session";
 import { type Sharing, useInvite, useSharing } from "../api/sharing";
 import style from "./share-dialog.module.css";
@@ -17,8 +18,8 @@ const LABELS: Record<(typeof INVITED)[number], string> = {
 };
 
 /** The page's own place first, if others can reach it by that. */
-export function originsOf(sharing: Sharing, own: { origin: string; hostname: string }): string[] {
-  const here = /^(localhost|127\.0\.0\.1|\[::1\])$/.test(own.hostname) ? [] : [own.origin];
+export function originsOf(sharing: Sharing, own: { page: string; hostname: string }): string[] {
+  const here = /^(localhost|127\.0\.0\.1|\[::1\])$/.test(own.hostname) ? [] : [own.page];
   return [...new Set([...here, ...sharing.origins])];
 }
 
@@ -99,8 +100,8 @@ function Body() {
   const [chosen, setChosen] = useState<string | null>(null);
   if (sharing.isError) return <Text>{sentence(sharing.error)}</Text>;
   if (!sharing.data) return <div className={style.waiting} aria-busy="true" />;
-  const origins = originsOf(sharing.data, location);
-  const origin = origins.find((each) => each === chosen) ?? origins[0] ?? location.origin;
+  const origins = originsOf(sharing.data, { page: pageUrl(), hostname: location.hostname });
+  const origin = origins.find((each) => each === chosen) ?? origins[0] ?? pageUrl();
   const open = sharing.data.invitations.filter((each) => each.path !== undefined);
   const over = sharing.data.invitations.filter((each) => each.path === undefined);
   return (

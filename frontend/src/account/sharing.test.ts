@@ -25,8 +25,8 @@ test("links begin with the place where the owner has the page, unless others can
     secure: false,
     invitations: [],
   };
-  const here = { origin: "http://127.0.0.1:8000", hostname: "127.0.0.1" };
-  const there = { origin: "http://lab.local:8000", hostname: "lab.local" };
+  const here = { page: "http://127.0.0.1:8000", hostname: "127.0.0.1" };
+  const there = { page: "http://lab.local:8000", hostname: "lab.local" };
   expect(originsOf(sharing, here)).toEqual(sharing.origins);
   expect(originsOf(sharing, there)).toEqual(["http://lab.local:8000", "http://10.0.0.2:8000"]);
   expect(originsOf({ ...sharing, origins: [] }, here)).toEqual([]);

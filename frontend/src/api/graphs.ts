@@ -85,6 +85,8 @@ export function useConfig() {
     queryKey: keys.config,
     queryFn: ({ signal }) => ask<Config>("/api/config", { signal }),
     staleTime: Number.POSITIVE_INFINITY,
+    // Without it there is no way to the runner, nor for Stop.
+    refetchInterval: (query) => (query.state.status === "error" ? 5_000 : false),
   });
 }
 

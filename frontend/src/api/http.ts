@@ -1,6 +1,7 @@
 /** Requests to editor and runner, and how they refuse. */
 
 import { sessionEnd } from "./ended";
+import { here } from "./place";
 
 /** RFC 9457 as both processes answer it. */
 export interface ProblemDetails {
@@ -49,13 +50,47 @@ export interface Ask {
 }
 
 const PATIENCE = 20_000; // ms
+const SESSION = "/api/session";
+
+/** Whether the editor knows who we are; "unsure" when it does not answer. */
+export async function knowsUs(): Promise<"yes" | "no" | "unsure"> {
+  const init: RequestInit = { credentials: "include", signal: AbortSignal.timeout(5_000) };
+  const answer = await fetch(here(SESSION), init).catch(() => null);
+  if (answer?.status === 401) sessionEnd.notice();
+  return answer === null ? "unsure" : answer.status === 401 ? "no" : "yes";
+}
+
+/** The editor tells when a session has ended. The runner may only lack what the cookie is for. */
+async function heard401(isEditor: boolean): Promise<void> {
+  if (isEditor || (await knowsUs()) === "unsure") sessionEnd.notice();
+}
+
+const ENDED: ProblemDetails = {
+  type: "unauthenticated",
+  title: "Sign in first",
+  status: 401,
+  detail: "Your session has ended.",
+};
+
+/** Looks that would only be refused again: what refetches itself would ask for ever. */
+function isIdle(url: string, ask: Ask): boolean {
+  return sessionEnd.now() && (ask.method ?? "GET") === "GET" && !url.startsWith(SESSION);
+}
+
+/** What only a proxy answers without a word of ours. */
+const BY_PROXIES: ReadonlyMap<number, string> = new Map([
+  [413, "Too large for the proxy in front of the server (nginx: client_max_body_size 10m)."],
+  [502, "The proxy in front of the server does not reach it (502)."],
+  [503, "The proxy in front of the server does not reach it (503)."],
+  [504, "The server did not answer the proxy in front of it in time (504)."],
+]);
 
 async function problemOf(response: Response): Promise<ProblemDetails> {
   const fallback = {
     type: UNKNOWN_TYPE,
     title: response.statusText || "Refused",
     status: response.status,
-    detail: `The server answered ${response.status}.`,
+    detail: BY_PROXIES.get(response.status) ?? `The server answered ${response.status}.`,
   };
   try {
     const body: unknown = await response.json();
@@ -67,6 +102,8 @@ async function problemOf(response: Response): Promise<ProblemDetails> {
 }
 
 async function send(url: string, ask: Ask): Promise<Response> {
+  if (isIdle(url, ask)) throw new Refusal(ENDED);
+  const isEditor = url.startsWith("/");
   const patience = AbortSignal.timeout(ask.patience ?? PATIENCE);
   const init: RequestInit = {
     method: ask.method ?? "GET",
@@ -78,12 +115,12 @@ async function send(url: string, ask: Ask): Promise<Response> {
     init.body = typeof ask.body === "string" ? ask.body : JSON.stringify(ask.body);
   }
   try {
-    const response = await fetch(url, init);
-    if (response.status === 401) sessionEnd.notice();
+    const response = await fetch(isEditor ? here(url) : url, init);
+    if (response.status === 401) void heard401(isEditor);
     return response;
   } catch (error) {
     if (ask.signal?.aborted) throw error;
-    throw new Unreachable(url.startsWith("/") ? "The editor" : "The runner");
+    throw new Unreachable(isEditor ? "The editor" : "The runner");
   }
 }
 

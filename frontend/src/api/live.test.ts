@@ -110,8 +110,8 @@ test("a Stop that nobody hears is sent again until somebody does", async () => {
   newest().say({ type: "hello", engines: [], runs: [run("running")] });
   newest().close();
   let dead = true;
-  vi.stubGlobal("fetch", async (url: string) => {
-    posted("POST", url);
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    if (init.method === "POST") posted("POST", url);
     if (dead) throw new TypeError("no network");
     return new Response("{}", { status: 202 });
   });
@@ -177,5 +177,87 @@ test("a beat says when each robot last answered, without another render of every
   expect(live.heard.get("David")).toBe(2000);
   expect(seers).toHaveBeenCalledOnce();
   expect(all).not.toHaveBeenCalled();
+  live.close();
+});
+
+/** What the runner and the editor answer when they are asked over HTTP. */
+function answering(answers: Record<string, number | [number, object]>) {
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    posted(init.method ?? "GET", url);
+    const [, found] = Object.entries(answers).find(([part]) => url.includes(part)) ?? [];
+    if (found === undefined) throw new TypeError("no network");
+    const [status, body] = Array.isArray(found) ? found : [found, {}];
+    return Response.json(body, { status });
+  });
+}
+
+/** The socket is refused before it opens, again and again. */
+async function refusing(seconds: number): Promise<void> {
+  for (let i = 0; i < seconds * 10; i += 1) {
+    if (newest().readyState === 1) newest().close(1006);
+    await vi.advanceTimersByTimeAsync(100);
+  }
+}
+
+test("a runner that an encrypted page may not ask is said to be so, and breaks nothing", async () => {
+  vi.stubGlobal("location", new URL("https://robots.example/"));
+  vi.stubGlobal("WebSocket", function refuse() {
+    throw new DOMException("insecure", "SecurityError");
+  });
+  const live = new Live("http://robots.example:8001");
+  live.open();
+  await vi.advanceTimersByTimeAsync(1_000);
+  expect(live.now.link).toBe("down");
+  expect(live.now.why).toContain("--public-url https://robots.example/");
+  live.close();
+});
+
+test("once the session has ended nobody knocks again until somebody signs in", async () => {
+  answering({ "/api/session": 401, "/api/reach": 401 });
+  const live = new Live("http://h:1");
+  live.open();
+  await refusing(10);
+  expect(sessionEnd.now()).toBe(true);
+  const dialled = Wire.all.length;
+  const asked = posted.mock.calls.length;
+  await refusing(120);
+  expect([Wire.all.length, posted.mock.calls.length]).toEqual([dialled, asked]);
+  sessionEnd.clear();
+  live.redial();
+  expect(Wire.all.length).toBe(dialled + 1);
+  live.close();
+});
+
+test("a runner that does not know a session which the editor knows ends no session", async () => {
+  answering({ "/api/session": 200, "/api/reach": 401 });
+  const live = new Live("http://h:1");
+  live.open();
+  await refusing(60);
+  expect(sessionEnd.now()).toBe(false);
+  expect(live.now.why).toContain("does not know your session");
+  expect(Wire.all.length).toBeLessThan(12);
+  live.close();
+});
+
+test("a proxy that passes no sockets on is told from a runner that does not answer", async () => {
+  answering({ "/api/reach": 200 });
+  const live = new Live("https://robots.example/runner");
+  live.open();
+  await refusing(3);
+  expect(live.now.why).toContain("WebSockets");
+  answering({});
+  await refusing(10);
+  expect(live.now.why).toContain("does not answer");
+  newest().say({ type: "hello", engines: [], runs: [] });
+  expect(live.now.why).toBe("");
+  live.close();
+});
+
+test("a proxy that leads the runner's address elsewhere is told so", async () => {
+  answering({ "/api/reach": [502, { type: "misrouted", title: "T", detail: "To the runner!" }] });
+  const live = new Live("https://robots.example/runner");
+  live.open();
+  await refusing(3);
+  expect(live.now.why).toContain("To the runner!");
   live.close();
 });

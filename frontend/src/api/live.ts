@@ -4,6 +4,7 @@ import { sessionEnd } from "./ended";
 import { Refusal, sentence } from "./http";
 import type { Robot } from "./robots";
 import { getRun, postStop, type Run } from "./runs";
+import { forbidden, type Unreached, unreached } from "./unreached";
 
 export type LiveLink = "connecting" | "live" | "down";
 
@@ -24,6 +25,8 @@ export interface LiveNow {
   link: LiveLink;
   /** When the link became what it is, ms. */
   since: number;
+  /** Why the link is not there, as far as that was found out; "" while it is. */
+  why?: string;
   engines: readonly Robot[];
   runs: ReadonlyMap<string, Run>;
   stops: readonly StopAsked[];
@@ -46,6 +49,8 @@ const SESSION_ENDED = 4401;
 const SILENCE = 3_500; // ms; the runner beats each second
 const STOPS_KEPT = 5;
 const AGAIN = 1_000; // ms between two tries to send a Stop
+const SOON = 5_000; // ms; the longest wait for another try to reach the runner
+const SELDOM = 60_000; // ms; the same where trying soon has proven to be of no use
 const ALL_HOLDS = 5_000; // ms; later, "all" would mean runs that nobody had seen when it was asked
 
 /** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
@@ -69,6 +74,8 @@ export class Live {
   #again: ReturnType<typeof setTimeout> | undefined;
   #tries = 0;
   #closed = false;
+  /** What was found out about the last socket that did not open. */
+  #unreached: Unreached | null = null;
 
   constructor(runner: string) {
     this.#runner = runner;
@@ -89,10 +96,12 @@ export class Live {
 
   /** A fresh socket in place of the old one: the runner knows a socket by the session it opened with. */
   redial(): void {
+    if (this.#closed) return;
     const old = this.#socket;
-    if (old === null || this.#closed) return;
     this.#socket = null;
-    old.close();
+    this.#unreached = null;
+    this.#tries = 0;
+    old?.close();
     this.#connect();
   }
 
@@ -148,17 +157,29 @@ export class Live {
   }
 
   #connect(): void {
+    clearTimeout(this.#again);
     if (this.#closed) return;
+    const barred = forbidden(this.#runner);
+    if (barred !== null) {
+      this.#unreached = barred;
+      this.#down();
+      return;
+    }
     const socket = new WebSocket(`${this.#runner.replace(/^http/, "ws")}/api/live`);
+    let opened = false;
     this.#socket = socket;
     this.#expect(socket);
+    socket.onopen = () => {
+      opened = true;
+    };
     socket.onmessage = (event) => {
+      opened = true;
       this.#expect(socket);
       this.#hear(JSON.parse(String(event.data)) as Message);
     };
     socket.onclose = ({ code }) => {
       if (code === SESSION_ENDED) sessionEnd.notice();
-      this.#lost(socket);
+      this.#lost(socket, opened);
     };
   }
 
@@ -166,26 +187,46 @@ export class Live {
   #expect(socket: WebSocket): void {
     clearTimeout(this.#watch);
     this.#watch = setTimeout(() => {
-      this.#lost(socket);
+      this.#lost(socket, false);
       socket.close();
     }, SILENCE);
   }
 
-  #lost(socket: WebSocket): void {
+  #lost(socket: WebSocket, opened: boolean): void {
     if (this.#socket !== socket) return;
     this.#socket = null;
     clearTimeout(this.#watch);
+    this.#down();
+    if (!opened && !this.#closed) void this.#findOut();
+  }
+
+  /** There is no link; another try comes after a while, unless nobody is signed in. */
+  #down(): void {
     if (this.now.link !== "down") this.#set({ link: "down", since: Date.now() });
-    if (this.#closed) return;
-    const wait = Math.min(5_000, 250 * 2 ** this.#tries) * (0.7 + 0.6 * Math.random());
+    this.#set({ why: this.#unreached?.why ?? "" });
+    clearTimeout(this.#again);
+    if (this.#closed || this.#unreached?.kind === "ended") return;
+    const longest = this.#unreached?.kind === "strange" ? SELDOM : SOON;
+    const wait = Math.min(longest, 250 * 2 ** this.#tries) * (0.7 + 0.6 * Math.random());
     this.#tries += 1;
     this.#again = setTimeout(() => this.#connect(), wait);
+  }
+
+  /** A browser does not tell why a socket did not open. */
+  async #findOut(): Promise<void> {
+    const turn = this.#again;
+    const found = await unreached(this.#runner);
+    if (this.#closed || this.now.link === "live" || turn !== this.#again) return;
+    this.#unreached = found;
+    this.#set({ why: found.why });
+    if (found.kind === "ended") clearTimeout(this.#again);
   }
 
   #hear(message: Message): void {
     switch (message.type) {
       case "hello": {
         this.#tries = 0;
+        this.#unreached = null;
         const runs = new Map(this.now.runs);
         const open = new Set(message.runs.map((run) => run.id));
         // What this page believed to be open and the runner no longer names has ended unseen.
@@ -198,7 +239,7 @@ export class Live {
           );
         }
         for (const run of message.runs) runs.set(run.id, run);
-        this.#set({ link: "live", since: Date.now(), engines: message.engines, runs });
+        this.#set({ link: "live", why: "", since: Date.now(), engines: message.engines, runs });
         break;
       }
       case "run":

@@ -2,6 +2,7 @@
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import type { Author } from "./graphs";
 import { ask } from "./http";
+import { here } from "./place";
 import type { Role } from "./roles";
 
 export interface Guest {
@@ -71,5 +72,6 @@ export function useRevoke(runner: string | undefined) {
 
 /** The code of a link as a picture. */
 export function codeUrl(invitation: string, origin: string): string {
-  return `/api/invitations/${encodeURIComponent(invitation)}/qr?origin=${encodeURIComponent(origin)}`;
+  const path = `/api/invitations/${encodeURIComponent(invitation)}/qr`;
+  return here(`${path}?origin=${encodeURIComponent(origin)}`);
 }

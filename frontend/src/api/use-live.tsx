@@ -4,11 +4,13 @@ import {
   type ReactNode,
   use,
   useEffect,
+  useMemo,
   useRef,
   useState,
   useSyncExternalStore,
 } from "react";
 import { useConfig } from "./graphs";
+import { sentence } from "./http";
 import { Live, type LiveNow } from "./live";
 import type { Held, Robot } from "./robots";
 import type { Run } from "./runs";
@@ -16,13 +18,17 @@ import type { Run } from "./runs";
 interface LiveHold {
   live: Live | null;
   runner: string | undefined;
+  /** Why the page does not know where the runner is; "" when it does. */
+  lost: string;
 }
 
-const Context = createContext<LiveHold>({ live: null, runner: undefined });
+const Context = createContext<LiveHold>({ live: null, runner: undefined, lost: "" });
 
 /** Holds the page's one socket to the runner. `who` is who speaks: another name dials anew. */
 export function LiveProvider({ who, children }: { who: string; children: ReactNode }) {
-  const runner = useConfig().data?.runner_url;
+  const config = useConfig();
+  const runner = config.data?.runner_url;
+  const lost = config.isError ? sentence(config.error) : "";
   const [live, setLive] = useState<Live | null>(null);
   useEffect(() => {
     if (runner === undefined) return;
@@ -37,22 +43,28 @@ export function LiveProvider({ who, children }: { who: string; children: ReactNo
     known.current = who;
     live?.redial();
   }, [who, live]);
-  return <Context value={{ live, runner }}>{children}</Context>;
+  const hold = useMemo(() => ({ live, runner, lost }), [live, runner, lost]);
+  return <Context value={hold}>{children}</Context>;
 }
 
 const NOTHING: LiveNow = {
   link: "connecting",
-  since: 0,
+  since: Date.now(),
   engines: [],
   runs: new Map(),
   stops: [],
 };
 const never = () => () => {};
 
+/** Before the runner's address is known; with the reason, once there is one. */
+const unknown = (lost: string): LiveNow =>
+  lost === "" ? NOTHING : { ...NOTHING, link: "down", why: `Its address is not known. ${lost}` };
+
 export function useLive(): LiveHold & { now: LiveNow } {
   const hold = use(Context);
-  const { live } = hold;
-  const now = useSyncExternalStore(live?.subscribe ?? never, () => live?.now ?? NOTHING);
+  const { live, lost } = hold;
+  const nothing = useMemo(() => unknown(lost), [lost]);
+  const now = useSyncExternalStore(live?.subscribe ?? never, () => live?.now ?? nothing);
   return { ...hold, now };
 }
 

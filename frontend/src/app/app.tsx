@@ -3,11 +3,12 @@ import { MantineProvider } from "@mantine/core";
 import { Notifications } from "@mantine/notifications";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import type { ReactNode } from "react";
-import { Route, Switch } from "wouter";
+import { Route, Router, Switch } from "wouter";
 import { AskName } from "../account/ask-name";
 import { Gate } from "../account/gate";
 import { Refusal } from "../api/http";
 import { usePerson } from "../api/person";
+import { base } from "../api/place";
 import { LiveProvider } from "../api/use-live";
 import { StopNotice } from "../runs/stop-notice";
 import { UnsureStartNotice } from "../runs/unsure-start";
@@ -52,28 +53,30 @@ export function App() {
     <MantineProvider theme={theme} cssVariablesResolver={variables} defaultColorScheme="auto">
       <Notifications position="bottom-right" zIndex={350} />
       <QueryClientProvider client={client}>
-        <Gate>
-          <Live>
-            <DropFiles>
-              <Switch>
-                <Route path="/" component={HomeScreen} />
-                <Route path="/graphs/:id">{({ id }) => <GraphScreen key={id} id={id} />}</Route>
-                <Route path="/robots" component={RobotsScreen} />
-                <Route path="/runs" component={RunsScreen} />
-                <Route path="/runs/compare" component={CompareScreen} />
-                <Route path="/runs/statistics" component={StatisticsScreen} />
-                <Route path="/runs/:id">{({ id }) => <RunScreen key={id} id={id} />}</Route>
-                <Route component={Lost} />
-              </Switch>
-              <AskName />
-              <ReviewDialog />
-              <StopNotice />
-              <UnsureStartNotice />
-              <CarriedGhost carrier={actionCarrier} />
-              <LiveRegion />
-            </DropFiles>
-          </Live>
-        </Gate>
+        <Router base={base}>
+          <Gate>
+            <Live>
+              <DropFiles>
+                <Switch>
+                  <Route path="/" component={HomeScreen} />
+                  <Route path="/graphs/:id">{({ id }) => <GraphScreen key={id} id={id} />}</Route>
+                  <Route path="/robots" component={RobotsScreen} />
+                  <Route path="/runs" component={RunsScreen} />
+                  <Route path="/runs/compare" component={CompareScreen} />
+                  <Route path="/runs/statistics" component={StatisticsScreen} />
+                  <Route path="/runs/:id">{({ id }) => <RunScreen key={id} id={id} />}</Route>
+                  <Route component={Lost} />
+                </Switch>
+                <AskName />
+                <ReviewDialog />
+                <StopNotice />
+                <UnsureStartNotice />
+                <CarriedGhost carrier={actionCarrier} />
+                <LiveRegion />
+              </DropFiles>
+            </Live>
+          </Gate>
+        </Router>
       </QueryClientProvider>
     </MantineProvider>
   );

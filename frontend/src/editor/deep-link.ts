@@ -1,5 +1,6 @@
 /** Addresses of a graph and of what is in it: an action, an arrow, a problem. */
 
+import { pageUrl } from "../api/place";
 import { relationId } from "../graph/layout";
 import type { Graph } from "../graph/model";
 
@@ -7,9 +8,9 @@ import type { Graph } from "../graph/model";
 export function linkTo(
   graph: string,
   selection: readonly string[],
-  origin: string = window.location.origin,
+  page: string = pageUrl(),
 ): string {
-  const url = new URL(`/graphs/${encodeURIComponent(graph)}`, origin);
+  const url = new URL(`${page}/graphs/${encodeURIComponent(graph)}`);
   for (const id of selection.slice(0, 20)) {
     url.searchParams.append(id.includes(">") ? "arrow" : "action", id);
   }
@@ -20,10 +21,10 @@ export function linkTo(
 export function linkToProblem(
   graph: string,
   problem: { readonly code: string; readonly where: { aid?: string; relation?: string } },
-  origin: string = window.location.origin,
+  page: string = pageUrl(),
 ): string {
   const place = problem.where.relation ?? problem.where.aid;
-  const url = new URL(linkTo(graph, place === undefined ? [] : [place], origin));
+  const url = new URL(linkTo(graph, place === undefined ? [] : [place], page));
   url.searchParams.set("problem", problem.code);
   return url.href;
 }

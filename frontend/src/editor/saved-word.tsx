@@ -25,6 +25,7 @@ const whys: Record<Why, string> = {
   "not-accepted": "The server refused a change",
   restarting: "The editor restarts",
   "too-slow": "Connection too slow",
+  "no-socket": "No connection",
 };
 
 export interface Saved {

@@ -1,5 +1,6 @@
 /** Taking a graph away as a file: UMRF as the server writes it, or a picture of the canvas. */
 import { notifications } from "@mantine/notifications";
+import { here } from "../api/place";
 import { pictureOf } from "../ui/canvas/picture";
 import type { Bench, Format } from "./bench";
 
@@ -53,7 +54,7 @@ async function rasterised(svg: string, width: number, height: number): Promise<B
 export async function takeAway(bench: Bench, format: Format): Promise<void> {
   const name = fileName(bench.graph.name);
   if (format === "umrf") {
-    save(`/api/graphs/${encodeURIComponent(bench.id)}/umrf`, `${name}.umrf.graph.json`);
+    save(here(`/api/graphs/${encodeURIComponent(bench.id)}/umrf`), `${name}.umrf.graph.json`);
     return;
   }
   try {

@@ -14,6 +14,7 @@ import {
 } from "../api/graphs";
 import { sentence } from "../api/http";
 import { useMay } from "../api/person";
+import { here } from "../api/place";
 import style from "./home.module.css";
 
 /** "x copy", "x copy 2" …: the first that no graph is called. */
@@ -133,7 +134,7 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
           </Menu.Item>
           <Menu.Item
             component="a"
-            href={`/api/graphs/${encodeURIComponent(graph.id)}/umrf`}
+            href={here(`/api/graphs/${encodeURIComponent(graph.id)}/umrf`)}
             download={`${graph.name || "graph"}.umrf.graph.json`}
             leftSection={<IconShare3 size={15} />}
           >

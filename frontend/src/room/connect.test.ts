@@ -444,3 +444,30 @@ test("the address of a room follows the page's own", () => {
   expect(roomUrl("a/b", "https://host:1/graphs/x?y#z")).toBe("wss://host:1/api/graphs/a%2Fb/room");
   expect(roomUrl("g", "http://host/")).toBe("ws://host/api/graphs/g/room");
 });
+
+test("a server that lets in but opens no socket is told from one that does not answer", async () => {
+  let answers = true;
+  const admit = async () => {
+    if (!answers) throw new Error("nobody answers");
+    return null;
+  };
+  const other = connect({ url: "ws://h/room", open: server.open, random: () => 1, admit });
+  const settle = () => vi.advanceTimersByTimeAsync(20_000);
+  await vi.advanceTimersByTimeAsync(0);
+  server.last.end(1006);
+  expect(other.link()).toMatchObject({ state: "offline" });
+  expect(other.link().why).toBeUndefined(); // once may be a restart
+  await vi.advanceTimersByTimeAsync(300);
+  server.last.end(1006);
+  expect(other.link()).toMatchObject({ state: "offline", why: "no-socket" });
+  answers = false;
+  await settle();
+  expect(other.link().why).toBeUndefined();
+  answers = true;
+  await settle();
+  server.accept();
+  expect(other.link().why).toBeUndefined();
+  server.last.end(1006);
+  expect(other.link().why).toBeUndefined();
+  other.close();
+});

@@ -58,6 +58,8 @@ export class Line {
   private probedAt: number | null = null;
   private turn = 0;
   private attempts = 0;
+  /** Sockets in a row that did not open although the door had let us in. */
+  private unopened = 0;
   private retry: ReturnType<typeof setTimeout> | undefined;
   private readonly watch: ReturnType<typeof setInterval>;
 
@@ -118,8 +120,10 @@ export class Line {
     const why = await admit(this.attempts > 0).catch(() => "nobody" as const);
     if (turn !== this.turn || this.phase === "closed") return;
     if (why === null) this.enter();
-    else if (why === "nobody") this.stayAway(undefined);
-    else this.stop(why);
+    else if (why === "nobody") {
+      this.unopened = 0;
+      this.stayAway(undefined);
+    } else this.stop(why);
   }
 
   private enter(): void {
@@ -128,13 +132,19 @@ export class Line {
     this.socket = socket;
     this.heardAt = Date.now();
     this.probedAt = null;
+    let opened = false;
     socket.onopen = () => {
       if (socket !== this.socket) return;
       this.heardAt = Date.now();
+      this.unopened = 0;
+      opened = true;
       this.speaker.onOpen();
     };
     socket.onmessage = ({ data }) => this.onMessage(socket, data);
-    socket.onclose = ({ code, reason }) => this.onClose(socket, code, reason);
+    socket.onclose = ({ code, reason }) => {
+      if (!opened && this.options.admit !== null) this.unopened += 1;
+      this.onClose(socket, code, reason);
+    };
     socket.onerror = () => undefined; // a close event follows
   }
 
@@ -156,7 +166,7 @@ export class Line {
     this.drop();
     const refused = frames.refusedBy(code, reason);
     if (refused !== undefined) this.stop(refused);
-    else this.stayAway(frames.PASSING.get(code));
+    else this.stayAway(frames.PASSING.get(code) ?? (this.unopened > 1 ? "no-socket" : undefined));
   }
 
   private stop(why: Why): void {

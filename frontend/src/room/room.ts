@@ -2,6 +2,7 @@
 
 import type { Awareness } from "y-protocols/awareness";
 import type * as Y from "yjs";
+import { here } from "../api/place";
 import type { Device, Shelf } from "./device";
 import type { Stranded } from "./history";
 
@@ -17,7 +18,8 @@ export type Why =
   | "full"
   | "not-accepted"
   | "restarting"
-  | "too-slow";
+  | "too-slow"
+  | "no-socket";
 
 export interface Link {
   /** `refused` does not come back by itself: see `why` and `reconnect`. */
@@ -93,8 +95,8 @@ export interface Keep extends Shelf {
 }
 
 /** The address of a graph's room on the server that the page came from. */
-export function roomUrl(graph: string, base: string | URL = window.location.href): string {
-  const url = new URL(`/api/graphs/${encodeURIComponent(graph)}/room`, base);
+export function roomUrl(graph: string, from: string | URL = window.location.href): string {
+  const url = new URL(here(`/api/graphs/${encodeURIComponent(graph)}/room`), from);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   return url.href;
 }

@@ -43,6 +43,8 @@ const refusals: Readonly<Record<Why, string>> = {
   "not-accepted": "The server refused a change.",
   restarting: "The server restarts.",
   "too-slow": "The connection is too slow.",
+  "no-socket":
+    "The server answers, but no live connection to it opens: a proxy in between may not pass WebSockets on.",
 };
 
 function where(link: Link): string {

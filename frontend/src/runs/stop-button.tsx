@@ -1,7 +1,7 @@
 /** STOP: one, always at the same place, never disabled; STOP ALL by keys from anywhere. */
 import { IconSquareFilled } from "@tabler/icons-react";
 import { useEffect } from "react";
-import type { Live } from "../api/live";
+import type { Live, LiveLink } from "../api/live";
 import type { Run } from "../api/runs";
 import { foreignGraphs, openRuns, useLive } from "../api/use-live";
 import style from "./stop-button.module.css";
@@ -30,8 +30,9 @@ function useStopKey(live: Live | null): void {
   }, [live]);
 }
 
-function words(link: string, count: number): string {
+export function words(link: LiveLink, count: number): string {
   if (link === "down") return "state unknown";
+  if (link === "connecting") return "asking …";
   if (count === 0) return "nothing runs";
   return count === 1 ? "1 run" : `${count} runs`;
 }

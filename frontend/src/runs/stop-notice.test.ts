@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
 import type { LiveNow, StopAsked } from "../api/live";
 import { awaitsLook, type Run } from "../api/runs";
-import { meantBy } from "./stop-button";
-import { movingAgain, noticeOf, othersNotice } from "./stop-notice";
+import { meantBy, words } from "./stop-button";
+import { movingAgain, noticeOf, othersNotice, unreached } from "./stop-notice";
 
 const stop: StopAsked = { id: "s", run: "r", at: 1000, state: "heard", detail: "" };
 
@@ -114,4 +114,17 @@ test("a run that was called stopped and moves again is shouted before anything e
   expect(notice?.text).toContain("MOVES AGAIN: run 7: David shows Work_0 moving");
   expect(notice?.text).toContain("It is being stopped again.");
   expect(notice?.text).toContain("hardware stop");
+});
+
+test("a runner that is not reached is never silence", () => {
+  for (const link of ["connecting", "down"] as const) {
+    const lost = { ...now(null, link), why: "The runner does not answer." };
+    expect(unreached(lost, 1_000)).toBeNull(); // a moment is nothing to shout about
+    const notice = unreached(lost, 60_000);
+    expect(notice?.tone).toBe("loud");
+    expect(notice?.text).toContain("The runner does not answer.");
+    expect(notice?.text).toContain("hardware stop");
+    expect(words(link, 0)).not.toBe("nothing runs");
+  }
+  expect(unreached(now(null), 60_000)).toBeNull();
 });

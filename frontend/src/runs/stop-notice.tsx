@@ -120,6 +120,16 @@ export function othersNotice(now: LiveNow): Notice {
   return { tone: "loud", stays: true, text };
 }
 
+const UNREACHED = 6_000; // ms that the runner may take to answer before a page says that it does not
+
+/** Stop looks as always: where it would reach nobody that has to be said before it is needed. */
+export function unreached(now: LiveNow, at: number): Notice {
+  if (now.link === "live" || at - now.since < UNREACHED) return null;
+  const why = now.why || "The runner does not answer.";
+  const text = `STOP MAY REACH NOBODY: ${why} Use the hardware stop.`;
+  return { tone: "loud", stays: true, text };
+}
+
 export function StopNotice() {
   const { now } = useLive();
   const [dismissed, setDismissed] = useState("");
@@ -128,9 +138,12 @@ export function StopNotice() {
   const open = openRuns(now).length;
   const busy =
     watching && (open > 0 || last.state !== "heard" || Date.now() - last.at < GONE + 1000);
-  const at = useNow(200, busy);
+  const at = useNow(200, busy || now.link !== "live");
   const notice =
-    movingAgain(now) ?? (watching ? noticeOf(last, now, at) : null) ?? othersNotice(now);
+    movingAgain(now) ??
+    (watching ? noticeOf(last, now, at) : null) ??
+    othersNotice(now) ??
+    unreached(now, at);
   if (notice === null) return null;
   const looked =
     notice.tone === "loud" && now.link !== "down" ? openRuns(now).find(awaitsLook) : undefined;
