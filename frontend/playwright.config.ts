@@ -17,8 +17,13 @@ const launchOptions = {
     "--disable-sync",
   ],
 };
-/** A name of the network that leads to this computer: its pages are no secure context. */
-const lan = [...launchOptions.args, "--host-resolver-rules=MAP lab.test 127.0.0.1"];
+/** Names of the network that lead to this computer: on plain http their pages are no secure context. */
+const lan = [
+  ...launchOptions.args,
+  "--host-resolver-rules=MAP lab.test 127.0.0.1, MAP robots.test 127.0.0.1",
+];
+
+const NAMED = ["lan.spec.ts", "proxy.spec.ts"];
 
 export default defineConfig({
   testDir: "e2e",
@@ -43,10 +48,10 @@ export default defineConfig({
     launchOptions,
   },
   projects: [
-    { name: "here", testIgnore: "lan.spec.ts" },
+    { name: "here", testIgnore: NAMED },
     {
       name: "lan",
-      testMatch: "lan.spec.ts",
+      testMatch: NAMED,
       use: { launchOptions: { ...launchOptions, args: lan } },
     },
   ],

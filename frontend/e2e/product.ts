@@ -200,6 +200,13 @@ async function freePorts(): Promise<number> {
   }
 }
 
+/** A port that nobody listens on. */
+export async function freePort(): Promise<number> {
+  const found = await listen(0);
+  await found.close();
+  return found.port;
+}
+
 function listen(port: number): Promise<{ port: number; close: () => Promise<void> }> {
   return new Promise((done, fail) => {
     const server = createServer();

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 import anyio
+import httpx
 import msgspec
 from sqlalchemy import create_engine
 from sqlalchemy.exc import DBAPIError
@@ -31,12 +32,21 @@ from action_assistant.runner import archive
 from action_assistant.runner.links.findings import Finding, Verdict
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2_checkup import look
+from action_assistant.settings import reached
 from action_assistant.version import VERSION
+from action_assistant.web.access import REFUSED_SOCKET
+from action_assistant.web.certificate import Certificate
 from action_assistant.web.listen import bound
 
 _SIGNS: Final[dict[Verdict, str]] = {"fine": "✓", "note": "·", "wrong": "✗"}
 _SOUND_SQLITE: Final = (3, 51, 3)
 _ROS_S: Final = 60.0
+_UPGRADE: Final = {
+    "connection": "Upgrade",
+    "upgrade": "websocket",
+    "sec-websocket-version": "13",
+    "sec-websocket-key": "dGhlIHNhbXBsZSBub25jZQ==",
+}
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -57,6 +67,9 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     doctor.add_argument("--host", default="127.0.0.1", metavar="H", help="default: %(default)s")
     doctor.add_argument("--port", type=port_number, default=8000, metavar="N", help="default: 8000")
+    doctor.add_argument(
+        "--public-url", metavar="URL", help="where a proxy shows the page; it is asked there"
+    )
     doctor.add_argument(
         "--only", choices=("machine", "ros"), help="look at one side of it only; default: at both"
     )
@@ -91,6 +104,7 @@ def _machine(options: argparse.Namespace) -> Iterator[Finding]:
     yield from _sqlite()
     yield _port("editor", options.host, options.port)
     yield _port("runner", options.host, options.port + 1)
+    yield from _public(options)
     yield _clock()
 
 
@@ -219,6 +233,37 @@ def _ours(host: str, port: int) -> bool:
         except (urllib.error.URLError, OSError):
             continue
     return False
+
+
+def _public(options: argparse.Namespace) -> Iterator[Finding]:
+    """Whether the proxy leads to both processes, and passes sockets on. Nothing secret is sent."""
+    try:
+        public = reached(options.public_url, None).public
+    except CannotStart as error:
+        yield _wrong("public address", str(error))
+        return
+    if public is not None:
+        trust = Certificate(options.data).trusting_too()
+        with httpx.Client(verify=trust, timeout=5, trust_env=False) as client:
+            yield _shown(client, "page", public.page)
+            yield _shown(client, "runner", public.runner)
+
+
+def _shown(client: httpx.Client, name: str, url: str) -> Finding:
+    topic = f"{name} in public"
+    advice = "docs/proxy has the files for nginx and Caddy."
+    try:
+        health = client.get(f"{url}/healthz")
+        live = client.get(f"{url}/api/live", headers=_UPGRADE)
+    except httpx.HTTPError as error:
+        return _wrong(topic, f"{url} does not answer: {error}.", "Is the proxy running? " + advice)
+    if health.status_code != 200 or "version" not in health.text:
+        what = f"What answers at {url} is not the {name} ({health.status_code})."
+        return _wrong(topic, what, f"The proxy has to lead it to the {name}'s port. {advice}")
+    if REFUSED_SOCKET[0].decode() not in live.headers:
+        what = f"The proxy at {url} passes no WebSockets on."
+        return _wrong(topic, what, f"nginx: the headers Upgrade and Connection. {advice}")
+    return _fine(topic, f"{url} leads to the {name}, and passes WebSockets on.")
 
 
 def _clock() -> Finding:

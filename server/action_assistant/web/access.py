@@ -44,6 +44,8 @@ _HEADERS: Final = (
     (b"cross-origin-opener-policy", b"same-origin"),
     (b"x-frame-options", b"DENY"),
 )
+#: Of a refused upgrade: who gets the same refusal without it is behind a proxy that passes none on.
+REFUSED_SOCKET: Final = (b"x-refused", b"websocket")
 #: Or nginx would pass events on when it has some kilobytes of them.
 _UNBUFFERED: Final = (b"x-accel-buffering", b"no")
 
@@ -362,6 +364,8 @@ async def refuse(
     log.info("refused %s: %s", scope["path"], refused.detail)
     body = problem_of(refused)
     fields = [(b"content-type", b"application/problem+json")]
+    if scope["type"] == ScopeType.WEBSOCKET:
+        fields.append(REFUSED_SOCKET)
     if refused.status == 401:
         fields.append((b"www-authenticate", b"Bearer"))
     if refused.status == 429:

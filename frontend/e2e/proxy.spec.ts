@@ -1,0 +1,259 @@
+/**
+ * The main job through a proxy with TLS, under a real name and below a path: draw, run, Stop; and what
+ * the page says where the proxy is not as the documentation has it.
+ */
+
+import { type Browser, expect, type Page, test } from "@playwright/test";
+import { add, card, saved, start } from "./bench";
+import { freePort, type Person, Product, TOKEN } from "./product";
+import { type Kind, missing, NAME, Proxy } from "./proxies";
+
+/** A picture for who looks, when a folder for them is named. */
+async function picture(page: Page, name: string): Promise<void> {
+  const folder = process.env.PROXY_PICTURES;
+  if (folder !== undefined) await page.screenshot({ path: `${folder}/${name}.png` });
+}
+
+interface Setting {
+  readonly product: Product;
+  readonly proxy: Proxy;
+  end(): Promise<void>;
+}
+
+async function behind(
+  kind: Kind,
+  path: string,
+  change?: (text: string) => string,
+  named = true,
+): Promise<Setting> {
+  const proxy = new Proxy(kind, path, await freePort());
+  const product = new Product(named ? ["--public-url", `${proxy.url}/`] : [], named ? "" : NAME);
+  await product.start();
+  await proxy.start(product.port, change);
+  return {
+    product,
+    proxy,
+    end: async () => {
+      await proxy.dispose();
+      await product.dispose();
+    },
+  };
+}
+
+/** Somebody opens the link that the server printed, at the public address. */
+async function arrive(
+  browser: Browser,
+  proxy: Proxy,
+  link = `/#t=${TOKEN}`,
+): Promise<Person & { refused: string[] }> {
+  const context = await browser.newContext({ ignoreHTTPSErrors: true });
+  const page = await context.newPage();
+  const failures: string[] = [];
+  const refused: string[] = [];
+  page.on("pageerror", (error) => failures.push(error.message));
+  page.on("response", (answer) => {
+    if (answer.status() >= 400) refused.push(`${answer.status()} ${answer.url()}`);
+  });
+  await page.goto(proxy.url + link);
+  const field = page.getByRole("textbox", { name: /others see you/i });
+  await field.fill("Ada");
+  await field.press("Enter");
+  await field.waitFor({ state: "detached" });
+  return { context, page, failures, refused };
+}
+
+const stopButton = (page: Page) => page.getByRole("button", { name: /^Stop run/ });
+
+function stateOf(product: Product, graph: string): () => Promise<string | undefined> {
+  return async () => {
+    const runs = await product.ask<{ state: string }[]>(
+      `/api/runs?graph=${graph}`,
+      {},
+      product.runnerUrl,
+    );
+    return runs[0]?.state;
+  };
+}
+
+const CASES = [
+  ["nginx", "/temoto"],
+  ["caddy", "/temoto"],
+  ["nginx", ""],
+] as const;
+
+for (const [kind, path] of CASES) {
+  test.describe(`${kind}, ${path === "" ? "at the root" : "below a path"}`, () => {
+    test.skip(missing(kind) !== "", missing(kind));
+    let setting: Setting;
+    test.beforeAll(async () => {
+      setting = await behind(kind, path);
+    });
+    test.afterAll(() => setting?.end());
+
+    test("somebody draws, opens a deep link anew, runs and stops", async ({ browser }) => {
+      test.setTimeout(120_000);
+      const { product, proxy } = setting;
+      const { page, context, failures, refused } = await arrive(browser, proxy);
+      expect(await page.evaluate(() => window.isSecureContext)).toBe(true);
+      const [cookie, ...others] = await context.cookies();
+      expect(others).toEqual([]);
+      expect(cookie).toMatchObject({
+        name: `aa_${product.port}`,
+        domain: NAME,
+        path: `${path}/`,
+        secure: true,
+        httpOnly: true,
+        sameSite: "Strict",
+      });
+
+      const graph = await product.chain(60);
+      await page.goto(`${proxy.url}/graphs/${graph}`);
+      await expect(card(page, "Wait")).toBeVisible({ timeout: 45_000 });
+      await saved(page);
+      await add(page, "Sooner");
+      await saved(page);
+      await page.reload();
+      await expect(card(page, "Sooner")).toBeVisible({ timeout: 45_000 });
+      await saved(page);
+
+      await start(page);
+      await expect(stopButton(page)).toBeVisible();
+      await expect(page.getByText("Live", { exact: true }).first()).toBeVisible();
+      await picture(page, `${kind}${path.replace("/", "-")}`);
+      await page.setViewportSize({ width: 390, height: 844 });
+      await picture(page, `${kind}${path.replace("/", "-")}-phone`);
+      await page.setViewportSize({ width: 1440, height: 900 });
+      await stopButton(page).click();
+      await expect.poll(stateOf(product, graph)).toBe("stopped");
+      await expect(page.getByText(/Run \d+: stopped/)).toBeVisible();
+
+      // Every way in the page stays below the path, and what it links to does.
+      await page.getByRole("link", { name: "Runs", exact: true }).click();
+      await expect(page).toHaveURL(`${proxy.url}/runs`);
+      await page.getByRole("link", { name: "Robots", exact: true }).click();
+      await expect(page).toHaveURL(`${proxy.url}/robots`);
+      await page.getByRole("button", { name: "Share", exact: true }).click();
+      const dialog = page.getByRole("dialog", { name: "Share" });
+      await expect(dialog.getByText("Encrypted.")).toBeVisible();
+      await dialog.getByRole("textbox", { name: "For whom" }).fill("Mari");
+      await dialog.getByRole("button", { name: "New link" }).click();
+      const link = await dialog.getByRole("textbox", { name: "Link for Mari" }).inputValue();
+      expect(link).toContain(`${proxy.url}/#i=`);
+      await dialog.getByRole("button", { name: "Code of the link for Mari" }).click();
+      const code = dialog.getByRole("img", { name: "QR code of the link for Mari" });
+      await expect
+        .poll(() => code.evaluate((img: HTMLImageElement) => img.naturalWidth))
+        .not.toBe(0);
+      await picture(page, `${kind}${path.replace("/", "-")}-share`);
+      expect(failures).toEqual([]);
+      expect(refused.filter((each) => !each.startsWith("401"))).toEqual([]);
+      expect(refused.length).toBeLessThan(3);
+      await context.close();
+    });
+
+    test("Stop does not pass the editor's process: frozen, with requests that wait, or dead", async ({
+      browser,
+    }) => {
+      test.setTimeout(120_000);
+      const { product, proxy } = setting;
+      const { page, context, failures } = await arrive(browser, proxy);
+      for (const how of ["frozen", "dead"] as const) {
+        const graph = await product.chain(50 + how.length);
+        await page.goto(`${proxy.url}/graphs/${graph}`);
+        await saved(page);
+        await start(page);
+        await expect(stopButton(page)).toBeVisible();
+        const editor = product.pid("editor");
+        process.kill(editor, "SIGSTOP");
+        try {
+          // Ten requests that are not answered would hold up every other one to a second port.
+          await page.evaluate((url) => {
+            for (let i = 0; i < 10; i += 1) void fetch(`${url}/api/graphs?n=${i}`).catch(() => {});
+          }, proxy.url);
+          if (how === "dead") process.kill(editor, "SIGKILL");
+          await stopButton(page).click();
+          await expect.poll(stateOf(product, graph)).toBe("stopped");
+          await expect(page.getByText(/Run \d+: stopped/)).toBeVisible();
+        } finally {
+          if (how === "frozen") process.kill(editor, "SIGCONT");
+        }
+        await product.untilReady();
+      }
+      expect(failures).toEqual([]);
+      await context.close();
+    });
+  });
+}
+
+test.describe("where the proxy is not as it should be", () => {
+  test.skip(missing("nginx") !== "", missing("nginx"));
+
+  const alert = (page: Page) =>
+    page.getByRole("alert").filter({ hasText: "STOP MAY REACH NOBODY" });
+
+  test("one that passes no sockets on is named, for STOP and for edits", async ({ browser }) => {
+    const setting = await behind("nginx", "/temoto", (text) =>
+      text.replace(/proxy_set_header (Upgrade|Connection) .*/g, ""),
+    );
+    try {
+      const { page, context } = await arrive(browser, setting.proxy);
+      await expect(alert(page)).toContainText("pass WebSockets on");
+      await expect(page.getByText("state unknown")).toBeVisible();
+      await page.goto(`${setting.proxy.url}/graphs/${await setting.product.chain(3)}`);
+      await expect(page.getByText(/may not pass WebSockets on/).first()).toBeVisible();
+      await picture(page, "no-sockets");
+      await page.setViewportSize({ width: 390, height: 844 });
+      await picture(page, "no-sockets-phone");
+      await context.close();
+    } finally {
+      await setting.end();
+    }
+  });
+
+  test("one that leads the runner's part to the editor is named", async ({ browser }) => {
+    const setting = await behind("nginx", "/temoto", (text) =>
+      text.replace("location /temoto/runner/", "location /nowhere/"),
+    );
+    try {
+      const { page, context } = await arrive(browser, setting.proxy);
+      await expect(alert(page)).toContainText("it has to lead it to the runner");
+      await context.close();
+    } finally {
+      await setting.end();
+    }
+  });
+
+  test("one that replaces the host is named at the door", async ({ browser }) => {
+    const setting = await behind("nginx", "/temoto", (text) =>
+      text.replace(/proxy_set_header Host .*/, ""),
+    );
+    const context = await browser.newContext({ ignoreHTTPSErrors: true });
+    try {
+      const page = await context.newPage();
+      await page.goto(`${setting.proxy.url}/#t=${TOKEN}`);
+      await expect(page.getByText(/has to pass on the Host header/)).toBeVisible();
+      await picture(page, "no-host");
+    } finally {
+      await context.close();
+      await setting.end();
+    }
+  });
+
+  test("without a public address the page is not blank, and says what is missing", async ({
+    browser,
+  }) => {
+    const setting = await behind("nginx", "", undefined, false);
+    try {
+      const { page, context, failures, refused } = await arrive(browser, setting.proxy);
+      await expect(alert(page)).toContainText(`--public-url ${setting.proxy.url}/`);
+      await picture(page, "no-public-url");
+      const before = refused.length;
+      await page.waitForTimeout(5_000);
+      expect(refused.length - before).toBeLessThan(2);
+      expect(failures).toEqual([]);
+      await context.close();
+    } finally {
+      await setting.end();
+    }
+  });
+});

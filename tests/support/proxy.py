@@ -1,0 +1,68 @@
+"""nginx as the documentation has it, in front of a product."""
+
+import shutil
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+DOCUMENTED = Path(__file__).parents[2] / "docs" / "proxy" / "nginx.conf"
+NGINX = shutil.which("nginx", path="/usr/sbin:/usr/local/sbin:/usr/bin") or ""
+
+
+@contextmanager
+def nginx(folder: Path, *, name: str, port: int, editor: int, without: str = "") -> Iterator[Path]:
+    """It runs inside the block; the file with the certificate that it shows. `without` is taken out
+    of what is documented."""
+    folder.mkdir()
+    key, chain = folder / "key.pem", folder / "chain.pem"
+    subject = ("-subj", f"/CN={name}", "-addext", f"subjectAltName=DNS:{name}")
+    command = ("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key)
+    subprocess.run([*command, "-out", chain, *subject], check=True, capture_output=True)
+    text = DOCUMENTED.read_text()
+    assert without in text
+    changes = {
+        "listen 443": f"listen 127.0.0.1:{port}",
+        "robots.example.org;": f"{name};",
+        "/etc/ssl/certs/robots.example.org.pem": str(chain),
+        "/etc/ssl/private/robots.example.org.key": str(key),
+        "127.0.0.1:8000": f"127.0.0.1:{editor}",
+        "127.0.0.1:8001": f"127.0.0.1:{editor + 1}",
+    }
+    text = text.replace(without, "") if without else text
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    temporary = " ".join(f"{kind}_temp_path {folder}/{kind};" for kind in kinds)
+    whole = folder / "nginx.conf"
+    whole.write_text(
+        f"user root; pid {folder}/pid; error_log stderr; events {{}}\n"
+        f"http {{ access_log off; {temporary}\n{text} }}"
+    )
+    log = folder / "log"
+    with log.open("wb") as out:
+        process = subprocess.Popen(
+            [NGINX, "-p", str(folder), "-c", str(whole), "-g", "daemon off;"], stderr=out
+        )
+    try:
+        _wait(port, process, log)
+        yield chain
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+def _wait(port: int, process: "subprocess.Popen[bytes]", log: Path) -> None:
+    deadline = time.monotonic() + 20
+    while True:
+        try:
+            socket.create_connection(("127.0.0.1", port), 1).close()
+        except OSError:
+            assert process.poll() is None, log.read_text()
+            assert time.monotonic() < deadline, log.read_text()
+            time.sleep(0.05)
+        else:
+            return
