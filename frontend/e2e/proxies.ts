@@ -28,7 +28,7 @@ export function missing(kind: Kind): string {
   return program(kind) === null ? `${kind} is not installed` : "";
 }
 
-export class Proxy {
+export class ProxyServer {
   readonly port: number;
   private readonly kind: Kind;
   private readonly path: string;

@@ -6,7 +6,7 @@
 import { type Browser, expect, type Page, test } from "@playwright/test";
 import { add, card, saved, start } from "./bench";
 import { freePort, type Person, Product, TOKEN } from "./product";
-import { type Kind, missing, NAME, Proxy } from "./proxies";
+import { type Kind, missing, NAME, ProxyServer } from "./proxies";
 
 /** A picture for who looks, when a folder for them is named. */
 async function picture(page: Page, name: string): Promise<void> {
@@ -16,7 +16,7 @@ async function picture(page: Page, name: string): Promise<void> {
 
 interface Setting {
   readonly product: Product;
-  readonly proxy: Proxy;
+  readonly proxy: ProxyServer;
   end(): Promise<void>;
 }
 
@@ -26,7 +26,7 @@ async function behind(
   change?: (text: string) => string,
   named = true,
 ): Promise<Setting> {
-  const proxy = new Proxy(kind, path, await freePort());
+  const proxy = new ProxyServer(kind, path, await freePort());
   const product = new Product(named ? ["--public-url", `${proxy.url}/`] : [], named ? "" : NAME);
   await product.start();
   await proxy.start(product.port, change);
@@ -43,7 +43,7 @@ async function behind(
 /** Somebody opens the link that the server printed, at the public address. */
 async function arrive(
   browser: Browser,
-  proxy: Proxy,
+  proxy: ProxyServer,
   link = `/#t=${TOKEN}`,
 ): Promise<Person & { refused: string[] }> {
   const context = await browser.newContext({ ignoreHTTPSErrors: true });
@@ -189,7 +189,7 @@ test.describe("where the proxy is not as it should be", () => {
   test.skip(missing("nginx") !== "", missing("nginx"));
 
   const alert = (page: Page) =>
-    page.getByRole("alert").filter({ hasText: "STOP MAY REACH NOBODY" });
+    page.getByRole("alert").filter({ hasText: /STOP (MAY REACH NOBODY|CANNOT BE PROVEN HERE)/ });
 
   test("one that passes no sockets on is named, for STOP and for edits", async ({ browser }) => {
     const setting = await behind("nginx", "/temoto", (text) =>
@@ -200,6 +200,7 @@ test.describe("where the proxy is not as it should be", () => {
       await expect(alert(page)).toContainText("pass WebSockets on");
       await expect(page.getByText("state unknown")).toBeVisible();
       await page.goto(`${setting.proxy.url}/graphs/${await setting.product.chain(3)}`);
+      await page.getByText("No connection", { exact: true }).hover();
       await expect(page.getByText(/may not pass WebSockets on/).first()).toBeVisible();
       await picture(page, "no-sockets");
       await page.setViewportSize({ width: 390, height: 844 });

@@ -208,7 +208,7 @@ test("a runner that an encrypted page may not ask is said to be so, and breaks n
   live.open();
   await vi.advanceTimersByTimeAsync(1_000);
   expect(live.now.link).toBe("down");
-  expect(live.now.why).toContain("--public-url https://robots.example/");
+  expect(live.now.unreached?.why).toContain("--public-url https://robots.example/");
   live.close();
 });
 
@@ -234,7 +234,7 @@ test("a runner that does not know a session which the editor knows ends no sessi
   live.open();
   await refusing(60);
   expect(sessionEnd.now()).toBe(false);
-  expect(live.now.why).toContain("does not know your session");
+  expect(live.now.unreached?.why).toContain("does not know your session");
   expect(Wire.all.length).toBeLessThan(12);
   live.close();
 });
@@ -244,12 +244,12 @@ test("a proxy that passes no sockets on is told from a runner that does not answ
   const live = new Live("https://robots.example/runner");
   live.open();
   await refusing(3);
-  expect(live.now.why).toContain("WebSockets");
+  expect(live.now.unreached?.why).toContain("WebSockets");
   answering({});
   await refusing(10);
-  expect(live.now.why).toContain("does not answer");
+  expect(live.now.unreached?.why).toContain("does not answer");
   newest().say({ type: "hello", engines: [], runs: [] });
-  expect(live.now.why).toBe("");
+  expect(live.now.unreached).toBeNull();
   live.close();
 });
 
@@ -258,6 +258,6 @@ test("a proxy that leads the runner's address elsewhere is told so", async () =>
   const live = new Live("https://robots.example/runner");
   live.open();
   await refusing(3);
-  expect(live.now.why).toContain("To the runner!");
+  expect(live.now.unreached?.why).toContain("To the runner!");
   live.close();
 });

@@ -25,8 +25,8 @@ export interface LiveNow {
   link: LiveLink;
   /** When the link became what it is, ms. */
   since: number;
-  /** Why the link is not there, as far as that was found out; "" while it is. */
-  why?: string;
+  /** Why the link is not there, as far as that was found out. */
+  unreached?: Unreached | null;
   engines: readonly Robot[];
   runs: ReadonlyMap<string, Run>;
   stops: readonly StopAsked[];
@@ -203,7 +203,7 @@ export class Live {
   /** There is no link; another try comes after a while, unless nobody is signed in. */
   #down(): void {
     if (this.now.link !== "down") this.#set({ link: "down", since: Date.now() });
-    this.#set({ why: this.#unreached?.why ?? "" });
+    this.#set({ unreached: this.#unreached });
     clearTimeout(this.#again);
     if (this.#closed || this.#unreached?.kind === "ended") return;
     const longest = this.#unreached?.kind === "strange" ? SELDOM : SOON;
@@ -218,7 +218,7 @@ export class Live {
     const found = await unreached(this.#runner);
     if (this.#closed || this.now.link === "live" || turn !== this.#again) return;
     this.#unreached = found;
-    this.#set({ why: found.why });
+    this.#set({ unreached: found });
     if (found.kind === "ended") clearTimeout(this.#again);
   }
 
@@ -239,7 +239,13 @@ export class Live {
           );
         }
         for (const run of message.runs) runs.set(run.id, run);
-        this.#set({ link: "live", why: "", since: Date.now(), engines: message.engines, runs });
+        this.#set({
+          link: "live",
+          unreached: null,
+          since: Date.now(),
+          engines: message.engines,
+          runs,
+        });
         break;
       }
       case "run":

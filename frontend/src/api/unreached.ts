@@ -3,9 +3,12 @@
 import { knowsUs } from "./http";
 import { pageUrl } from "./place";
 
-/** `ended`: nobody is signed in any more. `strange`: asking again soon is of no use. */
+/**
+ * `ended`: nobody is signed in any more. `strange`: asking again soon is of no use. `mute`: it answers,
+ * so a Stop arrives, but what becomes of it is not seen.
+ */
 export interface Unreached {
-  readonly kind: "ended" | "strange" | "passing";
+  readonly kind: "ended" | "strange" | "mute" | "silent";
   readonly why: string;
 }
 
@@ -25,13 +28,13 @@ export function forbidden(runner: string): Unreached | null {
 export async function unreached(runner: string): Promise<Unreached> {
   const answer = await asked(`${runner}/api/reach`);
   if (answer === null)
-    return { kind: "passing", why: `The runner does not answer.${stray(runner)}` };
+    return { kind: "silent", why: `The runner does not answer.${stray(runner)}` };
   if (answer.status === 401) return unknownTo(runner);
   if (!answer.ok || !/json/.test(answer.headers.get("content-type") ?? "")) {
     return { kind: "strange", why: await astray(runner, answer) };
   }
   return {
-    kind: "passing",
+    kind: "mute",
     why: "The runner answers, but no live connection to it opens: a proxy in between has to pass WebSockets on (nginx: proxy_http_version 1.1, and the headers Upgrade and Connection).",
   };
 }

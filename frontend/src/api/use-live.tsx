@@ -58,7 +58,13 @@ const never = () => () => {};
 
 /** Before the runner's address is known; with the reason, once there is one. */
 const unknown = (lost: string): LiveNow =>
-  lost === "" ? NOTHING : { ...NOTHING, link: "down", why: `Its address is not known. ${lost}` };
+  lost === ""
+    ? NOTHING
+    : {
+        ...NOTHING,
+        link: "down",
+        unreached: { kind: "silent", why: `The runner’s address is not known. ${lost}` },
+      };
 
 export function useLive(): LiveHold & { now: LiveNow } {
   const hold = use(Context);

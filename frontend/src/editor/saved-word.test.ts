@@ -12,3 +12,12 @@ test("saved is said only when nothing waits and the room is live", () => {
     "This graph is gone · 1 change not saved",
   );
 });
+
+test("a room that does not open says why, once that is known", () => {
+  const link = { state: "offline", unsaved: 0, seq: 0 } as const;
+  expect(savedWords(link).words).toBe("Opening");
+  expect(savedWords({ ...link, why: "no-socket" })).toEqual({
+    tone: "off",
+    words: "No connection",
+  });
+});

@@ -50,7 +50,11 @@ export function savedWords(link: Link, mayEdit = true): Saved {
       ? { tone: "good", words: "Saved" }
       : { tone: "busy", words: `Saving ${link.unsaved}` };
   }
-  if (link.seq === 0) return { tone: "busy", words: "Opening" };
+  if (link.seq === 0) {
+    return link.why === undefined
+      ? { tone: "busy", words: "Opening" }
+      : { tone: "off", words: whys[link.why] };
+  }
   if (link.unsaved === 0) return { tone: "off", words: "Offline" };
   return { tone: "off", words: `Offline with ${changes(link.unsaved)}` };
 }

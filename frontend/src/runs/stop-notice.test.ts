@@ -118,7 +118,8 @@ test("a run that was called stopped and moves again is shouted before anything e
 
 test("a runner that is not reached is never silence", () => {
   for (const link of ["connecting", "down"] as const) {
-    const lost = { ...now(null, link), why: "The runner does not answer." };
+    const why = "The runner does not answer.";
+    const lost: LiveNow = { ...now(null, link), unreached: { kind: "silent", why } };
     expect(unreached(lost, 1_000)).toBeNull(); // a moment is nothing to shout about
     const notice = unreached(lost, 60_000);
     expect(notice?.tone).toBe("loud");
@@ -127,4 +128,9 @@ test("a runner that is not reached is never silence", () => {
     expect(words(link, 0)).not.toBe("nothing runs");
   }
   expect(unreached(now(null), 60_000)).toBeNull();
+  const mute = {
+    ...now(null, "down"),
+    unreached: { kind: "mute", why: "No socket opens." },
+  } as const;
+  expect(unreached(mute, 60_000)?.text).toContain("CANNOT BE PROVEN");
 });

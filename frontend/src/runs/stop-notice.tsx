@@ -125,8 +125,9 @@ const UNREACHED = 6_000; // ms that the runner may take to answer before a page 
 /** Stop looks as always: where it would reach nobody that has to be said before it is needed. */
 export function unreached(now: LiveNow, at: number): Notice {
   if (now.link === "live" || at - now.since < UNREACHED) return null;
-  const why = now.why || "The runner does not answer.";
-  const text = `STOP MAY REACH NOBODY: ${why} Use the hardware stop.`;
+  const { kind, why } = now.unreached ?? { kind: "silent", why: "The runner does not answer." };
+  const head = kind === "mute" ? "STOP CANNOT BE PROVEN HERE" : "STOP MAY REACH NOBODY";
+  const text = `${head}: ${why} Use the hardware stop.`;
   return { tone: "loud", stays: true, text };
 }
 

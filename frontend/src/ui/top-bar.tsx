@@ -2,6 +2,7 @@
 
 import { Fragment, type ReactNode } from "react";
 import { Link } from "wouter";
+import { here } from "../api/place";
 import style from "./top-bar.module.css";
 
 export interface Crumb {
@@ -23,7 +24,7 @@ interface Props {
 }
 
 export function Mark() {
-  return <img src="/mark.svg" alt="" width={24} height={24} className={style.mark} />;
+  return <img src={here("/mark.svg")} alt="" width={24} height={24} className={style.mark} />;
 }
 
 /** The focus goes past the bar. */

@@ -241,9 +241,10 @@ class Access:
         origin = headers.get("origin")
         if origin is not None and not self._addresses.allows_origin(origin):
             raise WrongOrigin(f"Pages of {origin!r} may not talk to this server.")
-        replaced = origin and self._addresses.replaced_host(headers.get("host"), origin)
-        if replaced:
-            raise WrongHost(replaced)
+        if origin is not None and scope["path"].startswith("/api/"):  # the page itself has to say it
+            replaced = self._addresses.replaced_host(headers.get("host"), origin)
+            if replaced is not None:
+                raise WrongHost(replaced)
         method = scope.get("method", "GET") if scope["type"] == ScopeType.HTTP else "WEBSOCKET"
         if method == "OPTIONS" and "access-control-request-method" in headers:
             return True

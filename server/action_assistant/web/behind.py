@@ -5,6 +5,7 @@ import re
 from typing import Any, Final
 
 from litestar import route
+from litestar.params import FromPath
 from litestar.types import (
     ASGIApp,
     ControllerRouterHandler,
@@ -119,7 +120,7 @@ def misrouted(runner_port: int) -> ControllerRouterHandler:
         guards=[Needs("see")],
         include_in_schema=False,
     )
-    async def astray(rest: str) -> None:
+    async def astray(rest: FromPath[str]) -> None:
         raise Misrouted(
             f"The proxy leads what is below {RUNNER}/ to the editor; it has to lead it to the runner, "
             f"on port {runner_port}."
