@@ -101,13 +101,18 @@ http { access_log off; ${temporary}\n${server} }`;
     return ["run", "--config", join(this.folder, "Caddyfile"), "--adapter", "caddyfile"];
   };
 
-  async dispose(): Promise<void> {
+  /** It may be started anew, also with another file. */
+  async end(): Promise<void> {
     const { process: child } = this;
-    if (child !== undefined && child.exitCode === null) {
-      const gone = new Promise((done) => child.once("exit", done));
-      child.kill("SIGTERM");
-      await gone;
-    }
+    this.process = undefined;
+    if (child === undefined || child.exitCode !== null) return;
+    const gone = new Promise((done) => child.once("exit", done));
+    child.kill("SIGTERM");
+    await gone;
+  }
+
+  async dispose(): Promise<void> {
+    await this.end();
     rmSync(this.folder, { recursive: true, force: true, maxRetries: 5 });
   }
 }

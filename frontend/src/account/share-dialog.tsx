@@ -23,7 +23,7 @@ export function originsOf(sharing: Sharing, own: { page: string; hostname: strin
   return [...new Set([...here, ...sharing.origins])];
 }
 
-function Where({ secure, reached }: { secure: boolean; reached: boolean }) {
+function Where({ secure, proxied, reached }: Record<"secure" | "proxied" | "reached", boolean>) {
   if (!reached) {
     return (
       <p className={style.where} data-tone="off">
@@ -39,16 +39,30 @@ function Where({ secure, reached }: { secure: boolean; reached: boolean }) {
     <p className={style.where}>
       <IconLock size={18} aria-hidden />
       <span>
-        <b>Encrypted.</b> Browsers warn others until they trust this server’s authority, the file{" "}
-        <code>tls/ca.pem</code> in its data folder.
+        <b>Encrypted.</b>{" "}
+        {proxied ? (
+          "The proxy in front of this server has the certificate."
+        ) : (
+          <>
+            Browsers warn others until they trust this server’s authority, the file{" "}
+            <code>tls/ca.pem</code> in its data folder.
+          </>
+        )}
       </span>
     </p>
   ) : (
     <p className={style.where} data-tone="off">
       <IconLockOpen2 size={18} aria-hidden />
       <span>
-        <b>Not encrypted.</b> Others on the same network can read what is sent, links too. Start the
-        server with <code>--tls</code> where you do not trust everybody there.
+        <b>Not encrypted.</b> Others on the same network can read what is sent, links too.{" "}
+        {proxied ? (
+          "Give the proxy a certificate"
+        ) : (
+          <>
+            Start the server with <code>--tls</code>
+          </>
+        )}{" "}
+        where you do not trust everybody there.
       </span>
     </p>
   );
@@ -106,7 +120,11 @@ function Body() {
   const over = sharing.data.invitations.filter((each) => each.path === undefined);
   return (
     <div className={style.body}>
-      <Where secure={sharing.data.secure} reached={origins.length > 0} />
+      <Where
+        secure={sharing.data.secure}
+        proxied={sharing.data.proxied === true}
+        reached={origins.length > 0}
+      />
       <NewLink />
       {open.length > 0 && (
         <section className={style.links} aria-label="Links">

@@ -29,6 +29,8 @@ export interface Sharing {
   /** Where others find the page, the likeliest first; empty when they cannot. */
   origins: readonly string[];
   secure: boolean;
+  /** The first of these is shown by a proxy, whose certificate that is. */
+  proxied?: boolean;
   invitations: readonly Invitation[];
 }
 

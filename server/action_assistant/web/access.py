@@ -241,7 +241,9 @@ class Access:
         origin = headers.get("origin")
         if origin is not None and not self._addresses.allows_origin(origin):
             raise WrongOrigin(f"Pages of {origin!r} may not talk to this server.")
-        if origin is not None and scope["path"].startswith("/api/"):  # the page itself has to say it
+        if origin is not None and scope["path"].startswith(
+            "/api/"
+        ):  # the page itself has to say it
             replaced = self._addresses.replaced_host(headers.get("host"), origin)
             if replaced is not None:
                 raise WrongHost(replaced)

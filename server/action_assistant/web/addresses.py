@@ -89,6 +89,11 @@ class Addresses:
         self._looked = clock()
 
     @property
+    def is_proxied(self) -> bool:
+        """Whether a proxy shows the page at a public address."""
+        return self._public is not None
+
+    @property
     def is_encrypted(self) -> bool:
         """Whether what is sent to the address that others use first cannot be read on its way."""
         return self.secure if self._public is None else self._public.is_secure

@@ -22,12 +22,14 @@ class Sharing(msgspec.Struct, frozen=True):
     """How others reach this server, and the links to it.
 
     `origins`: where the page is for them, the likeliest first; empty when the server listens on this
-    computer only. `secure`: whether what is sent is encrypted.
+    computer only. `secure`: whether what is sent is encrypted. `proxied`: the first of them is shown by
+    a proxy, whose certificate that is.
     """
 
     origins: tuple[str, ...]
     secure: bool
     invitations: list[Invitation]
+    proxied: bool = False
 
 
 class Inviting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -75,7 +77,10 @@ def _links(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         guards=[Needs("share")],
     )
     async def list_invitations() -> Sharing:
-        return Sharing(addresses.origins(), addresses.is_encrypted, door.house.invitations.all())
+        links = door.house.invitations.all()
+        return Sharing(
+            addresses.origins(), addresses.is_encrypted, links, proxied=addresses.is_proxied
+        )
 
     @post(
         "/api/invitations",
