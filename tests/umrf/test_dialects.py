@@ -16,13 +16,18 @@ SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf" / 
 OWN = Path(__file__).parent / "examples"
 
 
+#: What the engine takes for an action, since it has a name and a type: a reply of CMake.
+FOREIGN = ".cmake__api__v1__reply__target-"
+
+
 def reading_of(name: str) -> Reading:
     return read((OWN / name).read_bytes())
 
 
 def verdicts() -> list[dict[str, Any]]:
     path = SHARED / "verdicts.jsonl"
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    lines = path.read_text().splitlines() if path.exists() else []
+    return [json.loads(line) for line in lines if FOREIGN not in line]
 
 
 @pytest.mark.parametrize(
@@ -53,7 +58,7 @@ def test_graphs_of_ros_1_get_entry_exit_types_and_conditions() -> None:
     ends = [(r.parent, r.child) for r in graph.relations if r.parent == ENTRY or r.child == EXIT]
     assert ends == [(ENTRY, "a1"), ("a3", EXIT)]
     show = next(r for r in graph.relations if (r.parent, r.child) == ("a1", "a2"))
-    assert (show.conditions.on_true, show.conditions.on_error) == ("stop", "bypass")
+    assert (show.conditions.on_true, show.conditions.on_error) == ("stop", "ignore")
     back = next(r for r in graph.relations if (r.parent, r.child) == ("a2", "a1"))
     assert not back.required
     assert graph.actions[0].inputs[0].text.endswith('"pvf_required":true}')

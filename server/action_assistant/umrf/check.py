@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Mapping
 
-from action_assistant.umrf.action_files import at_top
 from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.scenarios import check_scenarios
@@ -13,6 +12,8 @@ from action_assistant.umrf.codec import ActionReading, Reading
 from action_assistant.umrf.codes import REFUSED, STRUCTURAL
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem, Signature
+from action_assistant.umrf.places import placed
+from action_assistant.umrf.writing import write
 
 __all__ = [
     "REFUSED",
@@ -21,6 +22,7 @@ __all__ = [
     "check",
     "check_action",
     "check_reading",
+    "check_written",
     "refused_by_parser",
 ]
 
@@ -52,9 +54,17 @@ def check_reading(
     facts: EngineFacts = PINNED,
     graphs: Mapping[str, Graph] | None = None,
 ) -> list[Problem]:
-    """Every problem of a file as it stands: of its text, and of the graph in it."""
-    problems = [*reading.problems, *check(reading.graph, library, facts, graphs)]
+    """Every problem of a file as it stands, with its place there: of its text, and of the graph in
+    it."""
+    found = check(reading.graph, library, facts, graphs)
+    problems = [*reading.problems, *reading.placed(found)]
     return sorted(problems, key=lambda problem: problem.severity)
+
+
+def check_written(graph: Graph) -> list[Problem]:
+    """Every problem of a graph, with its place in the graph's canonical text."""
+    found = check(graph)
+    return placed(found, write(graph), {}) if found else []
 
 
 def check_action(reading: ActionReading) -> list[Problem]:
@@ -63,7 +73,7 @@ def check_action(reading: ActionReading) -> list[Problem]:
     subject = Subject(graph, PINNED)
     check_structure(subject)
     check_static(subject)
-    problems = [*reading.problems, *at_top(iter(subject.problems))]
+    problems = [*reading.problems, *reading.placed(subject.problems)]
     return sorted(problems, key=lambda problem: problem.severity)
 
 
@@ -75,15 +85,15 @@ def refused_by_parser(reading: Reading) -> list[Problem]:
     at_ends = {
         f"{r.parent}>{r.child}" for r in reading.graph.relations if {r.parent, r.child} & ends
     }
-    return [
-        problem
-        for problem in (*reading.problems, *subject.problems)
-        if problem.severity == "error"
-        and (
-            problem.code in REFUSED
-            or (problem.code == "ghost" and (problem.where.relation or "").split(";")[0] in at_ends)
+
+    def is_refusal(problem: Problem) -> bool:
+        at_end = (problem.where.relation or "").split(";")[0] in at_ends
+        return problem.severity == "error" and (
+            problem.code in REFUSED or (problem.code == "ghost" and at_end)
         )
-    ]
+
+    seen = reading.placed(filter(is_refusal, subject.problems))
+    return [*filter(is_refusal, reading.problems), *seen]
 
 
 def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ()) -> list[Problem]:

@@ -154,6 +154,7 @@ CODES: Final[dict[str, Code]] = {
     "parameter-inside": Code("other", _WARNING, "a parameter inside another one", "not written"),
     "parameter-name": Code("other", _WARNING, "an empty name, one with `:`, or two that are one for the engine", "the engine does not find the parameter again"),
     "parameter-allowed": Code("other", _WARNING, "a value outside `pvf_allowed_values`", "the engine does not notice"),
+    "stop-awaited": Code("other", _WARNING, "in a file of ROS 1: an action waits for the parent that is to stop it", "the older engine never ran it; now it runs after its other parents, or never"),
     "remap-target": Code("other", _WARNING, "an output renamed to an input that the child lacks", "the value is lost"),
     "remap-order": Code("other", _BOTH, "a renaming that changes the order of several outputs", "the engine does not find them any more (error: the child then never runs)"),
     "unknown-action": Code("other", _WARNING, "no library knows the action", "an engine that does not either refuses the graph"),

@@ -1,21 +1,42 @@
 """Which dialect a file is written in, and older ones translated into D3 (SPEC 1.5)."""
 
-from typing import Final
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
 from action_assistant.umrf.dialects_old import (
+    EFFECTS,
+    Old,
     from_action,
     from_actions,
     from_umrf_actions,
     items_of,
 )
-from action_assistant.umrf.jsontext import Json, Number
-from action_assistant.umrf.model import Problem, Where
+from action_assistant.umrf.jsontext import Json, Number, pointer
+from action_assistant.umrf.model import Note, Problem
 from action_assistant.umrf.relations import MAX_REFERRED_ID, whole_of
 
-Translation = tuple[dict[str, Json], tuple[str, ...], tuple[Problem, ...]]
+
+class Translation(NamedTuple):
+    """A file in D3. Notes and problems name places of the given file, to which `origins` lead
+    from the translated one (`places.Origins`)."""
+
+    file: dict[str, Json]
+    notes: tuple[Note, ...] = ()
+    problems: tuple[Problem, ...] = ()
+    origins: Mapping[str, str] = MappingProxyType({})
+
 
 _MARKS: Final = ("graph_name", "actions", "umrf_actions", "graph_entry", "graph_exit")
-_ACTION_MARKS: Final = ("name", "type", "effect", "suffix", "package_name", "input_parameters")
+_PARAMETERS: Final = ("input_parameters", "output_parameters")
+_TYPES: Final = ("sync", "async", "spontaneous")
+_ACTION_FIELDS: Final = {
+    "name", "instance_id", "type", "actor", "description", "state", "runtime", "input_parameters",
+    "output_parameters", "parents", "children", "gui_attributes", "effect", "id", "suffix",
+    "package_name", "library_path", "notation",
+}  # fmt: skip
+#: Of packages of JavaScript, which have a name and a type as well.
+_FOREIGN_TYPES: Final = ("module", "commonjs")
 
 
 def dialect_of(file: dict[str, Json]) -> str | None:
@@ -25,7 +46,7 @@ def dialect_of(file: dict[str, Json]) -> str | None:
     `umrf_actions`, `D1'` the same from a language model, `D3-action` and `D0` single actions.
     """
     if not any(mark in file for mark in _MARKS):
-        return _action_dialect(file)
+        return action_dialect(file) if _is_action(file) else None
     if "umrf_actions" in file and "actions" not in file:
         told = {"effect", "type", "package_name"}
         full = any(told & action.keys() for action in items_of(file, "umrf_actions"))
@@ -38,8 +59,26 @@ def dialect_of(file: dict[str, Json]) -> str | None:
     return "D2" if no_ends or any(map(_is_d2, actions)) else "D3"
 
 
-def _action_dialect(file: dict[str, Json]) -> str | None:
-    if sum(mark in file for mark in _ACTION_MARKS) < 2:
+def _is_action(file: dict[str, Json]) -> bool:
+    """Whether a file says what only actions say: the name and type that the engine asks for many
+    other files have too."""
+    if any(isinstance(file.get(side), dict) for side in _PARAMETERS):
+        return bool(file.keys() & {"name", "type", "effect"})
+    if (effect := file.get("effect")) and isinstance(effect, str) and effect in EFFECTS:
+        return bool(file.keys() & {"name", "suffix", "package_name"})
+    kind = file.get("type")
+    if not isinstance(file.get("name"), str) or not isinstance(kind, str):
+        return False
+    return kind in _TYPES or (file.keys() <= _ACTION_FIELDS and kind not in _FOREIGN_TYPES)
+
+
+def action_dialect(file: dict[str, Json]) -> str | None:
+    """The dialect of a file that is known to be that of an action: with the engine's eyes, which
+    wants a name and a type. None for a graph, and for what says nothing of an action."""
+    if any(mark in file for mark in _MARKS):
+        return None
+    told = file.keys() & {"name", "type", "effect", "suffix", "package_name", *_PARAMETERS}
+    if len(told) < 2:
         return None
     return "D3-action" if "type" in file else "D0"
 
@@ -52,10 +91,10 @@ def _is_d2(action: dict[str, Json]) -> bool:
 
 
 def translated(file: dict[str, Json], dialect: str) -> Translation:
-    """The file in D3, notes on what was translated, and why the engine refuses it as it stands."""
+    """The file in D3, what was translated, and why the engine refuses it as it stands."""
     match dialect:
         case "D3-designer":
-            return _from_designer(file)
+            old = _from_designer(file)
         case "D2":
             old = from_actions(file)
         case "D1" | "D1'":
@@ -63,36 +102,37 @@ def translated(file: dict[str, Json], dialect: str) -> Translation:
         case "D0" | "D3-action":
             old = from_action(file)
         case _:
-            return file, (), ()
-    return old.file, (*old.told(), *renumber(old.file)), tuple(old.problems)
+            return Translation(file)
+    renumber(old)
+    return Translation(old.file, old.notes.told(), tuple(old.problems), old.origins)
 
 
-def _from_designer(file: dict[str, Json]) -> Translation:
-    file = dict(file)
-    notes: list[str] = []
-    problems: list[Problem] = []
+def _from_designer(file: dict[str, Json]) -> Old:
+    old = Old(file)
     positions: dict[str, Json] = {}
     for end in ("entry", "exit"):
         field = f"graph_{end}"
         value = file.get(field)
         if not isinstance(value, dict):
             continue
-        file[field] = value.get("actions", [])
-        notes.append(f"{field} was an object and is a list now.")
-        message = f"{field} is an object, not a list; the engine refuses the file."
-        where = Where(path=f"/{field}")
-        problems.append(Problem(code="dialect-old", severity="error", where=where, message=message))
+        path = pointer(field)
+        old.file[field] = value.get("actions", [])
+        old.origins[path] = pointer(field, "actions")
+        old.note(f"{field} was an object and is a list now.", path)
+        old.refuse(path, f"{field} is an object, not a list; the engine refuses the file.")
         attributes = value.get("gui_attributes")
         point = attributes.get("position") if isinstance(attributes, dict) else None
         if isinstance(point, dict):
             positions[end] = point
-        lost = sorted(value.keys() - {"actions", "gui_attributes"})
-        if lost:
-            notes.append(f"{field} had members without a place: {', '.join(lost)}.")
+        for lost in sorted(value.keys() - {"actions", "gui_attributes"}):
+            text = f"{field} had a member without a place: “{lost}”."
+            old.note(text, path + pointer(lost))
+        for lost in sorted(attributes.keys() - {"position"}) if isinstance(attributes, dict) else ():
+            text = f"The gui_attributes of {field} had a member without a place: “{lost}”."
+            old.note(text, path + pointer("gui_attributes", lost))
     if positions:
-        _add_attributes(file, positions)
-    notes.extend(renumber(file))
-    return file, tuple(notes), tuple(problems)
+        _add_attributes(old.file, positions)
+    return old
 
 
 def _add_attributes(file: dict[str, Json], ours: dict[str, Json]) -> None:
@@ -103,38 +143,39 @@ def _add_attributes(file: dict[str, Json], ours: dict[str, Json]) -> None:
     file["gui_attributes"] = joined
 
 
-def renumber(file: dict[str, Json]) -> list[str]:
-    """Gives actions whose `instance_id` no relation can refer to the lowest free one, in place of
-    `file`'s members. Returns notes."""
+def renumber(old: Old) -> None:
+    """Gives actions whose `instance_id` no relation can refer to the lowest free one."""
+    file = old.file
     actions = file.get("actions")
     if not isinstance(actions, list):
-        return []
+        return
     used: dict[str, set[int]] = {}
-    large: list[tuple[str, str]] = []
-    for action in actions:
+    large: dict[tuple[str, str], int] = {}
+    for index, action in enumerate(actions):
         if isinstance(action, dict) and isinstance(name := action.get("name", ""), str):
             number, fits = whole_of(action.get("instance_id", Number("0")))
             if fits and number <= MAX_REFERRED_ID:
                 used.setdefault(name, set()).add(number)
             elif isinstance(spelled := action.get("instance_id"), Number):
-                large.append((name, spelled.text))
+                large.setdefault((name, spelled.text), index)
     new: dict[tuple[str, str], int] = {}
     lowest: dict[str, int] = {}
-    for name, spelled_text in large:
+    for (name, spelled_text), index in large.items():
         taken = used.setdefault(name, set())
         number = lowest.get(name, 0)
         while number in taken:
             number += 1
         taken.add(number)
         lowest[name] = number + 1
-        new.setdefault((name, spelled_text), number)
+        new[name, spelled_text] = number
+        place = old.at(pointer("actions", index, "instance_id"))
+        old.note(f"{name} had the number {spelled_text}, now {number}.", place)
     if not new:
-        return []
+        return
     file["actions"] = [_renumbered_action(action, new) for action in actions]
     for end in ("graph_entry", "graph_exit"):
         if isinstance(items := file.get(end), list):
             file[end] = [_renumbered(item, new) for item in items]
-    return [f"{name} had the number {text}, now {n}." for (name, text), n in new.items()]
 
 
 def _renumbered_action(action: Json, new: dict[tuple[str, str], int]) -> Json:

@@ -14,6 +14,8 @@ from typing import Any, Final, NoReturn, TypeAlias
 
 import msgspec
 
+from action_assistant.umrf.jsonplaces import doubled_in, path_at, place_at, places_of, pointer
+
 MAX_BYTES: Final = 10 * 1024 * 1024
 MAX_DEPTH: Final = 64
 MAX_VALUES: Final = 1_000_000
@@ -28,7 +30,8 @@ _SURROGATE: Final = re.compile(r"[\ud800-\udfff]|\\u[dD][89a-fA-F]")
 class Unreadable(Exception):
     """The text is no JSON, no UMRF, or beyond the limits.
 
-    `path` is a JSON pointer, empty if unknown; `line` and `column` count from 1.
+    `path` is a JSON pointer into the text, empty for the whole; `line` and `column` count characters
+    from 1.
     """
 
     def __init__(
@@ -37,8 +40,8 @@ class Unreadable(Exception):
         message: str,
         *,
         path: str = "",
-        line: int | None = None,
-        column: int | None = None,
+        line: int = 1,
+        column: int = 1,
     ) -> None:
         super().__init__(message)
         self.code = code
@@ -62,15 +65,9 @@ class Number(msgspec.Struct, frozen=True):
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | bool | Number | None"
 
 
-class _Doubled(dict[str, Any]):
-    """An object that names a key twice."""
-
-    key: str = ""
-
-
 def parse(text: str | bytes) -> Json:
     """The value of a JSON text. Raises `Unreadable`."""
-    text = _decoded(text)
+    text = decoded(text)
     _bound(text)
     hooks = _Hooks(text)
     try:
@@ -85,9 +82,9 @@ def parse(text: str | bytes) -> Json:
         message = f"This is not JSON: {e.msg} at line {e.lineno}, column {e.colno}."
         raise Unreadable("not-json", message, line=e.lineno, column=e.colno) from None
     if hooks.doubled:
-        _report_doubled(value)
+        _report_doubled(text)
     if _SURROGATE.search(text):
-        _report_surrogate(value)
+        _report_surrogate(value, text)
     return value
 
 
@@ -114,11 +111,6 @@ def dump_indented(value: Json) -> str:
     return "".join(out)
 
 
-def pointer(*keys: str | int) -> str:
-    """The JSON pointer (RFC 6901) that leads through these keys."""
-    return "".join("/" + str(key).replace("~", "~0").replace("/", "~1") for key in keys)
-
-
 def number(value: float) -> Number:
     """A number in its shortest spelling, whole numbers without a point."""
     return Number(str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value))
@@ -133,35 +125,27 @@ class _Hooks:
 
     def pairs(self, pairs: list[tuple[str, Json]]) -> dict[str, Json]:
         members = dict(pairs)
-        if len(members) == len(pairs):
-            return members
-        seen: set[str] = set()
-        found = _Doubled(members)
-        for key, _ in pairs:
-            if key in seen:
-                found.key = key
-                break
-            seen.add(key)
-        self.doubled = True
-        return found
+        self.doubled = self.doubled or len(members) < len(pairs)
+        return members
 
     def number(self, text: str) -> Number:
         if len(text) > MAX_NUMBER or math.isinf(float(text)):
-            line, column = self._where(text)
+            line, column, path = self._where(text)
             message = f"The number {text[:30]}… at line {line}, column {column} is too big for the engine to read."
-            raise Unreadable("number-too-big", message, line=line, column=column)
+            raise Unreadable("number-too-big", message, path=path, line=line, column=column)
         return Number(text)
 
     def constant(self, name: str) -> NoReturn:
-        line, column = self._where(name)
+        line, column, _ = self._where(name)
         message = (
             f"This is not JSON: {name} at line {line}, column {column}; JSON knows no such number."
         )
         raise Unreadable("not-json", message, line=line, column=column)
 
-    def _where(self, token: str) -> tuple[int, int]:
-        """Where a token stands first; the scanner does not say."""
-        return _place(self._text, _without_strings(self._text).find(token))
+    def _where(self, token: str) -> tuple[int, int, str]:
+        """Line, column and pointer of where a token stands first; the scanner does not say."""
+        offset = _without_strings(self._text).find(token)
+        return *place_at(self._text, offset), path_at(self._text, offset)
 
 
 def _without_strings(text: str) -> str:
@@ -169,12 +153,8 @@ def _without_strings(text: str) -> str:
     return _STRING.sub(lambda found: " " * len(found[0]), text)
 
 
-def _place(text: str, offset: int) -> tuple[int, int]:
-    """Line and column, both from 1."""
-    return text.count("\n", 0, offset) + 1, offset - text.rfind("\n", 0, offset)
-
-
-def _decoded(text: str | bytes) -> str:
+def decoded(text: str | bytes) -> str:
+    """The text as `parse` sees it: without a byte order mark. Raises `Unreadable`."""
     if len(text) > MAX_BYTES:
         raise Unreadable("too-large", "The text is larger than 10 MB.")
     if isinstance(text, str):
@@ -182,9 +162,9 @@ def _decoded(text: str | bytes) -> str:
     try:
         return text.decode().removeprefix("\ufeff")
     except UnicodeDecodeError as e:
-        line = text[: e.start].count(b"\n") + 1
+        line, column = place_at(start := text[: e.start].decode().removeprefix("\ufeff"), len(start))
         message = f"The text is not UTF-8 (byte {e.start}, line {line})."
-        raise Unreadable("not-utf-8", message, line=line) from None
+        raise Unreadable("not-utf-8", message, line=line, column=column) from None
 
 
 def _bound(text: str) -> None:
@@ -205,7 +185,7 @@ def _bound(text: str) -> None:
 def _too_deep(text: str) -> Unreadable:
     signs = _without_strings(text)
     depths = accumulate((sign in "[{") - (sign in "]}") for sign in signs)
-    line, column = _place(text, next(n for n, depth in enumerate(depths) if depth > MAX_DEPTH))
+    line, column = place_at(text, next(n for n, depth in enumerate(depths) if depth > MAX_DEPTH))
     message = (
         f"The text is nested more than {MAX_DEPTH} levels deep at line {line}, column {column}."
     )
@@ -226,25 +206,27 @@ def _walk(value: Json, path: str = "") -> Iterator[tuple[str, Json]]:
             pass
 
 
-def _report_doubled(value: Json) -> NoReturn:
-    for path, found in _walk(value):
-        if isinstance(found, _Doubled):
-            place = path + pointer(found.key)
-            raise Unreadable("double-key", f"The key “{found.key}” stands twice.", path=place)
-    # what a doubled key hides is not in the value any more
-    raise Unreadable("double-key", "A key stands twice in one object.")
+def _report_doubled(text: str) -> NoReturn:
+    found = doubled_in(text)
+    assert found is not None, "the scanner saw a doubled key"
+    path, offset = found
+    line, column = place_at(text, offset)
+    key = path.rpartition("/")[2].replace("~1", "/").replace("~0", "~")
+    message = f"The key “{key}” stands twice in one object."
+    raise Unreadable("double-key", message, path=path, line=line, column=column)
 
 
-def _report_surrogate(value: Json) -> None:
+def _report_surrogate(value: Json, text: str) -> None:
     for path, found in _walk(value):
         texts = (
             list(found) if isinstance(found, dict) else [found] if isinstance(found, str) else []
         )
-        for text in texts:
-            if any("\ud800" <= c <= "\udfff" for c in text):
-                raise Unreadable(
-                    "lone-surrogate", "A text contains half of a character pair.", path=path
-                )
+        if any("\ud800" <= sign <= "\udfff" for each in texts for sign in each):
+            place = places_of(text, [path])[path]
+            message = "A text contains half of a character pair."
+            raise Unreadable(
+                "lone-surrogate", message, path=place.path, line=place.line, column=place.column
+            )
 
 
 def _compact(value: Json, out: list[str]) -> None:

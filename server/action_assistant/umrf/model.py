@@ -130,11 +130,16 @@ class Graph(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Where(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The place of a problem. `path` is a JSON pointer into the canonical file."""
+    """The place of a problem. `path` is a JSON pointer into the text that was given, or, of a graph
+    that was not read from one, into its canonical text. `line` and `column` (characters, both from
+    1) are there where that text is known: where the value begins, with its key if it has one.
+    """
 
     path: str = ""
     aid: Key | None = None
     relation: str | None = None
+    line: int | None = None
+    column: int | None = None
 
 
 class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
@@ -145,6 +150,24 @@ class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     where: Where
     message: str
     fix: str | None = None
+
+
+class Note(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """What was done with something of a text that was read: translated, or left out.
+
+    `times` counts how often it was, `where` is the first place and `also` are the others (the first
+    thousand of them).
+    """
+
+    message: str
+    where: Where
+    times: int = 1
+    also: tuple[Where, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """The message, with how often it is true."""
+        return f"{self.message} ({self.times} times)" if self.times > 1 else self.message
 
 
 class Signature(msgspec.Struct, frozen=True, kw_only=True):

@@ -27,11 +27,13 @@ from action_assistant.umrf.model import (
     Conditions,
     Graph,
     Key,
+    Note,
     Problem,
     Relation,
     Remap,
     Where,
 )
+from action_assistant.umrf.notes import Notes
 from action_assistant.umrf.relations import conditions_of, remap_of
 
 #: Problems of one code that are kept.
@@ -58,12 +60,15 @@ _Name: TypeAlias = tuple[str, int]
 
 
 class Tree(msgspec.Struct, frozen=True):
-    """What `read_tree` found."""
+    """What `read_tree` found. Problems and notes name places of the file that was read; `origins`
+    lead there from the canonical text of the graph (`places.Origins`)."""
 
     graph: Graph
     problems: tuple[Problem, ...]
     states: dict[Key, str]
     graph_state: str | None
+    notes: tuple[Note, ...]
+    origins: dict[str, str]
 
 
 def read_tree(file: dict[str, Json]) -> Tree:
@@ -99,6 +104,8 @@ class _Reader:
         self.by_name: dict[_Name, list[int]] = {}
         self.listed: list[list[_Item]] = []
         self.listing: list[list[_Item]] = []
+        self.notes = Notes()
+        self.origins: dict[str, str] = {}
 
     def report(self, code: str, path: str, message: str) -> None:
         self.told[code] = self.told.get(code, 0) + 1
@@ -134,7 +141,14 @@ class _Reader:
             notes=tuple((k, dump(v)) for k, v in notes.items()) if isinstance(notes, dict) else (),
             extra=tuple(extra),
         )
-        return Tree(graph, tuple(self.problems), self.states, graph_state)
+        return Tree(
+            graph,
+            tuple(self.problems),
+            self.states,
+            graph_state,
+            self.notes.told(),
+            self.origins,
+        )
 
     def _state(self, item: dict[str, Json], field: str, path: str) -> str | None:
         """A run state that says something, or None; a wrong one makes the engine refuse the file."""
@@ -146,12 +160,14 @@ class _Reader:
             message = f"{dump(value)} is not a state that the engine knows; it refuses the file."
             self.report("state-illegal", f"{path}/{field}", message)
             return None
+        self.notes.add(f"“{field}” was left out; it says how a past run stood.", f"{path}/{field}")
         return None if value == "UNINITIALIZED" else value
 
     def _end(self, file: dict[str, Json], field: str, extra: Extra, kind: _Kind) -> list[_Item]:
         if field not in file:
             if len(self.actions) == 1 and not file.keys() & {"graph_entry", "graph_exit"}:
                 only = self.actions[0]
+                self.origins[pointer(field, 0)] = self._origin(pointer("actions", 0))
                 return [_Item(-1, only.name, only.instance_id, _Side(0.0))]
             message = f"The file has no {field}; the engine refuses it."
             self.report("entry-exit-missing", "", message)
@@ -160,7 +176,15 @@ class _Reader:
         if not isinstance(value, list):
             extra.append((field, dump(value)))
             return []
-        return self._items(-1, value, pointer(field), kind)
+        return self._items(-1, value, pointer(field), pointer(field), kind)
+
+    def _origin(self, path: str) -> str:
+        return self.origins.get(path, path)
+
+    def _came_from(self, canonical: str, path: str) -> None:
+        """Says where something stands in the file that stands elsewhere in the canonical text."""
+        if canonical != path:
+            self.origins[canonical] = path
 
     # Actions
 
@@ -180,6 +204,8 @@ class _Reader:
     def _read_action(self, item: dict[str, Json], path: str, used: set[str]) -> None:
         extra: Extra = []
         index = len(self.actions)
+        place = pointer("actions", index)
+        self._came_from(place, path)
         position, key, rest = action_attributes(item)
         if rest is not None:
             extra.append(("gui_attributes", rest))
@@ -206,8 +232,16 @@ class _Reader:
         )
         twins.append(index)
         self._read_run_state(item, key, path)
-        self.listed.append(self._side_items(index, item, "parents", path, extra, self._parent))
-        self.listing.append(self._side_items(index, item, "children", path, extra, self._child))
+        for field, lists, kind in (
+            ("parents", self.listed, self._parent),
+            ("children", self.listing, self._child),
+        ):
+            items: list[_Item] = []
+            if isinstance(value := item.get(field, []), list):
+                items = self._items(index, value, f"{path}/{field}", f"{place}/{field}", kind)
+            else:
+                extra.append((field, dump(value)))
+            lists.append(items)
         extra.extend((field, dump(item[field])) for field in item if field not in _ACTION_FIELDS)
         self.actions.append(msgspec.structs.replace(action, extra=tuple(extra)))
 
@@ -217,21 +251,15 @@ class _Reader:
         if "runtime" in item and not is_runtime(item["runtime"]):
             message = "The run log of the action is malformed; the engine refuses the file."
             self.report("runtime-illegal", path + "/runtime", message)
-
-    def _side_items(
-        self, owner: int, item: dict[str, Json], field: str, path: str, extra: Extra, kind: _Kind
-    ) -> list[_Item]:
-        if field not in item:
-            return []
-        value = item[field]
-        if not isinstance(value, list):
-            extra.append((field, dump(value)))
-            return []
-        return self._items(owner, value, f"{path}/{field}", kind)
+        elif "runtime" in item:
+            self.notes.add("“runtime” was left out; it is the log of a past run.", path + "/runtime")
 
     # Relations
 
-    def _items(self, owner: int, items: list[Json], path: str, kind: _Kind) -> list[_Item]:
+    def _items(
+        self, owner: int, items: list[Json], path: str, place: str, kind: _Kind
+    ) -> list[_Item]:
+        """`path`: of the list in the file; `place`: in the canonical text."""
         found: list[_Item] = []
         for index, item in enumerate(items):
             if not isinstance(item, dict) or not isinstance(item.get("name"), str):
@@ -239,6 +267,7 @@ class _Reader:
                 self.report("relation-unnamed", path + pointer(index), message)
                 continue
             extra: Extra = []
+            self._came_from(place + pointer(len(found)), path + pointer(index))
             name = str(item["name"])
             found.append(_Item(owner, name, number_of(item, extra), kind(index, item, extra)))
         return found

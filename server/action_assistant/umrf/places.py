@@ -1,0 +1,77 @@
+"""Where what is said of a file stands in the text that was given (SPEC 1.5).
+
+Problems and notes name places of the graph's canonical text, or of a file that was translated.
+`Origins` lead from there to the given text, where the place is looked up; it is the one way for all.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeAlias, TypeVar
+
+from msgspec.structs import replace
+
+from action_assistant.umrf.jsonplaces import places_of
+from action_assistant.umrf.model import Note, Problem, Where
+
+#: Where values came from: a pointer → the pointer in the given text. What is not named stands
+#: where what is around it came from.
+Origins: TypeAlias = Mapping[str, str]
+
+Told = TypeVar("Told", Problem, Note)
+
+
+def origin(origins: Origins, path: str) -> str:
+    """The pointer in the given text of what stands at `path`."""
+    head = path
+    while head not in origins:
+        cut = head.rfind("/")
+        if cut < 0:
+            return path
+        head = head[:cut]
+    return origins[head] + path[len(head) :]
+
+
+def joined(inner: Origins, outer: Origins) -> dict[str, str]:
+    """Both steps in one: `inner` leads to pointers that `outer` leads on from."""
+    return {**outer, **{new: origin(outer, old) for new, old in inner.items()}}
+
+
+def placed(problems: Iterable[Problem], text: str, origins: Origins) -> list[Problem]:
+    """The problems with their places in the given text, to which `origins` lead."""
+    return located(text, [moved(problem, origins) for problem in problems])[0]
+
+
+def moved(told: Told, origins: Origins) -> Told:
+    """A problem or note with the pointers of the given text, to which `origins` lead."""
+
+    def lead(where: Where) -> Where:
+        return replace(where, path=origin(origins, where.path))
+
+    match told:
+        case Problem():
+            return replace(told, where=lead(told.where))
+        case Note():
+            return replace(told, where=lead(told.where), also=tuple(map(lead, told.also)))
+
+
+def located(
+    text: str, problems: Sequence[Problem], notes: Sequence[Note] = ()
+) -> tuple[list[Problem], tuple[Note, ...]]:
+    """Problems and notes that have pointers of this text, with lines and columns; of what is not
+    there the place is what it would be in. Without a text they stay as they are."""
+    every = [problem.where for problem in problems]
+    every += [where for note in notes for where in (note.where, *note.also)]
+    if not text or not every:
+        return list(problems), tuple(notes)
+    places = places_of(text, {where.path for where in every})
+
+    def find(where: Where) -> Where:
+        place = places[where.path]
+        return replace(where, path=place.path, line=place.line, column=place.column)
+
+    return (
+        [replace(problem, where=find(problem.where)) for problem in problems],
+        tuple(
+            replace(note, where=find(note.where), also=tuple(map(find, note.also)))
+            for note in notes
+        ),
+    )
