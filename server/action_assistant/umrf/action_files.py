@@ -9,7 +9,7 @@ from action_assistant.umrf.dialects import action_dialect, dialect_of, translate
 from action_assistant.umrf.dialects_old import RELATIONS
 from action_assistant.umrf.jsontext import Json, Unreadable, decoded, dump, dump_indented, parse
 from action_assistant.umrf.model import Action, Graph, Note, Problem
-from action_assistant.umrf.places import joined, located, moved, placed
+from action_assistant.umrf.places import located, moved, placed
 from action_assistant.umrf.reading import read_tree
 from action_assistant.umrf.writing import tree_of
 
@@ -20,7 +20,7 @@ _PLACE: Final = "/actions/0"
 class ActionReading(msgspec.Struct, frozen=True):
     """An action as its own file describes it. `dialect`: `D3-action`, or `D0` of 2019.
 
-    `remarks`, `problems`, `text` and `origins` as in `codec.Reading`.
+    `remarks`, `problems`, `text` and `steps` as in `codec.Reading`.
     """
 
     action: Action
@@ -28,7 +28,7 @@ class ActionReading(msgspec.Struct, frozen=True):
     remarks: tuple[Note, ...] = ()
     problems: tuple[Problem, ...] = ()
     text: str = ""
-    origins: dict[str, str] = {}
+    steps: tuple[dict[str, str], ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -37,7 +37,7 @@ class ActionReading(msgspec.Struct, frozen=True):
 
     def placed(self, problems: Iterable[Problem]) -> list[Problem]:
         """Problems of the graph that has only this action, with their places in its file."""
-        return placed(problems, self.text, self.origins)
+        return placed(problems, self.text, self.steps)
 
 
 def read_action(text: str | bytes) -> ActionReading:
@@ -59,10 +59,10 @@ def read_action(text: str | bytes) -> ActionReading:
     own_problems = (p for p in tree.problems if p.where.path.startswith(_PLACE))
     found, told = located(
         text,
-        [*problems, *(moved(problem, given) for problem in own_problems)],
+        [*problems, *(moved(problem, [given]) for problem in own_problems)],
         [
             *(note for note in notes if "became a graph" not in note.message),
-            *(moved(note, given) for note in tree.notes),
+            *(moved(note, [given]) for note in tree.notes),
         ],
     )
     return ActionReading(
@@ -71,7 +71,7 @@ def read_action(text: str | bytes) -> ActionReading:
         remarks=told,
         problems=tuple(found),
         text=text,
-        origins=joined(tree.origins, given),
+        steps=(tree.origins, given),
     )
 
 

@@ -64,7 +64,7 @@ def check_reading(
 def check_written(graph: Graph) -> list[Problem]:
     """Every problem of a graph, with its place in the graph's canonical text."""
     found = check(graph)
-    return placed(found, write(graph), {}) if found else []
+    return placed(found, write(graph)) if found else []
 
 
 def check_action(reading: ActionReading) -> list[Problem]:

@@ -13,7 +13,7 @@ from action_assistant.umrf.action_files import (
 from action_assistant.umrf.dialects import dialect_of, translated
 from action_assistant.umrf.jsontext import Json, Unreadable, decoded, parse, pointer
 from action_assistant.umrf.model import Graph, Key, Note, Problem, Where
-from action_assistant.umrf.places import joined, located, moved, placed
+from action_assistant.umrf.places import located, moved, placed
 from action_assistant.umrf.reading import Tree, read_tree
 from action_assistant.umrf.writing import Stamp, write
 
@@ -29,7 +29,8 @@ class Reading(msgspec.Struct, frozen=True):
     `remarks`: what was translated, left out, or has no place in D3. `problems`: what is wrong in the
     text as it stands and cannot be seen in the graph any more (H1 among it); `check` finds the rest.
     Both have their places in the text. `states`, `graph_state`: run states that the text carries
-    (other than UNINITIALIZED). `origins` lead from the canonical text of the graph to `text`.
+    (other than UNINITIALIZED). `steps` lead from the canonical text of the graph to `text`
+    (`places.Steps`).
     """
 
     graph: Graph
@@ -39,7 +40,7 @@ class Reading(msgspec.Struct, frozen=True):
     states: dict[Key, str] = {}
     graph_state: str | None = None
     text: str = ""
-    origins: dict[str, str] = {}
+    steps: tuple[dict[str, str], ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -48,7 +49,7 @@ class Reading(msgspec.Struct, frozen=True):
 
     def placed(self, problems: Iterable[Problem]) -> list[Problem]:
         """Problems of the graph with their places in the text that was read."""
-        return placed(problems, self.text, self.origins)
+        return placed(problems, self.text, self.steps)
 
 
 def read(text: str | bytes) -> Reading:
@@ -65,15 +66,14 @@ def read(text: str | bytes) -> Reading:
         )
     file, notes, problems, given = translated(value, dialect)
     tree = read_tree(file)
-    origins = joined(tree.origins, given)
     found, told = located(
         text,
         [
             *problems,
-            *(moved(problem, given) for problem in tree.problems),
-            *(moved(problem, origins) for problem in _carried_states(tree)),
+            *(moved(problem, [given]) for problem in tree.problems),
+            *(moved(problem, [tree.origins, given]) for problem in _carried_states(tree)),
         ],
-        [*notes, *(moved(note, given) for note in tree.notes)],
+        [*notes, *(moved(note, [given]) for note in tree.notes)],
     )
     return Reading(
         graph=tree.graph,
@@ -83,7 +83,7 @@ def read(text: str | bytes) -> Reading:
         states=tree.states,
         graph_state=tree.graph_state,
         text=text,
-        origins=origins,
+        steps=(tree.origins, given),
     )
 
 

@@ -1,7 +1,5 @@
 """Which dialect a file is written in, and older ones translated into D3 (SPEC 1.5)."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from action_assistant.umrf.dialects_old import (
@@ -24,7 +22,7 @@ class Translation(NamedTuple):
     file: dict[str, Json]
     notes: tuple[Note, ...] = ()
     problems: tuple[Problem, ...] = ()
-    origins: Mapping[str, str] = MappingProxyType({})
+    origins: dict[str, str] = {}  # noqa: RUF012 — never changed
 
 
 _MARKS: Final = ("graph_name", "actions", "umrf_actions", "graph_entry", "graph_exit")
@@ -127,7 +125,9 @@ def _from_designer(file: dict[str, Json]) -> Old:
         for lost in sorted(value.keys() - {"actions", "gui_attributes"}):
             text = f"{field} had a member without a place: “{lost}”."
             old.note(text, path + pointer(lost))
-        for lost in sorted(attributes.keys() - {"position"}) if isinstance(attributes, dict) else ():
+        for lost in (
+            sorted(attributes.keys() - {"position"}) if isinstance(attributes, dict) else ()
+        ):
             text = f"The gui_attributes of {field} had a member without a place: “{lost}”."
             old.note(text, path + pointer("gui_attributes", lost))
     if positions:

@@ -18,7 +18,12 @@ _OUTCOMES: Final[dict[str, tuple[str, ...]]] = {
 }
 _FLAGS: Final = ("pvf_required", "pvf_updatable")
 #: A parent that stops: only one that ended well did so, and one that was stopped told nobody.
-_STOPS: Final = ("on_true -> stop", "on_false -> stop", "on_error -> ignore", "on_stopped -> ignore")
+_STOPS: Final = (
+    "on_true -> stop",
+    "on_false -> stop",
+    "on_error -> ignore",
+    "on_stopped -> ignore",
+)
 
 
 class Old:
@@ -60,9 +65,9 @@ def from_umrf_actions(file: dict[str, Json], shallow: bool) -> Old:
     actions = old.file.pop("umrf_actions")
     old.file["actions"] = actions
     old.renamed("", "umrf_actions", "actions")
-    old.note("“umrf_actions” became “actions”.", "/umrf_actions")
+    old.note("“umrf_actions” became actions.", "/umrf_actions")
     old.refuse(
-        "/umrf_actions", "“umrf_actions” is an older form of “actions”; the engine refuses it."
+        "/umrf_actions", "“umrf_actions” is an older form of actions; the engine refuses it."
     )
     _translate(old, shallow)
     return old
@@ -91,10 +96,10 @@ def from_action(file: dict[str, Json]) -> Old:
         if file.get(field):
             old.note(f"“{field}” names neighbours of the action; they were left out.", f"/{field}")
     if "type" not in file:
-        old.refuse("", "The action has no “type”; the engine refuses the file.")
+        old.refuse("", "The action has no type; the engine refuses the file.")
         _actions(old, shallow=True)
     if "name" not in file:
-        old.refuse("", "The action has no “name”; the engine refuses the file.")
+        old.refuse("", "The action has no name; the engine refuses the file.")
     return old
 
 
@@ -160,13 +165,13 @@ def _type(old: Old, item: dict[str, Json], path: str, shallow: bool) -> None:
     if kind is not None:
         del item["effect"]
         old.renamed(path, "effect", "type")
-        text = f"The effect “{effect}” became the type “{kind}”."
+        text = f"The effect “{effect}” became the type {kind}."
         old.note(text, old.at(path, "effect"))
     elif not shallow or effect is not None:
-        text = "An action without a known effect got the type “sync”."
+        text = "An action without a known effect got the type sync."
         old.note(text, old.at(path, "effect"))
     else:
-        old.note("An action without a type got the type “sync”.", old.at(path))
+        old.note("An action without a type got the type sync.", old.at(path))
 
 
 def _number(old: Old, item: dict[str, Json], path: str) -> None:
@@ -181,7 +186,7 @@ def _number(old: Old, item: dict[str, Json], path: str) -> None:
             del item[field]
             item["instance_id"] = value
             old.renamed(path, field, "instance_id")
-            old.note(f"“{field}” became “instance_id”.", old.at(path, field))
+            old.note(f"“{field}” became instance_id.", old.at(path, field))
             return
 
 
@@ -198,9 +203,11 @@ def _relation(old: Old, relation: Json, path: str, side: str) -> Json:
     required = relation.get("required")
     if isinstance(required, str) and required in ("true", "false"):
         relation["required"] = required == "true"
-        old.note("“true” and “false” as texts became values.", old.at(path, "required"))
-    if _is_flag(relation.get("stop_when_received")) and "conditions" not in relation:
-        if _flag(relation.pop("stop_when_received")):
+        old.note(f"The text “{required}” became a value.", old.at(path, "required"))
+    stops = relation.get("stop_when_received")
+    if _is_flag(stops) and "conditions" not in relation:
+        del relation["stop_when_received"]
+        if _flag(stops):
             _stop(old, relation, path)
     if isinstance(condition := relation.get("condition"), str) and "conditions" not in relation:
         conditions = _conditions(condition)
@@ -209,7 +216,7 @@ def _relation(old: Old, relation: Json, path: str, side: str) -> Json:
             relation["conditions"] = conditions
             old.renamed(path, "condition", "conditions")
             told = ", ".join(str(c) for c in conditions if not str(c).endswith("ignore"))
-            text = f"The condition “{condition}” became “{told}”."
+            text = f"The condition “{condition}” became {told}."
             old.note(text, old.at(path, "condition"))
     return relation
 
@@ -221,13 +228,13 @@ def _stop(old: Old, relation: dict[str, Json], path: str) -> None:
     old.renamed(path, "stop_when_received", "conditions")
     place = old.at(path, "stop_when_received")
     old.note(
-        "“stop_when_received” became the conditions “on_true -> stop” and “on_false -> stop”. When "
+        "“stop_when_received” became the conditions on_true -> stop and on_false -> stop. When "
         "nothing is left to run then, the graph is HALTED, which the older engine called finished.",
         place,
     )
     if "required" not in relation:
         relation["required"] = False
-        old.note("What stops an action is not waited for: “required” became false.", old.at(path))
+        old.note("What stops an action is not waited for: it is not required.", old.at(path))
     elif relation["required"] is True:
         message = (
             "The action waits for a parent that is to stop it (“required” and “stop_when_received”). "
@@ -256,7 +263,7 @@ def _parameters(old: Old, group: dict[str, Json], path: str) -> dict[str, Json]:
             changed[key] = _parameters(old, value, inner)
         elif key in _FLAGS and isinstance(value, str) and value in ("true", "false"):
             changed[key] = value == "true"
-            old.note("“true” and “false” as texts became values.", inner)
+            old.note(f"The text “{value}” became a value.", inner)
         else:
             changed[key] = value
     return changed
@@ -287,7 +294,11 @@ def _ends(old: Old, actions: list[Json], first: set[int]) -> None:
             exits.append(index)
     by_index = dict(listed)
     for field, found, rule in (
-        ("graph_entry", entries, "Actions without parents, or marked to be first, became the entry."),
+        (
+            "graph_entry",
+            entries,
+            "Actions without parents, or marked to be first, became the entry.",
+        ),
         ("graph_exit", exits, "Actions without children became the exit."),
     ):
         references: list[Json] = []

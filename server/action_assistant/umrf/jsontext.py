@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 from itertools import accumulate
 from json.encoder import encode_basestring as quote
-from typing import Any, Final, NoReturn, TypeAlias
+from typing import Final, NoReturn, TypeAlias
 
 import msgspec
 
@@ -162,7 +162,9 @@ def decoded(text: str | bytes) -> str:
     try:
         return text.decode().removeprefix("\ufeff")
     except UnicodeDecodeError as e:
-        line, column = place_at(start := text[: e.start].decode().removeprefix("\ufeff"), len(start))
+        line, column = place_at(
+            start := text[: e.start].decode().removeprefix("\ufeff"), len(start)
+        )
         message = f"The text is not UTF-8 (byte {e.start}, line {line})."
         raise Unreadable("not-utf-8", message, line=line, column=column) from None
 

@@ -29,6 +29,4 @@ class Notes:
 
     def _all(self) -> Iterator[Note]:
         for message, (first, *others) in self._places.items():
-            yield Note(
-                message=message, where=first, times=self._times[message], also=tuple(others)
-            )
+            yield Note(message=message, where=first, times=self._times[message], also=tuple(others))

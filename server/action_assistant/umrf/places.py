@@ -12,15 +12,17 @@ from msgspec.structs import replace
 from action_assistant.umrf.jsonplaces import places_of
 from action_assistant.umrf.model import Note, Problem, Where
 
-#: Where values came from: a pointer → the pointer in the given text. What is not named stands
+#: Where values came from, in one step: a pointer → the pointer before it. What is not named stands
 #: where what is around it came from.
 Origins: TypeAlias = Mapping[str, str]
+#: Steps that lead to the given text, one after the other.
+Steps: TypeAlias = Sequence[Origins]
 
 Told = TypeVar("Told", Problem, Note)
 
 
 def origin(origins: Origins, path: str) -> str:
-    """The pointer in the given text of what stands at `path`."""
+    """The pointer from which what stands at `path` came, by one step."""
     head = path
     while head not in origins:
         cut = head.rfind("/")
@@ -30,21 +32,19 @@ def origin(origins: Origins, path: str) -> str:
     return origins[head] + path[len(head) :]
 
 
-def joined(inner: Origins, outer: Origins) -> dict[str, str]:
-    """Both steps in one: `inner` leads to pointers that `outer` leads on from."""
-    return {**outer, **{new: origin(outer, old) for new, old in inner.items()}}
+def placed(problems: Iterable[Problem], text: str, steps: Steps = ()) -> list[Problem]:
+    """The problems with their places in the given text, to which `steps` lead."""
+    return located(text, [moved(problem, steps) for problem in problems])[0]
 
 
-def placed(problems: Iterable[Problem], text: str, origins: Origins) -> list[Problem]:
-    """The problems with their places in the given text, to which `origins` lead."""
-    return located(text, [moved(problem, origins) for problem in problems])[0]
-
-
-def moved(told: Told, origins: Origins) -> Told:
-    """A problem or note with the pointers of the given text, to which `origins` lead."""
+def moved(told: Told, steps: Steps) -> Told:
+    """A problem or note with the pointers of the given text, to which `steps` lead."""
 
     def lead(where: Where) -> Where:
-        return replace(where, path=origin(origins, where.path))
+        path = where.path
+        for origins in steps:
+            path = origin(origins, path)
+        return replace(where, path=path)
 
     match told:
         case Problem():

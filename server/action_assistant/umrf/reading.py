@@ -213,7 +213,7 @@ class _Reader:
             key = f"a{index + 1}"
         used.add(key)
         if "type" not in item:
-            message = "The action has no type; the engine refuses the file. “sync” is assumed."
+            message = "The action has no type; the engine refuses the file. It is read as sync."
             self.report("type-missing", path, message)
         name = text_of(item, "name", extra)
         instance_id = number_of(item, extra)
@@ -252,7 +252,9 @@ class _Reader:
             message = "The run log of the action is malformed; the engine refuses the file."
             self.report("runtime-illegal", path + "/runtime", message)
         elif "runtime" in item:
-            self.notes.add("“runtime” was left out; it is the log of a past run.", path + "/runtime")
+            self.notes.add(
+                "“runtime” was left out; it is the log of a past run.", path + "/runtime"
+            )
 
     # Relations
 

@@ -207,7 +207,7 @@ def _check_waiting(subject: Subject, reach: Reach) -> None:
         elif missing:
             _report_missed_join(subject, action.key, missing, net)
         else:
-            message = f"Nothing ever answers “run” for {action.full_name}; it never runs."
+            message = f"Nothing ever answers run for {action.full_name}; it never runs."
             subject.report("never-run", "warning", message, action=action)
 
 

@@ -1,7 +1,6 @@
 """Where things of a graph stand in its canonical file, and how problems name them."""
 
-from collections.abc import Iterator
-from typing import Final
+from typing import Final, Literal
 
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.jsontext import pointer
@@ -104,8 +103,10 @@ class Subject:
         relation: Relation | None = None,
         member: str = "",
         fix: str | None = None,
+        side: Literal["parents", "children"] | None = None,
     ) -> None:
-        """Adds a problem of the graph, of an action or of a relation; `member` goes below it.
+        """Adds a problem of the graph, of an action or of a relation; `member` goes below it, `side`
+        says in which of the lists that have the relation it is.
 
         Only the first `MAX_EACH` of one code and severity: more help nobody and fill the memory.
         """
@@ -117,14 +118,14 @@ class Subject:
         if action is not None:
             where = Where(path=self.paths.get(action.key, "") + member, aid=action.key)
         elif relation is not None:
-            where = self._where(relation, member)
+            where = self._where(relation, member, side)
         self.problems.append(
             Problem(code=code, severity=severity, where=where, message=message, fix=fix)
         )
 
-    def _where(self, relation: Relation, member: str) -> Where:
+    def _where(self, relation: Relation, member: str, side: str | None) -> Where:
         path = self.parent_paths.get(id(relation)) or self.child_paths.get(id(relation), "")
-        if member.startswith("/remap"):
+        if side == "children" or (side is None and member.startswith("/remap")):
             path = self.child_paths.get(id(relation), path)
         listing = f";{relation.listing}" if relation.listing else ""
         owner = relation.child if relation.child in self.paths else relation.parent
@@ -133,11 +134,11 @@ class Subject:
         return Where(path=path + member, aid=aid, relation=key)
 
 
-def sorted_by_name(names: set[str]) -> Iterator[str]:
-    """Names in quotes, in order."""
-    return (f"“{name}”" for name in sorted(names))
-
-
 def joined(names: set[str]) -> str:
-    """Names for a sentence."""
-    return ", ".join(sorted_by_name(names))
+    """Names for a sentence. Without quotes: those say what stands at the place of a problem."""
+    return ", ".join(sorted(names))
+
+
+def quoted(names: set[str]) -> str:
+    """Names for a sentence that stand at the place of its problem."""
+    return ", ".join(f"“{name}”" for name in sorted(names))

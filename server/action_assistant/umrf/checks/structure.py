@@ -3,17 +3,19 @@
 import re
 from typing import Final
 
-from action_assistant.umrf.checks.places import Subject, joined
-from action_assistant.umrf.jsontext import Json, Number, parse_small
+from action_assistant.umrf.checks.places import Subject, quoted
+from action_assistant.umrf.jsontext import Json, Number, dump, parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Parameter, Relation, Severity
 from action_assistant.umrf.parameters import MAX_PATH, keys_of
-from action_assistant.umrf.relations import MAX_REFERRED_ID, conditions_of, remap_of, whole_of
+from action_assistant.umrf.relations import MAX_REFERRED_ID, condition_of, remap_of, whole_of
 
 _TEXTS: Final = {"name", "type", "actor", "description", "graph_name", "graph_description"}
 _LISTS: Final = {"parents", "children", "graph_entry", "graph_exit", "actions"}
 _OBJECTS: Final = {"input_parameters", "output_parameters"}
 _CLASS: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _CONTROL: Final = re.compile(r"[\x00-\x1f\x7f]")
+#: Characters of a wrong text that are quoted.
+_SHOWN: Final = 80
 TYPES: Final = ("sync", "async", "spontaneous")
 
 
@@ -99,7 +101,7 @@ def _check_action(subject: Subject, action: Action) -> None:
             "type-empty", "error", message, action=action, member="/type", fix="type-sync"
         )
     elif action.type not in TYPES and "type" not in extra:
-        message = f"The engine knows no type “{action.type}” and treats the action like “sync”."
+        message = f"The engine knows no type “{action.type}” and treats the action like sync."
         subject.report("type-unknown", "warning", message, action=action, member="/type")
     if action.instance_id > MAX_REFERRED_ID and "instance_id" not in extra:
         message = (
@@ -165,9 +167,8 @@ def _check_relation(subject: Subject, relation: Relation) -> None:
 
 def _check_parent_field(subject: Subject, relation: Relation, field: str, value: Json) -> None:
     member = f"/{field}"
-    if field == "conditions" and not conditions_of(value)[1]:
-        message = "A condition here is none that the engine knows (“on_true -> run”); it refuses the graph."
-        subject.report("condition-illegal", "error", message, relation=relation, member=member)
+    if field == "conditions":
+        _check_conditions(subject, relation, value)
     elif field == "required" and not isinstance(value, bool):
         message = "“required” must be true or false; the engine refuses the graph."
         subject.report("value-type", "error", message, relation=relation, member=member)
@@ -175,19 +176,44 @@ def _check_parent_field(subject: Subject, relation: Relation, field: str, value:
         subject.report(*found, relation=relation, member=member)
     elif field == "remap":
         message = "A renaming on the child's side is ignored; it belongs to the parent's side."
-        subject.report("wrong-side", "warning", message, relation=relation, member=member)
+        subject.report(
+            "wrong-side", "warning", message, relation=relation, member=member, side="parents"
+        )
+
+
+def _check_conditions(subject: Subject, relation: Relation, value: Json) -> None:
+    """Conditions that the engine refuses, each at its own place."""
+    if not isinstance(value, list):
+        message = "“conditions” must be a list of texts; the engine refuses the graph."
+        subject.report(
+            "condition-illegal", "error", message, relation=relation, member="/conditions"
+        )
+        return
+    for index, item in enumerate(value):
+        if condition_of(item) is None:
+            member = f"/conditions/{index}"
+            text = f"“{item}”" if isinstance(item, str) else dump(item)[:_SHOWN]
+            if isinstance(item, str) and len(item) > _SHOWN:
+                text = f"“{item[:_SHOWN]}” …"
+            message = (
+                f"{text} is no condition that the engine knows, such as on_true -> run; it refuses "
+                "the graph."
+            )
+            subject.report("condition-illegal", "error", message, relation=relation, member=member)
 
 
 def _check_child_field(subject: Subject, relation: Relation, field: str, value: Json) -> None:
     member = f"/{field}"
     if field == "remap" and not remap_of(value)[1]:
-        message = "This renaming repeats a “from” or lacks an end; the engine refuses the graph or aborts."
+        message = "This renaming repeats a source or lacks an end; the engine refuses the graph or aborts."
         subject.report("remap-illegal", "error", message, relation=relation, member="/remap")
     elif field == "instance_id" and (found := _check_number(value)):
-        subject.report(*found, relation=relation, member=member)
+        subject.report(*found, relation=relation, member=member, side="children")
     elif field in ("conditions", "required") and relation.parent != ENTRY:
         message = f"“{field}” on the parent's side is ignored; it belongs to the child's side."
-        subject.report("wrong-side", "warning", message, relation=relation, member=member)
+        subject.report(
+            "wrong-side", "warning", message, relation=relation, member=member, side="children"
+        )
 
 
 # Parameters
@@ -210,11 +236,11 @@ def _check_parameters(
             subject.report("parameter-illegal", "error", message, action=action, member=member)
         strange = {key for key in keys if not key or ":" in key}
         if strange:
-            message = f"{joined(strange)} is no name that the engine can find again."
+            message = f"{quoted(strange)} is no name that the engine can find again."
             subject.report("parameter-name", "warning", message, action=action, member=member)
         first = flat.setdefault("::".join(keys), parameter.path)
         if first != parameter.path:
-            message = f"“{first}” and “{parameter.path}” are one parameter for the engine."
+            message = f"“{parameter.path}” is one parameter with {first} for the engine."
             subject.report("parameter-name", "warning", message, action=action, member=member)
 
 
@@ -228,14 +254,27 @@ def refusal_of(value: Json) -> str | None:
     if not isinstance(kind, str):
         return "has a pvf_type that is no text"
     if "pvf_value" in value and not fits(kind, value["pvf_value"]):
-        return f"has a pvf_value that is no {kind}"
+        return _misfit("has a pvf_value", "that is no", kind)
     for flag in ("pvf_required", "pvf_updatable"):
         if not isinstance(value.get(flag, True), bool):
             return f"has a {flag} that is neither true nor false"
     allowed = value.get("pvf_allowed_values")
     if isinstance(allowed, list) and not all(fits(kind, member) for member in allowed):
-        return f"allows values that are no {kind}"
+        return _misfit("allows values", "that are no", kind)
     return None
+
+
+def _misfit(what: str, none: str, kind: str) -> str:
+    """Why a value does not go with its type: the engine reads none of types that it does not know."""
+    if kind in NATIVE:
+        return f"{what} {none} {kind}"
+    if not kind:
+        return f"{what}, and its pvf_type is empty"
+    return f"{what}, and of the type “{kind}” the engine reads none"
+
+
+#: Types of which the engine reads values.
+NATIVE: Final = ("string", "number", "bool", "strings", "numbers", "bools")
 
 
 def fits(kind: str, value: Json) -> bool:
