@@ -1,7 +1,16 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
 import { addAction, addParameter, connect, setField, undoOf } from "./edit";
-import { ABOUT, applyFix, applySafe, FIXES, type Fix, fixOf, safeOnes } from "./fixes";
+import {
+  ABOUT,
+  applyExamples,
+  applyFix,
+  applySafe,
+  FIXES,
+  type Fix,
+  fixOf,
+  safeOnes,
+} from "./fixes";
 import { mapsOf, rootOf } from "./layout";
 import { fullName, type Graph } from "./model";
 import { readGraph } from "./read";
@@ -51,6 +60,11 @@ const cases: Record<Fix, () => { doc: Y.Doc; where: { aid?: string; relation?: s
     rootOf(doc, "actions").set(`${twin}|twin`, true);
     return { doc, where: { aid: twin } };
   },
+  "take-example": () => {
+    const { doc, a } = broken();
+    addParameter(doc, a, "in", "x~1y", '{"pvf_type": "number", "pvf_example": "2.50"}');
+    return { doc, where: { aid: a, path: "/actions/0/input_parameters/x~1y" } };
+  },
   "type-sync": () => {
     const { doc, a } = broken();
     setField(doc, a, "type", "");
@@ -67,6 +81,10 @@ const found: Record<Fix, (graph: Graph) => boolean> = {
     ),
   "remove-relation": (graph) => graph.relations.length === 0 && graph.actions.length === 1,
   renumber: (graph) => new Set(graph.actions.map(fullName)).size === graph.actions.length,
+  "take-example": (graph) =>
+    graph.actions.some(({ inputs }) =>
+      inputs.some(({ text }) => text.endsWith('"pvf_example": "2.50", "pvf_value": 2.50}')),
+    ),
   "type-sync": (graph) => graph.actions.every(({ type }) => type === "sync"),
 };
 
@@ -115,6 +133,23 @@ test("a number is taken only by actions of the name, and never one that the engi
   expect(graphOf(doc).actions.map(fullName)).toContain("graph_exit_1");
 });
 
+test("every example is taken at once and undone at once, and never along with the safe fixes", () => {
+  const { doc, a, b } = broken();
+  const leaf = '{"pvf_type": "string", "pvf_example": "left"}';
+  const problems = [a, b].map((aid) => {
+    addParameter(doc, aid, "in", "to", leaf);
+    return { fix: "take-example", where: { aid, path: "/actions/0/input_parameters/to" } };
+  });
+  expect(safeOnes(problems)).toEqual([]);
+  const undo = undoOf(doc);
+  expect(applyExamples(doc, problems)).toBe(2);
+  expect(applyExamples(doc, problems)).toBe(0);
+  const texts = graphOf(doc).actions.flatMap(({ inputs }) => inputs.map(({ text }) => text));
+  expect(texts.every((text) => text.endsWith('"pvf_value": "left"}'))).toBe(true);
+  undo.undo();
+  expect(undo.canUndo()).toBe(false);
+});
+
 test("everything that loses nothing is mended at once and undone at once", () => {
   const { doc, arrow, a } = broken();
   rootOf(doc, "relations").set(`${arrow}|only`, "parents");
@@ -135,6 +170,6 @@ test("everything that loses nothing is mended at once and undone at once", () =>
   expect(undo.canUndo()).toBe(false);
 });
 
-test("what removes something that was drawn is never done unread", () => {
-  expect(FIXES.filter((fix) => !ABOUT[fix].safe)).toEqual(["remove-relation"]);
+test("what removes something that was drawn, or makes a value, is never done unread", () => {
+  expect(FIXES.filter((fix) => !ABOUT[fix].safe)).toEqual(["remove-relation", "take-example"]);
 });

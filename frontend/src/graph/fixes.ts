@@ -7,9 +7,12 @@
 
 import type * as Y from "yjs";
 import { removeActions, setField } from "./edit-actions";
+import { setParameter } from "./edit-parameters";
 import { mirrorRelation, removeRelation, setRequired } from "./edit-relations";
 import { setOutputsOptional } from "./ends";
+import { exampleOf } from "./examples";
 import { endsOf } from "./layout";
+import { withMember } from "./member";
 import type { Key } from "./model";
 import { graphOf, numbersOf, together } from "./pen";
 
@@ -19,13 +22,14 @@ export const FIXES = [
   "outputs-optional",
   "remove-relation",
   "renumber",
+  "take-example",
   "type-sync",
 ] as const;
 export type Fix = (typeof FIXES)[number];
 
 /** What of a problem a fix needs. */
 export interface Fixable {
-  readonly where: { readonly aid?: string; readonly relation?: string };
+  readonly where: { readonly aid?: string; readonly relation?: string; readonly path?: string };
   readonly fix?: string | null;
 }
 
@@ -42,6 +46,8 @@ export const ABOUT: Readonly<Record<Fix, About>> = {
   "outputs-optional": { words: "Let the end not wait for its outputs", safe: true },
   "remove-relation": { words: "Remove the arrow", safe: false },
   renumber: { words: "Give it a free number", safe: true },
+  // A robot acts on values: somebody shall have read them.
+  "take-example": { words: "Take the example as value", safe: false },
   "type-sync": { words: "Make it “sync”", safe: true },
 };
 
@@ -64,7 +70,16 @@ function placeOf(fix: Fix, where: Fixable["where"]): string | undefined {
     case "renumber":
     case "type-sync":
       return where.aid;
+    case "take-example":
+      return inputOf(where) === null ? undefined : where.aid;
   }
+}
+
+/** The path of the input that a place is about. */
+function inputOf({ path = "" }: Fixable["where"]): string | null {
+  const head = "/input_parameters/";
+  const at = path.indexOf(head);
+  return at < 0 ? null : path.slice(at + head.length);
 }
 
 /** Does the fix of one problem. False when there is none or nothing is left to do. */
@@ -84,6 +99,8 @@ export function applyFix(doc: Y.Doc, problem: Fixable): boolean {
         return removeWithGhosts(doc, place);
       case "renumber":
         return renumber(doc, place);
+      case "take-example":
+        return takeExample(doc, place, inputOf(problem.where) ?? "");
       case "type-sync":
         return typeSync(doc, place);
     }
@@ -106,6 +123,24 @@ export function safeOnes<P extends Fixable>(problems: readonly P[]): P[] {
 /** All that lose nothing, as one step of undo. Answers how many did something. */
 export function applySafe(doc: Y.Doc, problems: readonly Fixable[]): number {
   return together(doc, () => safeOnes(problems).filter((one) => applyFix(doc, one)).length);
+}
+
+/** Those that take an example as value. */
+export function exampleOnes<P extends Fixable>(problems: readonly P[]): P[] {
+  return problems.filter((problem) => fixOf(problem) === "take-example");
+}
+
+/** All that take an example, as one step of undo. Answers how many did something. */
+export function applyExamples(doc: Y.Doc, problems: readonly Fixable[]): number {
+  return together(doc, () => exampleOnes(problems).filter((one) => applyFix(doc, one)).length);
+}
+
+function takeExample(doc: Y.Doc, key: Key, path: string): boolean {
+  const action = graphOf(doc).actions.find((candidate) => candidate.key === key);
+  const input = action?.inputs.find((candidate) => candidate.path === path);
+  const value = input ? exampleOf(input.text) : null;
+  if (value === null) return false;
+  return setParameter(doc, key, "in", path, (now) => withMember(now, "pvf_value", value));
 }
 
 /** A ghost is there only because arrows name it: it goes with its last one. */

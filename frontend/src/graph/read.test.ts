@@ -33,7 +33,9 @@ const heads = fc.oneof(
 );
 const fields = fc.constantFrom(
   ..."|type |instance_id |order |missing |twin |in |in/a |in/b |out/ |x/name |on_true".split(" "),
-  ..."|on_false |po |co |required |only |remap |remap/a |x/parents/p |x/children/c |".split(" "),
+  ..."|on_false |po |co |required |only |remap |remap/a |x/parents/p |x/children/c |x |x/parents |x/a |".split(
+    " ",
+  ),
   "",
 );
 const keys = fc.oneof(

@@ -197,7 +197,7 @@ class Reader {
       entryPosition: asPosition(this.positions.get(ENTRY)) ?? null,
       exitPosition: asPosition(this.positions.get(EXIT)) ?? null,
       notes: under(this.positions, "g/"),
-      extra: under(this.meta, "x/"),
+      extra: extraOf(this.meta, "x"),
     };
   }
 }
@@ -232,6 +232,12 @@ function under(fields: Fields, prefix: string): Extra {
   return found.sort((a, b) => byText(a[0], b[0]));
 }
 
+/** Unknown fields in the order of their list, the others after them by name. */
+function extraOf(fields: Fields, head: string): Extra {
+  const texts = new Map(under(fields, `${head}/`));
+  return listed(texts.keys(), fields.get(head)).map((name) => [name, texts.get(name) ?? ""]);
+}
+
 function readAction(key: Key, fields: Fields, position: unknown): RawAction | null {
   const name = asText(fields.get(""));
   if (name === undefined) return null;
@@ -247,7 +253,7 @@ function readAction(key: Key, fields: Fields, position: unknown): RawAction | nu
     position: asPosition(position) ?? null,
     missing: fields.get("missing") === true,
     twin: fields.get("twin") === true,
-    extra: under(fields, "x/"),
+    extra: extraOf(fields, "x"),
   };
   return { action, order: asNumber(fields.get("order")) ?? 0 };
 }
@@ -294,8 +300,8 @@ function readRelation(id: string, fields: Fields): Relation | null {
     only: only === "parents" || only === "children" ? only : null,
     parentOrder: asNumber(fields.get("po")) ?? 0,
     childOrder: asNumber(fields.get("co")) ?? 0,
-    parentsExtra: under(fields, "x/parents/"),
-    childrenExtra: under(fields, "x/children/"),
+    parentsExtra: extraOf(fields, "x/parents"),
+    childrenExtra: extraOf(fields, "x/children"),
   };
 }
 

@@ -14,7 +14,8 @@ from action_assistant.umrf import check as checks
 from action_assistant.umrf import codec, semantics
 from action_assistant.umrf.action_files import ACTION_DIALECTS
 from action_assistant.umrf.facts import PINNED, SIMULATED, EngineFacts, facts_for
-from action_assistant.umrf.model import Graph, Problem, Signature, Where
+from action_assistant.umrf.fixes import with_examples
+from action_assistant.umrf.model import Graph, Note, Problem, Signature, Where
 from action_assistant.umrf.signatures import signature_of
 
 _DAY: Final = 24 * 3600.0  # seconds
@@ -23,11 +24,13 @@ _COMMANDS: Final = frozenset({"stop", "pause", "resume"})
 
 
 class Verdict(msgspec.Struct, frozen=True):
-    """What `check` found in one file."""
+    """What `check` found in one file, with places there. `notes`: what reading it translated or left
+    out."""
 
     file: str
     dialect: str | None
     problems: tuple[Problem, ...]
+    notes: tuple[Note, ...] = ()
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -56,6 +59,11 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "--through-document",
         action="store_true",
         help="by way of the shared document, as if it had been imported and exported",
+    )
+    convert.add_argument(
+        "--examples",
+        action="store_true",
+        help="give inputs that lack a value the example that old files have for them",
     )
     convert.set_defaults(deed=_convert)
 
@@ -98,9 +106,13 @@ def _text(path: Path) -> bytes:
 
 
 def _refusal(path: Path, error: codec.Unreadable) -> str:
-    place = f":{error.line}:{error.column}" if error.line is not None else ""
     within = f" at {error.path}" if error.path else ""
-    return f"{path}{place}: {error.message}{within}"
+    return f"{path}:{error.line}:{error.column}: {error.message}{within}"
+
+
+def _at(where: Where) -> str:
+    """A place in words: line and column, then the pointer."""
+    return f"line {where.line}, column {where.column}{': ' if where.path else ''}{where.path}"
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -128,14 +140,14 @@ def _verdict(
         reading = codec.read(text)
         if reading.dialect in ACTION_DIALECTS:
             action = codec.read_action(text)
-            return Verdict(str(path), action.dialect, tuple(checks.check_action(action)))
+            found = checks.check_action(action)
+            return Verdict(str(path), action.dialect, tuple(found), action.remarks)
     except codec.Unreadable as error:
-        problem = Problem(
-            code=error.code, severity="error", where=Where(path=error.path), message=error.message
-        )
+        where = Where(path=error.path, line=error.line, column=error.column)
+        problem = Problem(code=error.code, severity="error", where=where, message=error.message)
         return Verdict(str(path), None, (problem,))
     found = checks.check_reading(reading, actions, facts, graphs)
-    return Verdict(str(path), reading.dialect, tuple(dict.fromkeys(found)))
+    return Verdict(str(path), reading.dialect, tuple(dict.fromkeys(found)), reading.remarks)
 
 
 def _print(verdict: Verdict) -> None:
@@ -145,8 +157,9 @@ def _print(verdict: Verdict) -> None:
         f"{verdict.file}: {verdict.dialect or 'unreadable'}, {errors} errors, {warnings} warnings"
     )
     for problem in verdict.problems:
-        place = f" ({problem.where.path})" if problem.where.path else ""
-        print(f"  {problem.severity} {problem.code}: {problem.message}{place}")
+        print(f"  {problem.severity} {problem.code}: {problem.message} ({_at(problem.where)})")
+    for note in verdict.notes:
+        print(f"  note: {note.sentence} ({_at(note.where)})")
 
 
 def _convert(options: argparse.Namespace) -> int:
@@ -155,11 +168,26 @@ def _convert(options: argparse.Namespace) -> int:
     except codec.Unreadable as error:
         print(_refusal(options.file, error), file=sys.stderr)
         return 1
-    graph = _through_document(reading.graph) if options.through_document else reading.graph
-    for note in reading.notes:
-        print(f"{options.file}: {note}", file=sys.stderr)
+    graph = reading.graph
+    if options.examples:
+        graph = _with_examples(options.file, graph)
+    if options.through_document:
+        graph = _through_document(graph)
+    for note in reading.remarks:
+        place = f"{options.file}:{note.where.line}:{note.where.column}"
+        within = f" at {note.where.path}" if note.where.path else ""
+        print(f"{place}: {note.sentence}{within}", file=sys.stderr)
     sys.stdout.write(codec.write(graph))
     return 0
+
+
+def _with_examples(path: Path, graph: Graph) -> Graph:
+    """The graph with examples as values; says which."""
+    offered = [problem for problem in checks.check(graph) if problem.fix == "take-example"]
+    for problem in offered:
+        name = problem.where.path.partition("/input_parameters/")[2].replace("/", "::")
+        print(f"{path}: The example of “{name}” became its value.", file=sys.stderr)
+    return with_examples(graph, offered)
 
 
 def _through_document(graph: Graph) -> Graph:
@@ -201,8 +229,8 @@ def _simulate(options: argparse.Namespace) -> int:
 
 def _print_refusals(path: Path, refusals: Sequence[Problem]) -> None:
     for problem in refusals:
-        place = f" ({problem.where.path})" if problem.where.path else ""
-        print(f"{path}: the engine refuses it: {problem.message}{place}", file=sys.stderr)
+        place = f"({_at(problem.where)})"
+        print(f"{path}: the engine refuses it: {problem.message} {place}", file=sys.stderr)
 
 
 def _script(path: Path) -> semantics.Script:

@@ -17,8 +17,9 @@ from action_assistant.journal import tables
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf import codec
+from action_assistant.umrf.action_files import ACTION_DIALECTS
 from action_assistant.umrf.check import check
-from action_assistant.umrf.model import Graph, Problem
+from action_assistant.umrf.model import Graph, Note, Problem
 from action_assistant.web.keys import Author
 
 NAME_LIMIT: Final = 200  # characters
@@ -48,21 +49,28 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Reading(msgspec.Struct, frozen=True):
-    """What was found in an imported file: its dialect, what was translated, what is wrong."""
+    """What was found in an imported file: its dialect, what was translated, what is wrong.
+
+    `remarks` are the notes with their places; all places are in the file as it was sent.
+    """
 
     dialect: str
     notes: tuple[str, ...]
     problems: tuple[Problem, ...]
+    remarks: tuple[Note, ...] = ()
 
 
 class Preview(msgspec.Struct, frozen=True):
-    """What a file would become. `problems`: those of the file, then those of the graph."""
+    """What a file would become. `problems`: those of the file, then those of the graph. `remarks`
+    are the notes with their places; all places are in the file as it was sent.
+    """
 
     dialect: str
     notes: tuple[str, ...]
     problems: tuple[Problem, ...]
     name: str
     actions: int
+    remarks: tuple[Note, ...] = ()
 
 
 class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -112,7 +120,7 @@ class Catalogue:
 
     async def bring(self, body: bytes, author: str) -> tuple[GraphView, Reading]:
         """A graph from a UMRF file. The log keeps the file as it came."""
-        reading = read(body)
+        reading = read_graph(body)
         graph = reading.graph
         made = h.draft(
             h.CREATED,
@@ -120,7 +128,7 @@ class Catalogue:
             h.Created(graph.name, graph.description, reading.dialect, reading.notes),
         )
         view = await self._add(graph, [made, Draft(h.IMPORTED, author, body)], author)
-        return view, Reading(reading.dialect, reading.notes, reading.problems)
+        return view, Reading(reading.dialect, reading.notes, reading.problems, reading.remarks)
 
     async def describe(
         self, graph: str, author: str, *, name: str | None, description: str | None
@@ -197,8 +205,21 @@ class Catalogue:
         )
 
 
+def read_graph(body: bytes) -> codec.Reading:
+    """The UMRF file of a graph. Raises BadInput, NotUmrf, TooLarge with the place in the text."""
+    reading = read(body)
+    if reading.dialect in ACTION_DIALECTS:
+        raise NotUmrf(
+            f"This is the file of one action, {reading.graph.name or 'without a name'}, and not of a "
+            "graph. To draw with the action, open a graph and paste the text of the file there; "
+            "“action-assistant convert” makes a graph of this action alone.",
+            where={"code": "action-file", "line": 1, "column": 1},
+        )
+    return reading
+
+
 def read(body: bytes) -> codec.Reading:
-    """A UMRF file. Raises BadInput, NotUmrf, TooLarge with the place in the text."""
+    """A UMRF file, of a graph or of one action. Raises BadInput, NotUmrf, TooLarge with the place in the text."""
     try:
         return codec.read(body)
     except codec.Unreadable as error:
@@ -218,14 +239,15 @@ def read(body: bytes) -> codec.Reading:
 
 def preview(body: bytes) -> Preview:
     """What importing a file would make. Raises as `read` does."""
-    reading = read(body)
+    reading = read_graph(body)
     graph = reading.graph
     return Preview(
         reading.dialect,
         reading.notes,
-        (*reading.problems, *check(graph)),
+        (*reading.problems, *reading.placed(check(graph))),
         graph.name,
         sum(not action.missing for action in graph.actions),
+        reading.remarks,
     )
 
 

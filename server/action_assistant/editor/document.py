@@ -87,7 +87,7 @@ def flatten(graph: Graph) -> Maps:
     meta: dict[str, object] = {"schema": SCHEMA, "name": graph.name}
     if graph.description:
         meta["description"] = graph.description
-    meta.update({f"x/{field}": text for field, text in graph.extra})
+    meta.update(_extra_fields("x", graph.extra))
     maps: Maps = {"meta": meta, "actions": {}, "relations": {}, "positions": {}, "comments": {}}
     positions = maps["positions"]
     for index, action in enumerate(graph.actions):
@@ -116,7 +116,16 @@ def _action_fields(action: Action, order: float) -> dict[str, object]:
     fields.update({f"{key}|{field}": True for field, mark in marks.items() if mark})
     for side, parameters in (("in", action.inputs), ("out", action.outputs)):
         fields.update(_parameter_fields(f"{key}|{side}", parameters))
-    fields.update({f"{key}|x/{field}": text for field, text in action.extra})
+    fields.update(_extra_fields(f"{key}|x", action.extra))
+    return fields
+
+
+def _extra_fields(head: str, extra: tuple[tuple[str, JsonText], ...]) -> dict[str, object]:
+    """Unknown fields. Without a list of them they stand by name."""
+    fields: dict[str, object] = {f"{head}/{field}": text for field, text in extra}
+    names = [field for field, _ in extra]
+    if names != sorted(names, key=by_text):
+        fields[head] = _list_text(names)
     return fields
 
 
@@ -144,7 +153,7 @@ def _relation_fields(relation: Relation) -> dict[str, object]:
     fields.update(_remap_fields(head, relation.remap))
     extras = {"parents": relation.parents_extra, "children": relation.children_extra}
     for side, extra in extras.items():
-        fields.update({f"{head}|x/{side}/{field}": text for field, text in extra})
+        fields.update(_extra_fields(f"{head}|x/{side}", extra))
     return fields
 
 

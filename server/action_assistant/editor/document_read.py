@@ -52,7 +52,7 @@ def read_maps(maps: Mapping[str, Mapping[str, object]]) -> Graph:
         entry_position=values.position(positions.get(ENTRY)),
         exit_position=values.position(positions.get(EXIT)),
         notes=_under(positions, "g/"),
-        extra=_under(meta, "x/"),
+        extra=_extra(meta, "x"),
     )
 
 
@@ -73,6 +73,12 @@ def _under(fields: Fields, prefix: str) -> _Extra:
         if key.startswith(prefix) and isinstance(value, str) and values.json_text(value) is not None
     )
     return tuple(sorted(found, key=lambda pair: by_text(pair[0])))
+
+
+def _extra(fields: Fields, head: str) -> _Extra:
+    """Unknown fields in the order of their list, the others after them by name."""
+    texts = dict(_under(fields, f"{head}/"))
+    return tuple((field, texts[field]) for field in _listed(texts, fields.get(head)))
 
 
 # Actions
@@ -104,7 +110,7 @@ def _action(key: Key, name: str, own: Fields, position: object) -> Action:
         position=values.position(position),
         missing=own.get("missing") is True,
         twin=own.get("twin") is True,
-        extra=_under(own, "x/"),
+        extra=_extra(own, "x"),
     )
 
 
@@ -206,8 +212,8 @@ def _relation(ends: Ends, own: Fields) -> Relation | None:
         only="parents" if only == "parents" else "children" if only == "children" else None,
         parent_order=values.number(own.get("po")) or 0.0,
         child_order=values.number(own.get("co")) or 0.0,
-        parents_extra=_under(own, "x/parents/"),
-        children_extra=_under(own, "x/children/"),
+        parents_extra=_extra(own, "x/parents"),
+        children_extra=_extra(own, "x/children"),
     )
 
 

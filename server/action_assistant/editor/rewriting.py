@@ -21,7 +21,7 @@ from action_assistant.editor.sights import Moment
 from action_assistant.errors import NotUmrf
 from action_assistant.umrf import codec
 from action_assistant.umrf.check import check
-from action_assistant.umrf.jsontext import pointer
+from action_assistant.umrf.jsonplaces import places_of, pointer
 from action_assistant.umrf.model import Action, Graph, Key, Problem
 
 _ORDERS: Final = ("order", "po", "co")
@@ -40,7 +40,7 @@ class Change(msgspec.Struct, frozen=True):
 
 class Rewriting(msgspec.Struct, frozen=True):
     """What an edited text would change after `seq`, and the errors that the graph would then have
-    and does not have yet."""
+    and does not have yet, with their places in that text."""
 
     seq: int
     changes: tuple[Change, ...]
@@ -58,9 +58,10 @@ def rewriting(moment: Moment, text: bytes, known: Iterable[Problem] = ()) -> Rew
     _refuse(shown, wanted)
     old = _under_keys(shown.graph, _keys_of(moment.graph, shown.graph))
     new = _under_keys(wanted.graph, _aligned(old, wanted.graph))
-    _refuse_ghosts(old, new, text)
+    _refuse_ghosts(old, new, wanted.text)
     changes = tuple(_changes(moment.maps, old, new))
-    return Rewriting(moment.seq, changes, _worse(known, new) if changes else ())
+    worse = wanted.placed(_worse(known, new)) if changes else []
+    return Rewriting(moment.seq, changes, tuple(worse))
 
 
 def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
@@ -73,8 +74,7 @@ def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
     known = {(problem.code, problem.message) for problem in shown.problems}
     for problem in wanted.problems:
         if (problem.code, problem.message) not in known:
-            path = problem.where.path
-            raise NotUmrf(problem.message, where={"path": path} if path else None)
+            raise NotUmrf(problem.message, where=_place(wanted.text, problem.where.path))
 
 
 def _worse(known: Iterable[Problem], new: Graph) -> tuple[Problem, ...]:
@@ -141,14 +141,21 @@ def _under_keys(graph: Graph, keys: Mapping[Key, Key]) -> Graph:
     return replace(graph, actions=actions, relations=relations)
 
 
-def _refuse_ghosts(old: Graph, new: Graph, text: bytes) -> None:
+def _refuse_ghosts(old: Graph, new: Graph, text: str) -> None:
     """An arrow to an action that is not there is a slip here, most often half a renaming."""
     known = {action.full_name for action in old.actions if action.missing}
     for action in new.actions:
         if action.missing and action.full_name not in known:
             message = f"There is no action {action.name} with the number {action.instance_id}."
-            path = _naming(msgspec.json.decode(text), action)
-            raise NotUmrf(message, where={"path": path} if path else None)
+            path = _naming(msgspec.json.decode(text.encode()), action)
+            raise NotUmrf(message, where=_place(text, path))
+
+
+def _place(text: str, path: str) -> dict[str, object] | None:
+    """A place as refusals tell it; None for the whole text."""
+    found = places_of(text, [path])[path]
+    place: dict[str, object] = {"path": found.path, "line": found.line, "column": found.column}
+    return place if found.path else None
 
 
 def _naming(file: object, ghost: Action) -> str:

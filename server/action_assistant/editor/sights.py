@@ -12,7 +12,7 @@ from action_assistant.editor.replica import load
 from action_assistant.editor.rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.umrf.check import check
+from action_assistant.umrf.check import check_written
 from action_assistant.umrf.jsontext import parse_small
 from action_assistant.umrf.model import Graph, Problem
 
@@ -119,7 +119,7 @@ class Sights:
         """What is wrong with a graph at a moment."""
         found = self._problems.get((graph, moment.seq))
         if found is None:
-            found = self._problems.put((graph, moment.seq), check(moment.graph))
+            found = self._problems.put((graph, moment.seq), check_written(moment.graph))
         return found
 
     async def summary(self, graph: str, newest: int) -> Summary:

@@ -108,7 +108,7 @@ def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> 
             where={"path": "/digest"},
         )
     _check_names(reading.graph, simulated=asked.engine == SIMULATOR)
-    problems = [*reading.problems, *check(reading.graph, None, facts)]
+    problems = [*reading.problems, *reading.placed(check(reading.graph, None, facts))]
     _check_problems(problems, asked.override)
     script, script_text = _script(asked)
     return Admitted(

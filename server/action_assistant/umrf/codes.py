@@ -105,11 +105,11 @@ CODES: Final[dict[str, Code]] = {
     ),
     "H7": Code(
         "hazard", _ERROR, "an entry action whose required input has no value",
-        "the engine says nothing and never starts the graph",
+        "the engine says nothing and never starts the graph", ("take-example",),
     ),
     "H8": Code(
         "hazard", _BOTH, "something waits for what may never come (error: never comes)",
-        "the graph stays RUNNING for ever", ("not-required", "outputs-optional"),
+        "the graph stays RUNNING for ever", ("not-required", "outputs-optional", "take-example"),
     ),
     "H9": Code(
         "hazard", _ERROR, "a spontaneous action that leads into a loop",

@@ -1,12 +1,13 @@
 """Fixes of problems: each one call, idempotent, without inventing meaning."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final
 
 import msgspec
 
 from action_assistant.umrf.jsontext import dump, parse_small
 from action_assistant.umrf.model import Action, Graph, Key, Parameter, Problem, Relation
+from action_assistant.umrf.parameters import with_example
 from action_assistant.umrf.relations import MAX_REFERRED_ID
 
 
@@ -97,6 +98,24 @@ def _optional(parameter: Parameter) -> Parameter:
     return Parameter(parameter.path, dump({**value, "pvf_required": False}))
 
 
+def _with_example(graph: Graph, problem: Problem) -> Graph:
+    """Takes the example of the input that the problem is about as its value."""
+    _, found, path = problem.where.path.partition("/input_parameters/")
+    for action in graph.actions:
+        if found and action.key == problem.where.aid:
+            inputs = tuple(with_example(p) if p.path == path else p for p in action.inputs)
+            return _with_action(graph, msgspec.structs.replace(action, inputs=inputs))
+    return graph
+
+
+def with_examples(graph: Graph, problems: Iterable[Problem]) -> Graph:
+    """Takes the examples of all inputs without a value that the problems are about."""
+    for problem in problems:
+        if problem.fix == "take-example":
+            graph = _with_example(graph, problem)
+    return graph
+
+
 def _with_action(graph: Graph, changed: Action) -> Graph:
     actions = tuple(changed if a.key == changed.key else a for a in graph.actions)
     return msgspec.structs.replace(graph, actions=actions)
@@ -110,5 +129,6 @@ _FIXES: Final[dict[str, _Fix]] = {
     "outputs-optional": _optional_outputs,
     "remove-relation": _mend_relation(lambda _: None),
     "renumber": _renumbered,
+    "take-example": _with_example,
     "type-sync": _typed,
 }

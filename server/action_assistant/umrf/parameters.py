@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from action_assistant.umrf.jsontext import Json, dump, parse_small
-from action_assistant.umrf.model import Parameter
+from action_assistant.umrf.jsontext import Json, Number, dump, parse_small
+from action_assistant.umrf.model import JsonText, Parameter
 
 #: The engine has no limit; a file of ours could not be read again beyond it.
 MAX_PATH: Final = 60
@@ -49,6 +49,51 @@ def escape(key: str) -> str:
 def flat_name(path: str) -> str:
     """The name by which the engine knows a parameter: `pose::position::x`."""
     return "::".join(keys_of(path))
+
+
+def example_of(text: JsonText) -> Json:
+    """What the `pvf_example` of a parameter without a value would be as its value, or None.
+
+    Old files spell examples as texts; one that is no value of the type is not made into one. Twin of
+    `frontend/src/graph/examples.ts`.
+    """
+    leaf = parse_small(text)
+    if not isinstance(leaf, dict) or "pvf_value" in leaf:
+        return None
+    kind, value = leaf.get("pvf_type"), leaf.get("pvf_example")
+    if isinstance(value, str) and kind != "string":
+        value = parse_small(value)
+    if not isinstance(kind, str) or not fits(kind, value):
+        return None
+    allowed = leaf.get("pvf_allowed_values")
+    return value if not isinstance(allowed, list) or not allowed or value in allowed else None
+
+
+def with_example(parameter: Parameter) -> Parameter:
+    """The parameter with its example as value, if it has one that can be."""
+    leaf, value = parse_small(parameter.text), example_of(parameter.text)
+    if value is None or not isinstance(leaf, dict):
+        return parameter
+    return Parameter(parameter.path, dump({**leaf, "pvf_value": value}))
+
+
+#: Types of which the engine reads values.
+NATIVE: Final = ("string", "number", "bool", "strings", "numbers", "bools")
+
+
+def fits(kind: str, value: Json) -> bool:
+    """Whether the engine can read a value of a native type; of other types it reads none."""
+    match kind:
+        case "string":
+            return isinstance(value, str)
+        case "number":
+            return isinstance(value, Number)
+        case "bool":
+            return isinstance(value, bool)
+        case "strings" | "numbers" | "bools":
+            return isinstance(value, list) and all(fits(kind[:-1], member) for member in value)
+        case _:
+            return False
 
 
 def _leaves(

@@ -3,7 +3,15 @@ import { ActionIcon, Button, Tooltip } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
 import type { Problem, Problems } from "../../api/graphs";
-import { ABOUT, applyFix, applySafe, fixOf, safeOnes } from "../../graph/fixes";
+import {
+  ABOUT,
+  applyExamples,
+  applyFix,
+  applySafe,
+  exampleOnes,
+  fixOf,
+  safeOnes,
+} from "../../graph/fixes";
 import { relationId } from "../../graph/layout";
 import type { Graph } from "../../graph/model";
 import { bySeverity, placeOf } from "../../ui/canvas/marks";
@@ -121,6 +129,7 @@ export function ProblemList({ problems, seq }: Props) {
   if (!problems) return <p className={style.checked}>Checking …</p>;
   const order = bySeverity(problems.problems);
   const safe = safeOnes(order).length;
+  const examples = exampleOnes(order).length;
   return (
     <div className={style.list}>
       {order.length === 0 && (
@@ -139,6 +148,19 @@ export function ProblemList({ problems, seq }: Props) {
           }}
         >
           Fix all {safe} safe ones
+        </Button>
+      )}
+      {examples > 1 && bench.mayEdit && (
+        <Button
+          fullWidth
+          mb="sm"
+          leftSection={<IconTool size={15} aria-hidden />}
+          title="The examples of old files become the values that a robot acts on. Look at them afterwards; one undo takes it back."
+          onClick={() => {
+            if (applyExamples(bench.doc, order) === 0) tellNothing();
+          }}
+        >
+          Take all {examples} examples as values
         </Button>
       )}
       <Items problems={order} jumps />

@@ -10,11 +10,13 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.editor import catalogue, document
 from action_assistant.editor.house import Door
 from action_assistant.editor.rehearsal import Rehearsal, Rehearsing, Stage
+from action_assistant.umrf.model import Note
 from action_assistant.web.access import Needs
 
 
 class Pieces(msgspec.Struct, frozen=True):
-    """A UMRF text as the keys that a document would hold. `notes`: what was translated."""
+    """A UMRF text as the keys that a document would hold. `notes`: what was translated; `remarks`
+    are the same with their places in the text."""
 
     dialect: str
     notes: tuple[str, ...]
@@ -22,6 +24,7 @@ class Pieces(msgspec.Struct, frozen=True):
     actions: dict[str, Any]
     relations: dict[str, Any]
     positions: dict[str, Any]
+    remarks: tuple[Note, ...] = ()
 
 
 def routes(door: Door) -> list[ControllerRouterHandler]:
@@ -65,4 +68,5 @@ def _pieces(body: bytes) -> Pieces:
         dict(maps["actions"]),
         dict(maps["relations"]),
         dict(maps["positions"]),
+        reading.remarks,
     )

@@ -15,7 +15,7 @@ from action_assistant.umrf.model import (
     Severity,
     Where,
 )
-from action_assistant.umrf.parameters import flat_name
+from action_assistant.umrf.parameters import example_of, flat_name
 from action_assistant.umrf.writing import name_order
 
 #: Problems of one code and severity that are kept.
@@ -36,6 +36,7 @@ class Subject:
             action.key: pointer("actions", index) for index, action in enumerate(self.real)
         }
         self._flat: dict[Key, dict[str, str]] = {}
+        self._texts: dict[Key, dict[str, str]] = {}
         known = {ENTRY, EXIT, *self.actions}
         self.relations = [r for r in graph.relations if r.parent in known and r.child in known]
         by_child = sorted(self.relations, key=lambda r: (r.child_order, name_order(r)))
@@ -71,6 +72,13 @@ class Subject:
                 start = f"{self.paths.get(owner, '')}/{field}"
         paths[id(relation)] = f"{start}/{len(listed)}"
         listed.append(relation)
+
+    def fix_of_input(self, action: Action, name: str) -> str | None:
+        """What mends an input that has no value: its example, where that can be one."""
+        if action.key not in self._texts:
+            self._texts[action.key] = {p.path: p.text for p in action.inputs}
+        text = self._texts[action.key].get(self.path_of(action, name), "null")
+        return "take-example" if example_of(text) is not None else None
 
     def path_of(self, action: Action, name: str) -> str:
         """The path of a parameter by its flat name."""

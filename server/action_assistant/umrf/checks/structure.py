@@ -6,7 +6,7 @@ from typing import Final
 from action_assistant.umrf.checks.places import Subject, quoted
 from action_assistant.umrf.jsontext import Json, Number, dump, parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Parameter, Relation, Severity
-from action_assistant.umrf.parameters import MAX_PATH, keys_of
+from action_assistant.umrf.parameters import MAX_PATH, NATIVE, fits, keys_of
 from action_assistant.umrf.relations import MAX_REFERRED_ID, condition_of, remap_of, whole_of
 
 _TEXTS: Final = {"name", "type", "actor", "description", "graph_name", "graph_description"}
@@ -271,22 +271,3 @@ def _misfit(what: str, none: str, kind: str) -> str:
     if not kind:
         return f"{what}, and its pvf_type is empty"
     return f"{what}, and of the type “{kind}” the engine reads none"
-
-
-#: Types of which the engine reads values.
-NATIVE: Final = ("string", "number", "bool", "strings", "numbers", "bools")
-
-
-def fits(kind: str, value: Json) -> bool:
-    """Whether the engine can read a value of a native type; of other types it reads none."""
-    match kind:
-        case "string":
-            return isinstance(value, str)
-        case "number":
-            return isinstance(value, Number)
-        case "bool":
-            return isinstance(value, bool)
-        case "strings" | "numbers" | "bools":
-            return isinstance(value, list) and all(fits(kind[:-1], member) for member in value)
-        case _:
-            return False

@@ -96,12 +96,13 @@ def _check_inputs(
     given = {} if is_entry or not needed else _given_kinds(incoming, outputs, needed)
     for name, slot in needed.items():
         member = f"/input_parameters/{subject.path_of(action, name)}"
+        fix = subject.fix_of_input(action, name)
         if is_entry:
             message = (
                 f"{action.full_name} is an entry and its input “{name}” has no value: the engine "
                 "silently never starts the graph, and says nothing. (As a sub-graph it may get one.)"
             )
-            subject.report("H7", "error", message, action=action, member=member)
+            subject.report("H7", "error", message, action=action, member=member, fix=fix)
             continue
         kinds = given.get(name, set())
         if incoming and slot.type not in kinds:
@@ -110,7 +111,7 @@ def _check_inputs(
                 f"Nobody gives {action.full_name} its input “{name}”: it never runs and the graph "
                 f"stays RUNNING for ever.{wrong}"
             )
-            subject.report("H8", "error", message, action=action, member=member)
+            subject.report("H8", "error", message, action=action, member=member, fix=fix)
 
 
 def _given_kinds(
