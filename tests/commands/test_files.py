@@ -206,6 +206,68 @@ def test_the_file_of_an_action_is_checked_as_such(tmp_path: Path) -> None:
     )
 
 
+def test_check_says_line_and_column_in_the_file_also_of_an_old_one(tmp_path: Path) -> None:
+    action = '{"name": "Go", "id": 3,\n  "effect": "synchronous", "package_name": "go"}'
+    path = written(tmp_path, '\ufeff{"graph_name": "g",\r\n "umrf_actions": [\n  ' + action + "]}")
+    (verdict,) = json.loads(run("check", "--json", path).stdout)
+    places = {p["code"]: p["where"] for p in verdict["problems"]}
+    assert places["dialect-old"] == {"path": "/umrf_actions", "line": 2, "column": 2}
+    notes = {note["message"]: note["where"] for note in verdict["notes"]}
+    effect = notes["The effect “synchronous” became the type sync."]
+    assert effect == {"path": "/umrf_actions/0/effect", "line": 4, "column": 3}
+    told = run("check", path).stdout
+    assert "error dialect-old" in told
+    assert "(line 2, column 2: /umrf_actions)" in told
+    assert "(line 4, column 3: /umrf_actions/0/effect)" in told
+    assert f"{path}:4:3: The effect" in run("convert", path).stderr
+
+
+def test_what_is_no_json_has_its_line_and_column_also_for_programs(tmp_path: Path) -> None:
+    (verdict,) = json.loads(run("check", "--json", written(tmp_path, '{"a":\n  oops}')).stdout)
+    (problem,) = verdict["problems"]
+    assert (problem["where"]["line"], problem["where"]["column"]) == (2, 3)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        {"name": "left-pad", "version": "1.3.0", "type": "module", "dependencies": {}},
+        {"name": "pkg", "type": "module"},
+        {"name": "acme/site", "type": "project", "require": {"php": ">=8"}},
+        {"name": "lib", "type": "SHARED_LIBRARY", "artifacts": [], "id": "lib::@6890"},
+        {"type": "object", "title": "A schema", "properties": {"name": {"type": "string"}}},
+        {"type": "Feature", "name": "Tartu", "geometry": None, "properties": {}},
+    ],
+)
+def test_a_file_that_only_has_a_name_and_a_type_is_no_umrf(tmp_path: Path, value: object) -> None:
+    path = written(tmp_path, value)
+    (verdict,) = json.loads(run("check", "--json", path).stdout)
+    assert [problem["code"] for problem in verdict["problems"]] == ["not-umrf"]
+    assert run("convert", path).returncode == 1
+
+
+def test_a_list_of_actions_is_told_as_one(tmp_path: Path) -> None:
+    action = {"name": "Go", "effect": "synchronous", "children": [{"name": "Stop", "id": 0}]}
+    answer = run("convert", written(tmp_path, [action, {**action, "name": "Stop"}]))
+    assert answer.returncode == 1
+    assert "a list with 2 single actions" in answer.stderr
+
+
+def test_examples_become_values_when_asked(tmp_path: Path) -> None:
+    leaf = {"pvf_type": "number", "pvf_example": "2"}
+    action = {
+        "name": "Go",
+        "id": 0,
+        "effect": "synchronous",
+        "input_parameters": {"a": {"b": leaf}},
+    }
+    path = written(tmp_path, {"graph_name": "g", "umrf_actions": [action]})
+    assert "pvf_value" not in run("convert", path).stdout
+    answer = run("convert", "--examples", path)
+    assert json.loads(answer.stdout)["actions"][0]["input_parameters"]["a"]["b"]["pvf_value"] == 2
+    assert "“a::b”" in answer.stderr
+
+
 def test_check_knows_the_actions_and_sub_graphs_of_folders(tmp_path: Path) -> None:
     file = written(tmp_path, TWO)
     known = tmp_path / "known"

@@ -325,6 +325,43 @@ def test_a_preview_says_what_a_file_would_become_and_stores_nothing(http: httpx.
         assert_problem(http.post("/api/graphs?preview=true", content=body), status)
 
 
+def test_what_a_preview_says_has_its_place_in_the_file_that_was_sent(http: httpx.Client) -> None:
+    go = '{"name": "Go", "id": 7, "effect": "synchronous", "parents": [5, {"name": "No", "id": 0}]}'
+    text = '{"graph_name": "old",\n "umrf_actions": [5,\n  ' + go + "]}"
+    found = http.post("/api/graphs", params={"preview": "true"}, content=text.encode()).json()
+    ghost = next(each for each in found["problems"] if each["code"] == "ghost")
+    assert (ghost["where"]["path"], ghost["where"]["line"]) == ("/umrf_actions/1/parents/1", 3)
+    assert text.split("\n")[2][ghost["where"]["column"] - 1 :].startswith('{"name": "No"')
+    number = next(each for each in found["remarks"] if "“id”" in each["message"])
+    assert (number["where"]["path"], number["where"]["line"]) == ("/umrf_actions/1/id", 3)
+    assert len(found["remarks"]) == len(found["notes"])
+
+
+def test_the_problems_of_a_graph_have_their_places_in_its_text(http: httpx.Client) -> None:
+    made = imported(http)
+    [text, found] = (http.get(f"/api/graphs/{made['id']}/{what}") for what in ("umrf", "problems"))
+    lines = text.text.split("\n")
+    for problem in found.json()["problems"]:
+        where = problem["where"]
+        if key := where.get("path", "").rpartition("/")[2]:
+            here = lines[where["line"] - 1][where["column"] - 1 :]
+            assert here.startswith(f'"{key}"') or key.isdigit()
+
+
+def test_the_file_of_an_action_is_no_graph_but_can_be_pasted(http: httpx.Client) -> None:
+    action = {"name": "TaMove", "effect": "synchronous", "parents": [{"name": "A", "id": 0}]}
+    before = http.get("/api/graphs").json()
+    for query in ("", "?preview=true"):
+        refused = http.post(f"/api/graphs{query}", json=action)
+        problem = assert_problem(refused, 422)
+        assert "one action, TaMove" in problem["detail"]
+        assert "paste" in problem["detail"]
+        assert problem["where"]["code"] == "action-file"
+    assert http.get("/api/graphs").json() == before
+    pieces = http.post("/api/pieces", json=action).json()
+    assert [value for key, value in pieces["actions"].items() if "|" not in key] == ["TaMove"]
+
+
 def test_the_library_is_there_to_be_asked(http: httpx.Client) -> None:
     made = imported(http)
     go = next(each for each in http.get("/api/actions").json() if each["name"] == "Go")

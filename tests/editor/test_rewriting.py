@@ -131,7 +131,9 @@ def test_half_a_renaming_is_refused_where_the_old_name_stands() -> None:
     file["actions"][1]["name"] = "Return"
     with pytest.raises(NotUmrf, match="no action Back with the number 0") as refusal:
         rewriting(moment, json.dumps(file).encode())
-    assert refusal.value.where == {"path": "/graph_exit/0"}
+    where = refusal.value.where or {}
+    assert (where["path"], where["line"]) == ("/graph_exit/0", 1)
+    assert json.dumps(file)[int(str(where["column"])) - 1 :].startswith('{"name"')
 
 
 def test_errors_that_come_with_the_edit_are_told_before_it_is_made() -> None:

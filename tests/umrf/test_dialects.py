@@ -5,10 +5,13 @@ import os
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
+from action_assistant.umrf import semantics
 from action_assistant.umrf.check import STRUCTURAL, check, check_reading
 from action_assistant.umrf.codec import Reading, read, write
+from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import ENTRY, EXIT
 
 ROOT = Path(__file__).parents[2]
@@ -92,6 +95,121 @@ def test_a_single_action_becomes_a_graph_of_itself() -> None:
     current = read('{"name": "A", "type": "sync"}')
     assert current.dialect == "D3-action"
     assert not current.problems
+
+
+def test_an_action_that_names_neighbours_becomes_a_graph_without_ghosts() -> None:
+    neighbours = {"parents": [{"name": "A", "id": 0}], "children": [{"name": "C", "id": 0}]}
+    for own in ({"effect": "synchronous"}, {"type": "sync"}):
+        reading = read(json.dumps({"name": "B", **own, **neighbours}))
+        graph = reading.graph
+        assert [(a.full_name, a.missing) for a in graph.actions] == [("B_0", False)]
+        assert [(r.parent, r.child) for r in graph.relations] == [(ENTRY, "a1"), ("a1", EXIT)]
+        assert not [p for p in check(graph) if p.severity == "error"]
+        told = {note.where.path for note in reading.remarks}
+        assert {"/parents", "/children"} <= told
+        assert not any("loop" in note for note in reading.notes)
+
+
+def test_a_graph_without_a_last_action_is_not_told_to_be_one_loop() -> None:
+    def action(name: str, parent: str, child: str) -> dict[str, Any]:
+        sides = {"parents": [{"name": parent, "id": 0}], "children": [{"name": child, "id": 0}]}
+        return {"name": name, "id": 0, "effect": "synchronous"} | sides
+
+    first = action("A", "Z", "B") | {"parents": []}
+    text = json.dumps({"graph_name": "g", "umrf_actions": [first, action("B", "A", "Gone")]})
+    notes = read(text).notes
+    assert not any("loop" in note for note in notes)
+    assert any("graph_exit" in note and "FINISHED" in note for note in notes)
+
+
+@pytest.mark.parametrize("state", ["UNINITIALIZED", "RUNNING"])
+def test_a_run_state_that_is_left_out_is_told_with_its_place(state: str) -> None:
+    action = {"name": "A", "type": "sync", "state": state, "runtime": {"messages": []}}
+    file = {"graph_name": "g", "graph_state": "INITIALIZED", "actions": [action]}
+    told = {note.where.path for note in read(json.dumps(file)).remarks}
+    assert told == {"/graph_state", "/actions/0/state", "/actions/0/runtime"}
+
+
+# What stops an action in files of ROS 1
+
+
+def stopping(required: bool | None, shape: str) -> str:
+    """A timer that stops a worker, in the words of 2021."""
+    stop: dict[str, Any] = {"name": "Timer", "id": 0, "stop_when_received": True}
+    if required is not None:
+        stop["required"] = required
+
+    def action(name: str, parents: list[Any], *children: str, **more: Any) -> dict[str, Any]:
+        named = [{"name": child, "id": 0} for child in children]
+        sides = {"parents": parents, "children": named}
+        return {"name": name, "id": 0, "effect": "synchronous", **sides, **more}
+
+    start = {"name": "Start", "id": 0, "required": True}
+    shapes = {
+        "worker": [
+            action("Start", [], "Timer", "Work"),
+            action("Timer", [start], "Work"),
+            action("Work", [start, stop]),
+        ],
+        "root": [action("Timer", [], "Work"), action("Work", [stop], execute_first=True)],
+        "and then": [
+            action("Start", [], "Timer", "Work"),
+            action("Timer", [start], "Work", "Next"),
+            action("Work", [start, stop]),
+            action("Next", [{"name": "Timer", "id": 0}]),
+        ],
+        "loop": [
+            action("Timer", [], "Work", "Rest"),
+            action(
+                "Work", [{"name": "Rest", "id": 0, "required": False}, stop], "Rest",
+                execute_first=True,
+            ),
+            action("Rest", [{"name": "Work", "id": 0}, stop], "Work"),
+        ],
+    }  # fmt: skip
+    return json.dumps({"graph_name": "g", "umrf_actions": shapes[shape]})
+
+
+def ends(text: str, work_s: float) -> str:
+    """The last state of the graph after a simulated hour; the timer takes 10 s."""
+    graph = read(write(read(text).graph)).graph
+    times = {"Timer": 10.0, "Work": work_s, "Rest": 3.0}
+    behaviours = {name: [{"after_s": after}] for name, after in times.items()}
+    script = semantics.script_from({"behaviours": behaviours})
+    trace = semantics.simulate(graph, script=script, facts=SIMULATED, until_ms=3_600_000)
+    return [event.state for event in trace if isinstance(event, semantics.GraphState)][-1]
+
+
+@pytest.mark.parametrize(
+    ("shape", "work_s", "last"),
+    [
+        ("worker", 3.0, "FINISHED"),
+        ("worker", 100.0, "HALTED"),
+        ("root", 3.0, "FINISHED"),
+        ("root", 100.0, "HALTED"),
+        ("and then", 100.0, "FINISHED"),
+        ("loop", 4.0, "HALTED"),
+    ],
+)
+@pytest.mark.parametrize("required", [None, False])
+def test_a_graph_in_which_one_action_stops_another_ends(
+    shape: str, work_s: float, last: str, required: bool | None
+) -> None:
+    assert ends(stopping(required, shape), work_s) == last
+
+
+def test_what_stops_an_action_is_not_waited_for_and_nothing_follows_its_failure() -> None:
+    graph = read(stopping(None, "worker")).graph
+    stop = next(r for r in graph.relations if (r.parent, r.child) == ("a2", "a3"))
+    assert not stop.required
+    assert msgspec.structs.astuple(stop.conditions) == ("stop", "stop", "ignore", "ignore")
+
+
+def test_an_action_that_waits_for_what_stops_it_is_told_where_it_stands() -> None:
+    reading = read(stopping(True, "worker"))
+    (waits,) = [p for p in reading.problems if p.code == "stop-awaited"]
+    assert waits.where.path == "/umrf_actions/2/parents/1"
+    assert waits.where.line == 1
 
 
 def test_fields_that_the_engine_does_not_know_do_not_make_a_file_older() -> None:

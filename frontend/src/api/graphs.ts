@@ -58,10 +58,19 @@ export interface Version {
   umrf?: unknown;
 }
 
+/** A place: a JSON pointer into a text, with line and column where that text is known. */
+export interface Where {
+  path?: string;
+  aid?: string;
+  relation?: string;
+  line?: number;
+  column?: number;
+}
+
 export interface Problem {
   code: string;
   severity: "error" | "warning";
-  where: { path?: string; aid?: string; relation?: string };
+  where: Where;
   message: string;
   fix?: string | null;
 }
@@ -140,7 +149,15 @@ export function createGraph(name: string): Promise<GraphSummary> {
   return ask("/api/graphs", { method: "POST", body: { name } });
 }
 
-/** What importing a file would make: nothing is stored. */
+/** Something that was translated or left out, with its place in the file that was sent. */
+export interface Remark {
+  message: string;
+  where: Where;
+  /** How often; once when it is not there. */
+  times?: number;
+}
+
+/** What importing a file would make: nothing is stored. Places are those of the file. */
 export interface Preview {
   dialect: string;
   /** What was translated, and what has no place. */
@@ -148,6 +165,8 @@ export interface Preview {
   problems: Problem[];
   name: string;
   actions: number;
+  /** The notes with their places. */
+  remarks: Remark[];
 }
 
 export function previewGraph(text: string): Promise<Preview> {

@@ -1,11 +1,17 @@
 /** What was translated in a file of an old dialect, before it is kept. */
 import { Button, Group, Modal, Text } from "@mantine/core";
 import { useSyncExternalStore } from "react";
+import type { Where } from "../api/graphs";
 import { bySeverity, countWords } from "../ui/canvas/marks";
 import { dialectWords, reviews, type Waiting } from "./review";
 import style from "./review-dialog.module.css";
 
 const MOST_PROBLEMS = 8;
+
+/** Where in the file something stands; for one of many the first. */
+function Line({ where }: { where: Where }) {
+  return where.line === undefined ? null : <Text span c="dimmed">{` line ${where.line}`}</Text>;
+}
 
 function Problems({ waiting }: { waiting: Waiting }) {
   // That it is an old form is solved by keeping it.
@@ -22,6 +28,7 @@ function Problems({ waiting }: { waiting: Waiting }) {
           // biome-ignore lint/suspicious/noArrayIndexKey: the list never changes
           <li key={i} data-severity={problem.severity}>
             <b>{problem.code}</b> {problem.message}
+            <Line where={problem.where} />
           </li>
         ))}
       </ul>
@@ -41,12 +48,16 @@ function Body({ waiting }: { waiting: Waiting }) {
       </Text>
       <section className={style.part} aria-label="Translated">
         <h3>Translated</h3>
-        {preview.notes.length === 0 ? (
+        {preview.remarks.length === 0 ? (
           <Text c="dimmed">Only the form; every value stays as it was.</Text>
         ) : (
           <ul>
-            {preview.notes.map((note) => (
-              <li key={note}>{note}</li>
+            {preview.remarks.map(({ message, where, times = 1 }) => (
+              <li key={message}>
+                {message}
+                {times > 1 && ` (${times} times)`}
+                <Line where={where} />
+              </li>
             ))}
           </ul>
         )}

@@ -5,6 +5,7 @@ import { dialectWords, isPlain, Reviews } from "./review";
 const preview = (part: Partial<Preview> = {}): Preview => ({
   dialect: "D1",
   notes: ["effect became type"],
+  remarks: [],
   problems: [],
   name: "old",
   actions: 1,
