@@ -233,10 +233,18 @@ class Core(Clock):
         self._state(graph, node, "RUNNING")
         node.execution = Execution(graph.name, node.full_name, self.now)
         self._executions = [*self.executing(self.now), node.execution]
-        duration = node.call.after_s * 1000
+        duration = self._takes_ms(node)
         if node.type == "spontaneous":
             duration = max(duration, 1.0)
         self._let_run(graph, node, inf if node.call.never else duration)
+
+    def _takes_ms(self, node: Node) -> float:
+        """How long this call of an action takes."""
+        return node.call.after_s * 1000
+
+    def _stops_ms(self, node: Node) -> float:
+        """How long its code goes on after a stop."""
+        return node.call.stop_s * 1000
 
     def _let_run(self, graph: Running, node: Node, duration_ms: float) -> None:
         node.due_ms = self.now + duration_ms
@@ -330,7 +338,7 @@ class Core(Clock):
         if ends is None:
             ends = inf
         if not node.call.ignores_stop:
-            ends = min(ends, self.now + node.call.stop_s * 1000)
+            ends = min(ends, self.now + self._stops_ms(node))
         if node.execution is not None and node.execution.ends_ms > self.now:
             node.execution.ends_ms = ends
         return ends
