@@ -149,6 +149,7 @@ CODES: Final[dict[str, Code]] = {
     "no-exit": Code("other", _WARNING, "nothing leads to the exit", "never FINISHED: HALTED, or no end"),
     "unreachable": Code("other", _WARNING, "no way from the entry", "never runs"),
     "never-run": Code("other", _WARNING, "no parent answers `run`", "never runs"),
+    "not-tried": Code("other", _WARNING, "a graph in which not every way was tried, since that would take too long", "whether those that are left end is not known"),
     "restart": Code("other", _WARNING, "the response `restart`", "does nothing in this engine"),
     "self-loop": Code("other", _WARNING, "an action that is to run itself again", "it still runs when it is asked; nothing happens"),
     "parameter-inside": Code("other", _WARNING, "a parameter inside another one", "not written"),

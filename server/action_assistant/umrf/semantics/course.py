@@ -57,6 +57,8 @@ class Course:
         self._last = -1
         #: Whether it was seen to come to the same point twice.
         self.laps = False
+        #: Whether two ended at one moment: only the engine knows in which order.
+        self.tied = False
         self.outcome = Outcome("never") if self._never_starts() else self._followed()
 
     def state(self, place: int, before: int) -> State:
@@ -114,6 +116,7 @@ class Course:
 
     def _note(self, at: float, place: int, instant: Instant) -> None:
         number = len(self.times)
+        self.tied = self.tied or bool(self.times and self.times[-1] == at)
         self.times.append(at)
         self.roots.append(place)
         self.touched.append(tuple(instant.states))

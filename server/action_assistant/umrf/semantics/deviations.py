@@ -45,7 +45,7 @@ class Deviations:
         """The usual course is one that came there, too."""
         course = self.course
         for place in course.touched[number]:
-            if place == self.net.exit or course.state(place, number + 1).does not in DUE:
+            if place == self.net.exit or course.state(place, number + 1).does != RUNS:
                 continue
             if place not in self.alone and not course.came[number] & self.net.behind[place]:
                 self.alone[place] = course.outcome
@@ -78,6 +78,7 @@ class _Way:
         self._passed: list[int] = []
         self._met: list[tuple[_Key, Mask, Mask]] = []
         self._is_over = False
+        self._since = 0  # instants since it was last asked what can be left out
 
     def followed(self, instant: int, result: Precondition) -> Outcome:
         found = self._at(self.course.times[instant], self.course.roots[instant], result)
@@ -144,7 +145,11 @@ class _Way:
             return self._quiet(after)
         if after == len(course.times):
             return self._beyond()
-        return self._forget(after)
+        self._since += 1
+        if self._since >= len(self.apart) - _FEW:
+            self._since = 0
+            return self._forget(after)
+        return None
 
     def _state(self, place: int, before: int) -> State:
         own = self.apart.get(place)
@@ -156,7 +161,7 @@ class _Way:
         running, active = self._sums.pop(place, (0, 0))
         self._running -= running
         self._active -= active
-        if state == usual:
+        if state == usual and not (self._is_over and state.does in DUE):
             if self.apart.pop(place, None) is not None:
                 self.mask ^= 1 << place
             return
@@ -242,7 +247,7 @@ class _Way:
     def _as_before(self, after: int) -> Outcome | None:
         """What another course came to from the same point."""
         if self.course.active[after - 1] + self._active == 1:
-            alone = [place for place, state in self.apart.items() if state.does in DUE]
+            alone = [place for place, state in self.apart.items() if state.does == RUNS]
             if alone and self._is_fresh(alone[0], after):
                 known = self.all.alone.get(alone[0])
                 if known is not None:
@@ -282,7 +287,7 @@ class _Way:
         behind = self.net.behind[place]
         waiting = self._waiting(after) | known.waiting & behind
         if known.kind == "stuck" and not behind >> self.net.exit & 1:
-            return self._quiet(after)
+            return self._quiet(after)._replace(waiting=waiting)
         return self._joined(known, waiting)
 
     def _met_again(self, known: Outcome, dropped: Mask, after: int) -> Outcome:

@@ -111,6 +111,10 @@ class Instant:
         self.states[place] = state
 
     def _settle(self) -> None:
+        if self._tasks and self._only_ends():
+            self.end = "finished"
+            self.early = self.active > 0
+            return
         while self._tasks and self.end is None:
             place, result = self._tasks.popleft()
             self._inform(place, result, self._net.edges[place])
@@ -118,6 +122,18 @@ class Instant:
             circling = self._net.circling
             if any(circling[result] >> place & 1 for place, result in self._bypassed):
                 self.end = "locked"
+
+    def _only_ends(self) -> bool:
+        """Whether these bypasses do nothing but lead to the exit, however far."""
+        plain, ends = self._net.plain, self._net.ends
+        if not any(ends[result] >> place & 1 for place, result in self._tasks):
+            return False
+        if any(not plain[result] >> place & 1 for place, result in self._tasks):
+            return False
+        # Whoever leads to the exit may run itself, and would not be one of the others then.
+        return not self.active or not any(
+            self._state(place).does in ACTIVE for place in self._net.last
+        )
 
     def _inform(self, place: int, result: Precondition, edges: list[Asked | None]) -> None:
         ignored = 0

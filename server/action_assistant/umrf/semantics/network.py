@@ -76,6 +76,7 @@ class Network:
         empty: dict[str, Slot] = {}
         self.entry = [_asked(edge, running.entry, (empty, empty), places, bits, slots) for edge in running.entry.children]  # fmt: skip
         self.edges: list[list[Asked | None]] = []
+        self._bypasses: dict[Precondition, dict[int, list[int]]] = {}
         for node in self.nodes:
             before = {name: slot for name, slot in node.outputs.items() if slot.has_value()}
             kinds = before, node.outputs
@@ -96,6 +97,54 @@ class Network:
     def circling(self) -> dict[str, Mask]:
         """For each outcome the actions that a bypass of it leads back to."""
         return {outcome: self._circling(outcome) for outcome in PRECONDITIONS}
+
+    @cached_property
+    def plain(self) -> dict[str, Mask]:
+        """For each outcome the actions whose bypass sets nothing in motion but further bypasses."""
+        return {outcome: self._plain(outcome) for outcome in PRECONDITIONS}
+
+    @cached_property
+    def ends(self) -> dict[str, Mask]:
+        """For each outcome the actions whose bypass leads to the exit by bypasses alone."""
+        mask = (1 << len(self.nodes)) - 1
+        return {o: self._leading(o, {self.exit}) & mask for o in PRECONDITIONS}
+
+    @cached_property
+    def last(self) -> list[int]:
+        """The actions with an arrow to the exit."""
+        rows = enumerate(self.edges)
+        return [place for place, row in rows if any(e and e.child == self.exit for e in row)]
+
+    def _plain(self, outcome: Precondition) -> Mask:
+        other = {
+            place
+            for place, row in enumerate(self.edges)
+            if not all(e and e.responses[outcome] in ("bypass", "ignore") for e in row)
+            or all(e and e.responses[outcome] == "ignore" for e in row)
+        }
+        every: Mask = (1 << len(self.nodes)) - 1
+        return every & ~self._leading(outcome, other)
+
+    def _leading(self, outcome: Precondition, to: set[int]) -> Mask:
+        """Who leads to one of these by bypasses, and they themselves."""
+        found, stack = set(to), list(to)
+        while stack:
+            for place in self._bypassing(outcome).get(stack.pop(), ()):
+                if place not in found:
+                    found.add(place)
+                    stack.append(place)
+        return sum(1 << place for place in found)
+
+    def _bypassing(self, outcome: Precondition) -> dict[int, list[int]]:
+        """Who bypasses whom, by the one that is bypassed."""
+        if outcome not in self._bypasses:
+            found: dict[int, list[int]] = {}
+            for place, row in enumerate(self.edges):
+                for e in row:
+                    if e is not None and e.responses[outcome] == "bypass":
+                        found.setdefault(e.child, []).append(place)
+            self._bypasses[outcome] = found
+        return self._bypasses[outcome]
 
     def _circling(self, outcome: Precondition) -> Mask:
         ways = [
