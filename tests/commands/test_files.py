@@ -193,6 +193,27 @@ def test_simulate_tells_a_person_what_the_engine_would_do_wrong(tmp_path: Path) 
     assert "hazard H2: The child in “A_0 => B_0” does not list it" in answer.stdout
 
 
+@pytest.mark.parametrize("trace", [[], ["--trace"]])
+def test_a_simulation_that_is_cut_off_says_so(tmp_path: Path, trace: list[str]) -> None:
+    """A loop without end in which each lap takes a moment: 100,000 events come before a day is over."""
+    again = {"name": "B", "required": False, "conditions": ["on_error -> ignore"]}
+    first, second = TWO["actions"]
+    actions = [
+        {**first, "parents": [again], "children": [{"name": "B"}]},
+        {**second, "parents": [{"name": "A"}], "children": [{"name": "A"}]},
+    ]
+    loop = {**TWO, "actions": actions, "graph_entry": [{"name": "A"}], "graph_exit": []}
+    answer = run("simulate", *trace, written(tmp_path, loop))
+    assert answer.returncode == 1
+    assert "The simulation ends here, after 100,000 events" in answer.stderr
+    last = answer.stdout.splitlines()[-1]
+    if trace:
+        told = json.loads(last)
+        assert (told["kind"], told["code"], told["effect"]) == ("hazard", "events", "cut off")
+    else:
+        assert "hazard events: The simulation ends here" in last
+
+
 def test_the_file_of_an_action_is_checked_as_such(tmp_path: Path) -> None:
     path = written(tmp_path, {"name": "Go", "type": "sync", "input_parameters": {"x": 5}})
     answer = run("check", "--json", path)

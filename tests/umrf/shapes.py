@@ -141,3 +141,109 @@ SHAPES: dict[str, Callable[[int], dict[str, Any]]] = {
         parameters, nested, joined,
     )
 }  # fmt: skip
+
+
+# Shapes whose single deviations go far: each with `on_error -> ignore` or with the engine's defaults
+
+Arrow = tuple[int, int, list[str] | None, bool]
+
+
+def _drawn(
+    count: int, arrows: list[Arrow], last: int, usual: list[str], entry: int = 0
+) -> dict[str, Any]:
+    """A graph by places; an arrow without conditions has the usual ones."""
+    parents: list[list[Any]] = [[] for _ in range(count)]
+    children: list[list[Any]] = [[] for _ in range(count)]
+    for above, below, said, required in arrows:
+        said = usual if said is None else said
+        parents[below].append({"name": f"A{above}", "required": required, "conditions": said})
+        children[above].append(f"A{below}")
+    actions = [_action(f"A{n}", parents[n], children[n]) for n in range(count)]
+    file = _file(actions, [f"A{entry}"], [])
+    file["graph_exit"] = [{"name": f"A{last}", "conditions": usual}]
+    return file
+
+
+def _then(above: int, below: int, said: list[str] | None = None, required: bool = True) -> Arrow:
+    return above, below, said, required
+
+
+def diamonds(count: int, usual: list[str]) -> dict[str, Any]:
+    """Forks and joins, one after the other."""
+    places = range(0, count - 3, 3)
+    arrows = [
+        _then(n + above, n + below)
+        for n in places
+        for above, below in ((0, 1), (0, 2), (1, 3), (2, 3))
+    ]
+    return _drawn(3 * len(places) + 1, arrows, 3 * len(places), usual)
+
+
+def decisions(count: int, usual: list[str]) -> dict[str, Any]:
+    """Short and long ways, one decision after the other."""
+    true, false = ["on_true -> run", "on_false -> ignore"], ["on_true -> ignore", "on_false -> run"]
+    arrows: list[Arrow] = []
+    places = range(0, count - 5, 5)
+    for n in places:
+        arrows += [_then(n, n + 1, [*true, *usual]), _then(n, n + 2, [*false, *usual])]
+        arrows += [_then(n + 2, n + 3), _then(n + 3, n + 4)]
+        arrows += [_then(n + 1, n + 5, None, False), _then(n + 4, n + 5, None, False)]
+    return _drawn(5 * len(places) + 1, arrows, 5 * len(places), usual)
+
+
+def lanes(count: int, usual: list[str]) -> dict[str, Any]:
+    """Ten long chains side by side, and one that waits for all."""
+    long = (count - 2) // 10
+    arrows: list[Arrow] = []
+    for first in range(2, 2 + 10 * long, long):
+        arrows += [_then(0, first), _then(first + long - 1, 1)]
+        arrows += [_then(n, n + 1) for n in range(first, first + long - 1)]
+    return _drawn(2 + 10 * long, arrows, 1, usual)
+
+
+def grid(count: int, usual: list[str]) -> dict[str, Any]:
+    """Each waits for the one above and the one on its left."""
+    side = int(count**0.5)
+    arrows = [_then(n, n + 1) for n in range(side * side) if (n + 1) % side]
+    arrows += [_then(n, n + side) for n in range(side * (side - 1))]
+    return _drawn(side * side, arrows, side * side - 1, usual)
+
+
+def laps(count: int, usual: list[str]) -> dict[str, Any]:
+    """Small loops that are left when something is false, one after the other."""
+    places = range(0, count - 2, 3)
+    arrows: list[Arrow] = []
+    for n in places:
+        again = ["on_true -> ignore", "on_false -> run", *usual]
+        arrows += [_then(n, n + 1), _then(n + 1, n, again, False)]
+        arrows += [_then(n + 1, n + 2, ["on_false -> ignore", *usual])]
+        arrows += [_then(n + 2, n + 3)] if n + 3 < 3 * len(places) else []
+    return _drawn(3 * len(places), arrows, 3 * len(places) - 1, usual)
+
+
+def patrol(count: int, usual: list[str]) -> dict[str, Any]:
+    """One large loop without end, that something false leaves."""
+    back = ["on_false -> ignore", *usual]
+    out = ["on_true -> ignore", "on_false -> run", *usual]
+    arrows = [_then(n, n + 1) for n in range(count - 2)]
+    arrows += [_then(count - 2, 0, back, False), _then(count - 2, count - 1, out)]
+    return _drawn(count, arrows, count - 1, usual)
+
+
+def everybody(count: int, usual: list[str]) -> dict[str, Any]:
+    """Each waits for all before it."""
+    side = min(count, 180)
+    arrows = [_then(a, b) for a in range(side) for b in range(a + 1, side)]
+    return _drawn(side, arrows, side - 1, usual)
+
+
+def tree(count: int, usual: list[str]) -> dict[str, Any]:
+    """Each starts two."""
+    return _drawn(count, [_then((n - 1) // 2, n) for n in range(1, count)], count - 1, usual)
+
+
+GROWING: dict[str, Callable[[int], dict[str, Any]]] = {
+    f"{shape.__name__}-{name}": lambda count, shape=shape, usual=usual: shape(count, usual)
+    for shape in (diamonds, decisions, lanes, grid, laps, patrol, everybody, tree)
+    for name, usual in (("ignore", SAFE), ("default", []))
+}

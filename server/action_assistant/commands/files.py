@@ -219,12 +219,18 @@ def _simulate(options: argparse.Namespace) -> int:
             max_events=_EVENTS,
             states=reading.states,
         )
+        cut_off = None
         for event in trace:
             _report(event, as_json=options.trace)
+            if isinstance(event, semantics.Hazard) and event.code == semantics.CUT_OFF:
+                cut_off = event
     except codec.Unreadable as error:
         print(_refusal(options.file, error), file=sys.stderr)
         return 1
-    return 0
+    if cut_off is None:
+        return 0
+    print(f"{options.file}: {cut_off.message}", file=sys.stderr)
+    return 1
 
 
 def _print_refusals(path: Path, refusals: Sequence[Problem]) -> None:

@@ -21,6 +21,7 @@ from action_assistant.runner.visits import ActionRun, Visit
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import (
+    CUT_OFF,
     Dispatch,
     GraphResult,
     GraphState,
@@ -199,8 +200,9 @@ def _step(trace: Trace) -> Step | None:
             return Step(trace.graph, "", "ends", trace.value)
         case GraphState():
             return Step(trace.graph, "", "state", trace.state)
-        case Hazard():
-            return Step(trace.graph, trace.node or "", "hazard", trace.code)
+        case Hazard(code=code):  # that it was cut off is no part of what was expected before
+            is_cut = code == CUT_OFF
+            return None if is_cut else Step(trace.graph, trace.node or "", "hazard", code)
         case _:
             return None
 

@@ -4,7 +4,7 @@ from action_assistant.umrf.semantics.engine import Engine, GraphNow
 from action_assistant.umrf.semantics.graphs import EngineRefused
 from action_assistant.umrf.semantics.parts import Execution
 from action_assistant.umrf.semantics.script import Behaviour, Script, script_from
-from action_assistant.umrf.semantics.simulate import simulate
+from action_assistant.umrf.semantics.simulate import CUT_OFF, simulate
 from action_assistant.umrf.semantics.trace import (
     Dispatch,
     EdgeEval,
@@ -18,6 +18,7 @@ from action_assistant.umrf.semantics.trace import (
 )
 
 __all__ = [
+    "CUT_OFF",
     "Behaviour",
     "Dispatch",
     "EdgeEval",

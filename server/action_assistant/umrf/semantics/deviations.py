@@ -132,6 +132,7 @@ class _Way:
             instant.ends(root, result)
             states = instant.states
             self.last = instant.last if instant.last >= 0 else self.last
+            self.all.work += 1 + len(states)
             if instant.end is not None:
                 return Outcome(instant.end, instant.early)
         after = here + usual
@@ -139,7 +140,7 @@ class _Way:
         for place in states.keys() | touched:
             own = states.get(place)
             self._compare(place, own if own is not None else self._state(place, here), after)
-        self.all.work += 1 + len(states) + len(touched)
+        self.all.work += 1 + len(touched)
         self._await_halt(after)
         if course.active[after - 1] + self._active == 0:
             return self._quiet(after)

@@ -11,6 +11,8 @@ from action_assistant.umrf.semantics.script import Script
 from action_assistant.umrf.semantics.trace import Hazard, Trace
 
 DAY_MS: Final = 86_400_000.0
+#: The code of the last event of a trace that has more events than were asked for.
+CUT_OFF: Final = "events"
 
 
 def simulate(
@@ -28,14 +30,19 @@ def simulate(
     """Everything that happens from the start at 0 ms until nothing is left to happen, `until_ms`
     or `max_events`. `commands`: (ms, `stop` | `pause` | `resume`, running name or None for the top
     graph). Commands reach the engine as calls, so that two stops at once kill it. A start that the
-    engine refuses ends in a hazard `refused`."""
+    engine refuses ends in a hazard `refused`; a trace that is cut off after `max_events` in one more
+    event, the hazard `events`."""
     engine = Engine(facts=facts, script=script, library=library, actor=actor, serial=False)
     pending = sorted(commands, key=lambda command: command[0])
+    traces = _started(engine, graph, states)
     left = max_events
-    for trace in _started(engine, graph, states):
-        yield trace
-        left -= 1
-    while left > 0 and not engine.crashed:
+    while True:
+        yield from traces[:left]
+        if len(traces) > left:
+            break
+        left -= len(traces)
+        if engine.crashed:
+            return
         due = engine.due
         if pending and (due is None or pending[0][0] <= due):
             at_ms, verb, name = pending.pop(0)
@@ -46,9 +53,11 @@ def simulate(
             return
         else:
             traces = engine.advance(due)
-        for trace in traces[:left]:
-            yield trace
-        left -= len(traces)
+    message = (
+        f"The simulation ends here, after {max_events:,} events; the graph does not. How it goes on is "
+        "not known."
+    )
+    yield Hazard(engine.now, graph.name, CUT_OFF, "cut off", None, message)
 
 
 def _started(engine: Engine, graph: Graph, states: Mapping[Key, str] | None) -> list[Trace]:

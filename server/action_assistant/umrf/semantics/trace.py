@@ -60,7 +60,8 @@ class GraphResult(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_resu
 class Hazard(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="kind", tag="hazard"):
     """Here the real engine crashes, hangs or does something that nobody wants (SPEC 3).
 
-    `effect`: `crash` ends the trace; after `hang` no command is answered; `goes on` warns.
+    `effect`: `crash` ends the trace; after `hang` no command is answered; `goes on` warns; `cut off`
+    says that it was not simulated any further.
     """
 
     t_ms: float

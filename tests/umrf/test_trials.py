@@ -1,0 +1,183 @@
+"""Every single deviation is tried, at any size, and found to end as the engine's own rules say."""
+
+import json
+import time
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from action_assistant.umrf.check import check
+from action_assistant.umrf.checks.trials import Trials
+from action_assistant.umrf.codec import read
+from action_assistant.umrf.model import (
+    ENGINE_DEFAULTS,
+    ENTRY,
+    ENTRY_CONDITIONS,
+    EXIT,
+    RESPONSES,
+    Action,
+    Conditions,
+    Graph,
+    Parameter,
+    Relation,
+)
+from action_assistant.umrf.semantics.course import Course, Outcome
+from action_assistant.umrf.semantics.deviations import Deviations, Tied
+from action_assistant.umrf.semantics.network import Network
+from action_assistant.umrf.semantics.whole import whole
+from umrf.shapes import GROWING
+
+# Against the engine
+
+PLAIN = st.sampled_from(["run", "run", "run", "bypass", "ignore", "ignore"])
+ANY = st.one_of(PLAIN, st.sampled_from(RESPONSES))
+
+
+def conditions(answers: st.SearchStrategy[Any]) -> st.SearchStrategy[Conditions]:
+    usual = st.sampled_from(
+        [ENGINE_DEFAULTS, Conditions("run", "run"), Conditions("run"), Conditions("ignore", "run")]
+    )
+    return st.one_of(usual, st.builds(Conditions, answers, answers, answers, answers))
+
+
+LEAF = st.sampled_from(
+    [
+        '{"pvf_type":"string"}',
+        '{"pvf_type":"string","pvf_value":"x"}',
+        '{"pvf_type":"number"}',
+        '{"pvf_type":"string","pvf_required":false}',
+        '{"pvf_type":"string","pvf_updatable":false}',
+    ]
+)
+SIDE = st.dictionaries(st.sampled_from("pq"), LEAF, max_size=2).map(
+    lambda d: tuple(Parameter(*each) for each in d.items())
+)
+
+
+@st.composite
+def graphs(draw: st.DrawFn, most: int = 12) -> Graph:
+    """Chains, branches, joins and loops; half of them have values, some stop and pause."""
+    count = draw(st.integers(1, most))
+    said = conditions(ANY if draw(st.integers(0, 3)) == 0 else PLAIN)
+    values = draw(st.booleans())
+    nothing: st.SearchStrategy[tuple[Parameter, ...]] = st.just(())
+    actions = tuple(
+        Action(
+            key=f"k{n}", name=f"A{n}",
+            inputs=draw(SIDE if values and n else nothing), outputs=draw(SIDE if values else nothing),
+        )
+        for n in range(count)
+    )  # fmt: skip
+    place = st.integers(0, count - 1)
+    pairs = draw(st.sets(st.tuples(place, place), max_size=2 * count))
+    if draw(st.booleans()):
+        pairs = {(min(pair), max(pair)) for pair in pairs if pair[0] != pair[1]}
+    if draw(st.booleans()):
+        pairs |= {(n, n + 1) for n in range(count - 1)}
+    order = st.floats(0, 1)
+
+    def arrow(parent: str, child: str) -> Relation:
+        return Relation(
+            parent=parent, child=child, conditions=draw(said), required=draw(st.booleans()),
+            parent_order=draw(order), child_order=draw(order),
+        )  # fmt: skip
+
+    arrows = [arrow(f"k{a}", f"k{b}") for a, b in sorted(pairs)]
+    arrows += [
+        Relation(parent=ENTRY, child=f"k{n}", conditions=ENTRY_CONDITIONS)
+        for n in sorted({0} | draw(st.sets(place, max_size=2)))
+    ]
+    arrows += [arrow(f"k{n}", EXIT) for n in sorted(draw(st.sets(place, max_size=3)))]
+    return Graph(name="g", actions=actions, relations=tuple(arrows))
+
+
+def told(outcome: Outcome) -> Outcome:
+    """What is said of it: who asked last, and whether it was followed to the end, is another thing."""
+    if outcome.kind != "stuck":
+        return Outcome(outcome.kind, outcome.early)
+    return outcome._replace(cut=False, last=-1)
+
+
+@given(graphs(), st.booleans(), st.booleans())
+@settings(max_examples=250, deadline=None, suppress_health_check=list(HealthCheck))
+def test_a_deviation_ends_as_when_the_engine_goes_through_all_of_it(
+    graph: Graph, slower_first: bool, backwards: bool
+) -> None:
+    """In whichever order they are tried: what one comes to is remembered for the others."""
+    net = Network(graph, slower_first=slower_first)
+    course = Course(net)
+    assume(not course.tied)
+    assert told(course.outcome) == told(whole(net, graph, "", "on_true")[0])
+    deviations = Deviations(course)
+    ways = [(name, outcome) for name in net.names for outcome in ("on_false", "on_error")]
+    for name, outcome in reversed(ways) if backwards else ways:
+        try:
+            found = deviations.outcome(net.place[name], outcome)  # type: ignore[arg-type]
+        except Tied:
+            continue
+        assert told(found) == told(whole(net, graph, name, outcome)[0]), (name, outcome)
+
+
+@given(graphs(8))
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+def test_what_is_not_tried_cannot_end_otherwise(graph: Graph) -> None:
+    """An outcome that no child answers in another way is no way of its own."""
+    trials = Trials(graph)
+    ways = {(t.action.full_name if t.action else "", t.outcome) for t in trials}
+    usual = told(whole(trials.net, graph, "", "on_true")[0])
+    for name in trials.net.names:
+        for outcome in ("on_false", "on_error"):
+            if (name, outcome) not in ways:
+                assert told(whole(trials.net, graph, name, outcome)[0]) == usual
+
+
+# At any size
+
+
+def action(name: str, parents: list[Any], children: list[str], **fields: Any) -> dict[str, Any]:
+    listed = [{"name": child} for child in children]
+    return {"name": name, "type": "sync", "parents": parents, "children": listed} | fields
+
+
+def trap(count: int, at: int) -> Graph:
+    """A chain in which `on_false` of one action stops the next, which does not run: then nothing
+    runs any more and the graph stays RUNNING. All other ways end it."""
+    names = [f"A{n}" for n in range(count)]
+    actions = []
+    for n, name in enumerate(names):
+        said = ["on_false -> stop"] if n == at + 1 else []
+        parents = [{"name": above, "conditions": said} for above in names[max(0, n - 1) : n]]
+        actions.append(action(name, parents, names[n + 1 : n + 2]))
+    ends = {"graph_entry": [{"name": "A0"}], "graph_exit": [{"name": names[-1]}]}
+    return read(json.dumps({"graph_name": "g", "actions": actions} | ends)).graph
+
+
+@pytest.mark.parametrize(
+    ("count", "at"), [(60, 20), (60, 50), (60, 58), (1_000, 990), (2_500, 20), (2_500, 2_400)]
+)
+def test_a_trap_is_found_wherever_it_stands(count: int, at: int) -> None:
+    found = [p for p in check(trap(count, at)) if p.code == "H8"]
+    assert [p.message for p in found] == [
+        f"If A{at}_0 ends with on_false, the graph stays RUNNING for ever: nothing runs any more."
+    ]
+    assert found[0].where.path == f"/actions/{at}"
+
+
+@pytest.mark.parametrize("shape", GROWING)
+def test_every_way_through_a_large_graph_of_any_shape_is_tried(shape: str) -> None:
+    graph = read(json.dumps(GROWING[shape](1_000))).graph
+    started = time.process_time()
+    trials = Trials(graph)
+    ends = list(trials)
+    assert time.process_time() - started < 20  # a square would take minutes
+    coverage = trials.coverage()
+    assert coverage.tried == coverage.ways == len(ends) > 150
+
+
+def test_ways_that_are_not_tried_any_more_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("action_assistant.umrf.checks.trials.BUDGET", 20)
+    (problem,) = [p for p in check(trap(60, 50)) if p.code == "not-tried"]
+    assert problem.severity == "warning"
+    assert "were tried" in problem.message and "on none was" in problem.message
