@@ -11,86 +11,15 @@ from hypothesis import strategies as st
 from action_assistant.umrf.check import check
 from action_assistant.umrf.checks.trials import Trials
 from action_assistant.umrf.codec import read
-from action_assistant.umrf.model import (
-    ENGINE_DEFAULTS,
-    ENTRY,
-    ENTRY_CONDITIONS,
-    EXIT,
-    RESPONSES,
-    Action,
-    Conditions,
-    Graph,
-    Parameter,
-    Relation,
-)
+from action_assistant.umrf.model import Action, Graph
 from action_assistant.umrf.semantics.course import Course, Outcome
 from action_assistant.umrf.semantics.deviations import Deviations, Tied
 from action_assistant.umrf.semantics.network import Network
 from action_assistant.umrf.semantics.whole import whole
+from umrf.drawn import busy_graphs
 from umrf.shapes import GROWING
 
 # Against the engine
-
-PLAIN = st.sampled_from(["run", "run", "run", "bypass", "ignore", "ignore"])
-ANY = st.one_of(PLAIN, st.sampled_from(RESPONSES))
-
-
-def conditions(answers: st.SearchStrategy[Any]) -> st.SearchStrategy[Conditions]:
-    usual = st.sampled_from(
-        [ENGINE_DEFAULTS, Conditions("run", "run"), Conditions("run"), Conditions("ignore", "run")]
-    )
-    return st.one_of(usual, st.builds(Conditions, answers, answers, answers, answers))
-
-
-LEAF = st.sampled_from(
-    [
-        '{"pvf_type":"string"}',
-        '{"pvf_type":"string","pvf_value":"x"}',
-        '{"pvf_type":"number"}',
-        '{"pvf_type":"string","pvf_required":false}',
-        '{"pvf_type":"string","pvf_updatable":false}',
-    ]
-)
-SIDE = st.dictionaries(st.sampled_from("pq"), LEAF, max_size=2).map(
-    lambda d: tuple(Parameter(*each) for each in d.items())
-)
-
-
-@st.composite
-def graphs(draw: st.DrawFn, most: int = 12) -> Graph:
-    """Chains, branches, joins and loops; half of them have values, some stop and pause."""
-    count = draw(st.integers(1, most))
-    said = conditions(ANY if draw(st.integers(0, 3)) == 0 else PLAIN)
-    values = draw(st.booleans())
-    nothing: st.SearchStrategy[tuple[Parameter, ...]] = st.just(())
-    actions = tuple(
-        Action(
-            key=f"k{n}", name=f"A{n}",
-            inputs=draw(SIDE if values and n else nothing), outputs=draw(SIDE if values else nothing),
-        )
-        for n in range(count)
-    )  # fmt: skip
-    place = st.integers(0, count - 1)
-    pairs = draw(st.sets(st.tuples(place, place), max_size=2 * count))
-    if draw(st.booleans()):
-        pairs = {(min(pair), max(pair)) for pair in pairs if pair[0] != pair[1]}
-    if draw(st.booleans()):
-        pairs |= {(n, n + 1) for n in range(count - 1)}
-    order = st.floats(0, 1)
-
-    def arrow(parent: str, child: str) -> Relation:
-        return Relation(
-            parent=parent, child=child, conditions=draw(said), required=draw(st.booleans()),
-            parent_order=draw(order), child_order=draw(order),
-        )  # fmt: skip
-
-    arrows = [arrow(f"k{a}", f"k{b}") for a, b in sorted(pairs)]
-    arrows += [
-        Relation(parent=ENTRY, child=f"k{n}", conditions=ENTRY_CONDITIONS)
-        for n in sorted({0} | draw(st.sets(place, max_size=2)))
-    ]
-    arrows += [arrow(f"k{n}", EXIT) for n in sorted(draw(st.sets(place, max_size=3)))]
-    return Graph(name="g", actions=actions, relations=tuple(arrows))
 
 
 def told(outcome: Outcome) -> Outcome:
@@ -100,7 +29,7 @@ def told(outcome: Outcome) -> Outcome:
     return outcome._replace(cut=False, last=-1)
 
 
-@given(graphs(), st.booleans(), st.booleans())
+@given(busy_graphs(), st.booleans(), st.booleans())
 @settings(max_examples=250, deadline=None, suppress_health_check=list(HealthCheck))
 def test_a_deviation_ends_as_when_the_engine_goes_through_all_of_it(
     graph: Graph, slower_first: bool, backwards: bool
@@ -120,7 +49,7 @@ def test_a_deviation_ends_as_when_the_engine_goes_through_all_of_it(
         assert told(found) == told(whole(net, graph, name, outcome)[0]), (name, outcome)
 
 
-@given(graphs(8))
+@given(busy_graphs(8))
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 def test_what_is_not_tried_cannot_end_otherwise(graph: Graph) -> None:
     """An outcome that no child answers in another way is no way of its own."""

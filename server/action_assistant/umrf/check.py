@@ -9,7 +9,7 @@ from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.subgraphs import check_subgraphs
 from action_assistant.umrf.checks.values import check_static, check_values
 from action_assistant.umrf.codec import ActionReading, Reading
-from action_assistant.umrf.codes import REFUSED, STRUCTURAL
+from action_assistant.umrf.codes import REFUSED, STRUCTURAL, rank
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem, Signature
 from action_assistant.umrf.places import placed
@@ -33,7 +33,7 @@ def check(
     facts: EngineFacts = PINNED,
     graphs: Mapping[str, Graph] | None = None,
 ) -> list[Problem]:
-    """Every problem of a graph, errors first. Never raises.
+    """Every problem of a graph, errors first, then what is worst. Never raises.
 
     `library`: the actions that the engine has, by name; `graphs`: the graphs that it has indexed and
     so can run as sub-graphs. What is None is not known, and nothing is said of it.
@@ -45,7 +45,7 @@ def check(
     check_subgraphs(subject, graphs or {}, library or {})
     _check_actors(subject)
     check_scenarios(subject)
-    return sorted(subject.problems, key=lambda problem: problem.severity)
+    return sorted(subject.problems, key=rank)
 
 
 def check_reading(
@@ -58,7 +58,7 @@ def check_reading(
     it."""
     found = check(reading.graph, library, facts, graphs)
     problems = [*reading.problems, *reading.placed(found)]
-    return sorted(problems, key=lambda problem: problem.severity)
+    return sorted(problems, key=rank)
 
 
 def check_written(graph: Graph) -> list[Problem]:
@@ -74,7 +74,7 @@ def check_action(reading: ActionReading) -> list[Problem]:
     check_structure(subject)
     check_static(subject)
     problems = [*reading.problems, *reading.placed(subject.problems)]
-    return sorted(problems, key=lambda problem: problem.severity)
+    return sorted(problems, key=rank)
 
 
 def refused_by_parser(reading: Reading) -> list[Problem]:

@@ -7,7 +7,7 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.umrf.model import Severity
+from action_assistant.umrf.model import Problem, Severity
 
 #: `unreadable`: no graph at all; `refused`: the engine's parser refuses the text; `structural`: its
 #: parser takes it, its start does not; `hazard`: of SPEC 3; `other`: the rest.
@@ -169,6 +169,16 @@ REFUSED: Final = frozenset(name for name, code in CODES.items() if code.kind == 
 STRUCTURAL: Final[frozenset[str]] = REFUSED | {
     name for name, code in CODES.items() if code.kind == "structural"
 }
+
+#: Of what is possible, what comes first: it kills or blocks the engine, it cannot be stopped, it never
+#: ends. H3 stands in nearly every graph from the wild.
+_WORST: Final = ("H4", "H5", "H12", "H8", "H3")
+
+
+def rank(problem: Problem) -> tuple[Severity, int]:
+    """The order in which problems are told."""
+    code = problem.code
+    return problem.severity, _WORST.index(code) if code in _WORST else len(_WORST)
 
 
 def table() -> str:

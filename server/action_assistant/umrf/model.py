@@ -143,13 +143,15 @@ class Where(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """Something about a graph that a person should know. Checks return these, never raise."""
+    """Something about a graph that a person should know. Checks return these, never raise. `also`: the
+    other places of the same thing, which is told once."""
 
     code: str
     severity: Severity
     where: Where
     message: str
     fix: str | None = None
+    also: tuple[Where, ...] = ()
 
 
 class Note(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):

@@ -1,9 +1,11 @@
-"""Whether and how a graph gets from its entry to its exit (SPEC 2.3; H2, H3, H4, H8, H12)."""
+"""Whether and how a graph gets from its entry to its exit (SPEC 2.3; H2, H3, H8)."""
 
 from collections import deque
 
 from action_assistant.umrf.checks.loops import ENDS, check_instant_loops, check_spontaneous, loops
-from action_assistant.umrf.checks.places import Subject, joined
+from action_assistant.umrf.checks.overlaps import check_responses, check_stragglers
+from action_assistant.umrf.checks.places import Subject, more
+from action_assistant.umrf.checks.together import Together
 from action_assistant.umrf.model import (
     ENTRY,
     EXIT,
@@ -18,8 +20,6 @@ from action_assistant.umrf.model import (
 def check_flow(subject: Subject) -> None:
     """Reports all of it."""
     _check_sides(subject)
-    _check_bypasses(subject)
-    _check_responses(subject)
     if not subject.real:
         subject.report(
             "empty", "warning", "The graph has no actions; it ends as soon as it starts."
@@ -30,11 +30,14 @@ def check_flow(subject: Subject) -> None:
         subject.report("no-entry", "error", message, member="/graph_entry")
         return
     reach = Reach(subject)
+    together = Together(subject, reach.runs, reach.reports)
+    _check_bypasses(subject, reach)
+    check_responses(subject, reach.reports, together)
     _check_waiting(subject, reach)
     _check_exit(subject, reach)
     check_spontaneous(subject)
-    check_instant_loops(subject, reach.runs)
-    _check_stragglers(subject)
+    check_instant_loops(subject, reach.runs, reach.reports)
+    check_stragglers(subject, reach.reports, together)
 
 
 def _check_sides(subject: Subject) -> None:
@@ -58,63 +61,30 @@ def _check_sides(subject: Subject) -> None:
             subject.report("H2b", severity, message, relation=relation, fix="mirror-relation")
 
 
-def _check_bypasses(subject: Subject) -> None:
+def _check_bypasses(subject: Subject, reach: "Reach") -> None:
+    """H3: bypasses that can happen, told once."""
     if "H3" not in subject.facts.hazards or subject.facts.bypass_fixed:
         return
-    for relation in subject.sound:
-        outcomes = [p for p in PRECONDITIONS if relation.conditions.answer(p) == "bypass"]
-        if not outcomes or relation.child == EXIT or relation.parent == ENTRY:
+    found: list[tuple[Relation, list[Precondition]]] = []
+    for relation in sorted(subject.sound, key=subject.place):
+        if relation.child == EXIT or relation.parent == ENTRY:
             continue
-        message = (
-            f"If {subject.name(relation.parent)} ends with {' or '.join(outcomes)}, "
-            f"{subject.name(relation.child)} is bypassed: this engine then reads freed memory and "
-            "may abort with every running graph."
-        )
-        subject.report("H3", "warning", message, relation=relation, member="/conditions")
-
-
-def _check_responses(subject: Subject) -> None:
-    """What a response does to a child that is in the wrong state."""
-    for key, relations in subject.incoming.items():
-        if key == EXIT:
-            continue
-        by_answer: dict[str, set[Key]] = {}
-        for relation in relations:
-            for outcome in PRECONDITIONS if relation.parent != ENTRY else ("on_true",):
-                by_answer.setdefault(relation.conditions.answer(outcome), set()).add(
-                    relation.parent
-                )
-        runs = by_answer.get("run", set()) - {ENTRY}
-        for answer in ("pause", "stop"):
-            others = by_answer.get(answer, set())
-            if others and runs - others:
-                who = joined({subject.name(k) for k in runs - others})
-                message = (
-                    f"{who} may run {subject.name(key)} just when {joined({subject.name(k) for k in others})} "
-                    f"{answer}s it: this engine then aborts with every running graph."
-                )
-                subject.report("H4", "warning", message, action=subject.actions[key])
-        if by_answer.get("pause") and by_answer.get("stop"):
-            message = f"{subject.name(key)} may be stopped while it is paused: it ends in ERROR after 5 s."
-            subject.report("H5", "warning", message, action=subject.actions[key])
-    for relation in subject.sound:
-        _check_without_effect(subject, relation)
-
-
-def _check_without_effect(subject: Subject, relation: Relation) -> None:
-    if relation.child == EXIT or relation.parent == ENTRY:
+        reported = reach.reports.get(relation.parent, set())
+        outcomes = [
+            o for o in PRECONDITIONS if o in reported and relation.conditions.answer(o) == "bypass"
+        ]
+        if outcomes:
+            found.append((relation, outcomes))
+    if not found:
         return
-    answers = {outcome: relation.conditions.answer(outcome) for outcome in PRECONDITIONS}
-    parent, child = subject.name(relation.parent), subject.name(relation.child)
-    if "restart" in answers.values():
-        message = f"“restart” does nothing in this engine; {child} is not started again."
-        subject.report("restart", "warning", message, relation=relation, member="/conditions")
-    if relation.parent == relation.child and "run" in answers.values():
-        message = f"{child} cannot run itself again: it still runs when it is asked."
-        subject.report("self-loop", "warning", message, relation=relation, member="/conditions")
-    if "pause" in answers.values():
-        message = f"When {parent} pauses {child}, only a pause and a resume of the whole graph wake it again."
-        subject.report("H5", "warning", message, relation=relation, member="/conditions")
+    first, outcomes = found[0]
+    message = (
+        f"If {subject.name(first.parent)} ends with {' or '.join(outcomes)}, "
+        f"{subject.name(first.child)} is bypassed: this engine then reads freed memory and "
+        f"may abort with every running graph.{more(len(found) - 1, 'bypass', 'bypasses')}"
+    )
+    others = (relation for relation, _ in found[1:])
+    subject.report("H3", "warning", message, relation=first, member="/conditions", also=others)
 
 
 class Reach:
@@ -251,56 +221,3 @@ def _check_exit(subject: Subject, reach: Reach) -> None:
                 "another way bypasses into the exit, the graph stays RUNNING for ever."
             )
             subject.report("H8", "warning", message, relation=relation, member="/required")
-
-
-def _check_stragglers(subject: Subject) -> None:
-    """H12: ways to the exit that do not wait for what still runs."""
-    if "H12" not in subject.facts.hazards:
-        return
-    for relation in _first(subject.incoming.get(EXIT, [])):
-        siblings = {
-            other.child
-            for other in subject.outgoing.get(relation.parent, [])
-            if other.child != EXIT and _shares_answer(other, relation)
-        }
-        if siblings:
-            who = joined({subject.name(key) for key in siblings})
-            message = (
-                f"When {subject.name(relation.parent)} ends, the graph is FINISHED although {who} "
-                "runs on: the engine then ignores every stop of the graph."
-            )
-            subject.report("H12", "warning", message, relation=relation)
-    fork = _parallel(subject)
-    if fork is None:
-        return
-    for relation in subject.incoming.get(EXIT, []):
-        early = not relation.required and len(subject.incoming[EXIT]) > 1
-        bypasses = [p for p in ENDS if relation.conditions.answer(p) == "bypass"]
-        if early or bypasses:
-            why = f"ends with {' or '.join(bypasses)}" if bypasses else "ends first"
-            message = (
-                f"If {subject.name(relation.parent)} {why}, the graph is FINISHED while what "
-                f"{fork} started may run on: the engine then ignores every stop of the graph."
-            )
-            subject.report("H12", "warning", message, relation=relation, member="/conditions")
-
-
-def _shares_answer(other: Relation, to_exit: Relation) -> bool:
-    return any(
-        other.conditions.answer(o) == "run" and to_exit.conditions.answer(o) != "ignore"
-        for o in ENDS
-    )
-
-
-def _parallel(subject: Subject) -> str | None:
-    """The name of something that starts two actions at once, if there is any."""
-    for key, relations in subject.outgoing.items():
-        for outcome in ENDS:
-            started = [
-                r
-                for r in relations
-                if r.child != EXIT and (key == ENTRY or r.conditions.answer(outcome) == "run")
-            ]
-            if len(started) > 1:
-                return subject.name(key)
-    return None

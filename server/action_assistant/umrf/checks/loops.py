@@ -1,6 +1,6 @@
 """Loops of a graph, and what they do to the engine (SPEC 2.9, 2.10; H5, H9)."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Final
 
 from action_assistant.umrf.checks.places import Subject
@@ -25,13 +25,17 @@ def check_spontaneous(subject: Subject) -> None:
             subject.report("H9", "error", message, action=action, member="/type")
 
 
-def check_instant_loops(subject: Subject, runs: Collection[Key]) -> None:
-    """Loops that would block the engine if they took no time. `runs`: actions that can run."""
+def check_instant_loops(
+    subject: Subject, runs: Collection[Key], reports: Mapping[Key, Collection[Precondition]]
+) -> None:
+    """Loops that would block the engine if they took no time. `runs`: actions that can run;
+    `reports`: with which outcomes they can end."""
     if "H5" not in subject.facts.hazards:
         return
 
     def goes_round(relation: Relation) -> bool:
-        answers = {relation.conditions.answer(outcome) for outcome in ENDS}
+        reported = reports.get(relation.parent, ())
+        answers = {relation.conditions.answer(o) for o in ENDS if o in reported}
         return relation.parent != relation.child and bool(answers & {"run", "bypass"})
 
     for loop in loops(subject, goes_round):

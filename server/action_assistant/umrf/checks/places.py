@@ -1,5 +1,7 @@
 """Where things of a graph stand in its canonical file, and how problems name them."""
 
+from collections.abc import Iterable
+from itertools import islice
 from typing import Final, Literal
 
 from action_assistant.umrf.facts import EngineFacts
@@ -59,6 +61,12 @@ class Subject:
             self.incoming.setdefault(r.child, []).append(r)
             self.outgoing.setdefault(r.parent, []).append(r)
 
+    def place(self, relation: Relation) -> tuple[int, int]:
+        """Where a relation stands in the file: with which action, and there as which."""
+        path = self.parent_paths.get(id(relation), "")
+        numbers = [int(part) for part in path.split("/") if part.isdigit()]
+        return (numbers[0], numbers[-1]) if numbers else (0, 0)
+
     def _place(
         self, relation: Relation, listed: list[Relation], owner: Key, paths: dict[int, str]
     ) -> None:
@@ -112,9 +120,11 @@ class Subject:
         member: str = "",
         fix: str | None = None,
         side: Literal["parents", "children"] | None = None,
+        also: Iterable[Relation] = (),
     ) -> None:
         """Adds a problem of the graph, of an action or of a relation; `member` goes below it, `side`
-        says in which of the lists that have the relation it is.
+        says in which of the lists that have the relation it is. `also`: other relations of which the
+        same is to be said.
 
         Only the first `MAX_EACH` of one code and severity: more help nobody and fill the memory.
         """
@@ -127,8 +137,11 @@ class Subject:
             where = Where(path=self.paths.get(action.key, "") + member, aid=action.key)
         elif relation is not None:
             where = self._where(relation, member, side)
+        others = tuple(self._where(other, member, side) for other in islice(also, MAX_EACH))
         self.problems.append(
-            Problem(code=code, severity=severity, where=where, message=message, fix=fix)
+            Problem(
+                code=code, severity=severity, where=where, message=message, fix=fix, also=others
+            )
         )
 
     def _where(self, relation: Relation, member: str, side: str | None) -> Where:
@@ -150,3 +163,8 @@ def joined(names: set[str]) -> str:
 def quoted(names: set[str]) -> str:
     """Names for a sentence that stand at the place of its problem."""
     return ", ".join(f"“{name}”" for name in sorted(names))
+
+
+def more(count: int, one: str, many: str) -> str:
+    """The end of a message that is told for several places at once."""
+    return f" {count:,} more {one if count == 1 else many} of this kind." if count > 0 else ""

@@ -12,7 +12,7 @@ from heapq import heappop, heappush
 from typing import Final
 
 from action_assistant.umrf.model import Precondition
-from action_assistant.umrf.semantics.course import Course, Outcome, stuck
+from action_assistant.umrf.semantics.course import LAPS, MORE, Course, Outcome, stuck
 from action_assistant.umrf.semantics.instants import ACTIVE, DUE, IDLE, RUNS, Instant, State
 from action_assistant.umrf.semantics.network import Mask
 
@@ -78,13 +78,21 @@ class _Way:
         self._passed: list[int] = []
         self._met: list[tuple[_Key, Mask, Mask]] = []
         self._is_over = False
+        self._steps = 0
+        self._power = 1
+        self._point: tuple[int, dict[int, State]] = (-1, {})
         self._since = 0  # instants since it was last asked what can be left out
 
     def followed(self, instant: int, result: Precondition) -> Outcome:
         found = self._at(self.course.times[instant], self.course.roots[instant], result)
         if instant < len(self.course.times) - 1:
             self._push(len(self.course.times) - 1)
+        limit = LAPS * len(self.net.nodes) + MORE
         while found is None:
+            limit -= 1
+            if not limit:
+                found = Outcome("endless", cut=True)
+                break
             if not self._queue:
                 found = self._quiet(len(self.course.times))
                 break
@@ -97,7 +105,25 @@ class _Way:
                         raise Tied
                     root = place
             found = self._at(at, root, "on_true")
+            if found is None and self._is_over and self._is_lap(at, root):
+                found = Outcome("endless")
         return self._remembered(found)
+
+    def _is_lap(self, at: float, root: int) -> bool:
+        """Whether it has come to a point where it was before, when the usual course is over."""
+        self._steps += 1
+        again = root == self._point[0] and self._differing(at) == self._point[1]
+        if self._steps >= self._power:
+            self._power *= 2
+            self._point = root, self._differing(at)
+        return again
+
+    def _differing(self, at: float) -> dict[int, State]:
+        start = at // self.net.round_ms * self.net.round_ms
+        return {
+            place: state._replace(due=state.due - start) if state.does in DUE else state
+            for place, state in self.apart.items()
+        }
 
     def _is_due(self, place: int, at: float) -> bool:
         state = self.apart.get(place)

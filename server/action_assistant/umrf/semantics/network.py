@@ -91,7 +91,7 @@ class Network:
     @cached_property
     def behind(self) -> list[Mask]:
         """See the class."""
-        return _behind([[e.child for e in row if e is not None] for row in self.edges])
+        return behind([[e.child for e in row if e is not None] for row in self.edges])
 
     @cached_property
     def circling(self) -> dict[str, Mask]:
@@ -153,7 +153,7 @@ class Network:
         ]
         if not any(ways):
             return 0
-        return sum(1 << place for place, mask in enumerate(_behind(ways)) if mask >> place & 1)
+        return sum(1 << place for place, mask in enumerate(behind(ways)) if mask >> place & 1)
 
 
 def _bits(node: Node) -> dict[str, Mask]:
@@ -205,7 +205,7 @@ def _copy(slot: Slot) -> Slot:
     return same
 
 
-def _behind(ways: Sequence[Sequence[int]]) -> list[Mask]:
+def behind(ways: Sequence[Sequence[int]]) -> list[Mask]:
     """What is reached from each place, itself only by a loop (Tarjan's components, iterative)."""
     found = [0] * len(ways)
     index = [-1] * len(ways)

@@ -1,0 +1,175 @@
+"""What goes wrong where two things go on at once: responses that come at the wrong moment, and ends that
+leave something running (SPEC 2.3, 2.5; H4, H5, H12). Only what can happen is told."""
+
+from collections.abc import Collection, Mapping
+
+import msgspec
+
+from action_assistant.umrf.checks.places import Subject, joined, more
+from action_assistant.umrf.checks.together import Together
+from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
+
+_Reports = Mapping[Key, Collection[Precondition]]
+
+
+def check_responses(subject: Subject, reports: _Reports, together: Together) -> None:
+    """What a response does to a child that is in the wrong state."""
+    for key, relations in subject.incoming.items():
+        if key == EXIT:
+            continue
+        asking = _asking(relations, reports)
+        runs = {k for k, _ in asking.get("run", ())} - {ENTRY}
+        met: dict[str, set[Key]] = {}
+        for answer in ("pause", "stop"):
+            # Only what runs can be paused or stopped, and only then does `run` kill.
+            others = {k for k, o in asking.get(answer, ()) if together.goes_on(key, k, o)}
+            late = {k for k in runs - others if together.may_run(k, key)}
+            met[answer] = others
+            if others and late:
+                message = (
+                    f"{_names(subject, late)} may run {subject.name(key)} just when "
+                    f"{_names(subject, others)} {answer}s it: this engine then aborts with every "
+                    "running graph."
+                )
+                subject.report("H4", "warning", message, action=subject.actions[key])
+        if met["pause"] and met["stop"]:
+            message = f"{subject.name(key)} may be stopped while it is paused: it ends in ERROR after 5 s."
+            subject.report("H5", "warning", message, action=subject.actions[key])
+    for relation in subject.sound:
+        _check_without_effect(subject, relation, reports.get(relation.parent, ()), together)
+
+
+def _asking(
+    relations: list[Relation], reports: _Reports
+) -> dict[str, set[tuple[Key, Precondition]]]:
+    """Who can ask for what, and with which outcome."""
+    found: dict[str, set[tuple[Key, Precondition]]] = {}
+    for relation in relations:
+        reported = reports.get(relation.parent, ())
+        for outcome in PRECONDITIONS if relation.parent != ENTRY else ("on_true",):
+            if outcome in reported:
+                answer = relation.conditions.answer(outcome)
+                found.setdefault(answer, set()).add((relation.parent, outcome))
+    return found
+
+
+def _names(subject: Subject, keys: Collection[Key]) -> str:
+    return joined({subject.name(key) for key in keys})
+
+
+def _check_without_effect(
+    subject: Subject, relation: Relation, reported: Collection[Precondition], together: Together
+) -> None:
+    if relation.child == EXIT or relation.parent == ENTRY:
+        return
+    answers = {o: relation.conditions.answer(o) for o in PRECONDITIONS if o in reported}
+    parent, child = subject.name(relation.parent), subject.name(relation.child)
+    if "restart" in answers.values():
+        message = f"“restart” does nothing in this engine; {child} is not started again."
+        subject.report("restart", "warning", message, relation=relation, member="/conditions")
+    if relation.parent == relation.child and "run" in answers.values():
+        message = f"{child} cannot run itself again: it still runs when it is asked."
+        subject.report("self-loop", "warning", message, relation=relation, member="/conditions")
+    pausing = [o for o, answer in answers.items() if answer == "pause"]
+    if any(together.goes_on(relation.child, relation.parent, o) for o in pausing):
+        message = f"When {parent} pauses {child}, only a pause and a resume of the whole graph wake it again."
+        subject.report("H5", "warning", message, relation=relation, member="/conditions")
+
+
+# Ends that leave something running
+
+
+class _Early(msgspec.Struct, frozen=True):
+    """A way to the exit that does not wait for what may still run. `bypassed`: with which outcomes it
+    does not wait for anybody."""
+
+    relation: Relation
+    left: frozenset[Key]
+    bypassed: tuple[Precondition, ...]
+    started: bool
+
+
+def check_stragglers(subject: Subject, reports: _Reports, together: Together) -> None:
+    """H12: ways to the exit on which something else may still run, told once."""
+    if "H12" not in subject.facts.hazards:
+        return
+    incoming = [r for r in subject.incoming.get(EXIT, []) if not r.listing]
+    found = [
+        early
+        for relation in incoming
+        if (early := _early(subject, relation, incoming, reports, together)) is not None
+    ]
+    if not found:
+        return
+    first = found[0]
+    who, end = _left(subject, first), subject.name(first.relation.parent)
+    if first.started:
+        start = f"When {end} ends, the graph is FINISHED although {who} runs on"
+    else:
+        how = f"ends with {' or '.join(first.bypassed)}" if first.bypassed else "ends first"
+        start = f"If {end} {how}, the graph is FINISHED while {who} may run on"
+    rest = more(len(found) - 1, "way to the exit", "ways to the exit")
+    message = f"{start}: the engine then ignores every stop of the graph.{rest}"
+    others = (early.relation for early in found[1:])
+    subject.report(
+        "H12", "warning", message, relation=first.relation, member="/conditions", also=others
+    )
+
+
+def _left(subject: Subject, early: _Early) -> str:
+    names = sorted(subject.name(key) for key in early.left)
+    shown = joined(set(names[:3]))
+    return shown if len(names) <= 3 else f"{shown} or one of {len(names) - 3:,} others"
+
+
+def _early(
+    subject: Subject,
+    relation: Relation,
+    incoming: list[Relation],
+    reports: _Reports,
+    together: Together,
+) -> _Early | None:
+    bypassed: list[Precondition] = []
+    left: set[Key] = set()
+    others = [r.parent for r in incoming if r.required and r.parent != relation.parent]
+    started = False
+    for outcome in PRECONDITIONS:
+        answer = relation.conditions.answer(outcome)
+        if outcome not in reports.get(relation.parent, ()) or answer == "ignore":
+            continue
+        waited = () if answer == "bypass" else others
+        around = together.at_end(relation.parent, outcome, waited)
+        begun = _begun(subject, relation.parent, outcome) & around
+        if answer == "bypass":
+            if around:
+                bypassed.append(outcome)
+                left |= around
+            continue
+        if not around or _comes_after(subject, relation.parent, others):
+            continue
+        started = started or bool(begun)
+        left |= around
+    if not left:
+        return None
+    return _Early(relation, frozenset(left), tuple(bypassed), started and not bypassed)
+
+
+def _begun(subject: Subject, key: Key, outcome: Precondition) -> set[Key]:
+    return {
+        r.child
+        for r in subject.outgoing.get(key, [])
+        if r.child != EXIT and r.conditions.answer(outcome) == "run"
+    }
+
+
+def _comes_after(subject: Subject, key: Key, others: list[Key]) -> bool:
+    """Whether one of the others that the exit waits for can only come after this one."""
+    if not others:
+        return False
+    seen, stack = {ENTRY}, [ENTRY]
+    while stack:
+        for relation in subject.outgoing.get(stack.pop(), []):
+            if relation.child not in seen and relation.child != key:
+                seen.add(relation.child)
+                stack.append(relation.child)
+    return any(other not in seen for other in others)

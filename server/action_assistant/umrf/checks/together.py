@@ -1,0 +1,159 @@
+"""What may go on at the same time, as far as arrows and possible outcomes tell (SPEC 2.3).
+
+Too much rather than too little: how long actions take is not known, and which outcomes come together is
+not looked at. But an action that a join waits for is over when the join begins.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
+
+from action_assistant.umrf.checks.places import Subject
+from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
+from action_assistant.umrf.semantics.network import Mask, behind
+
+#: Above so many actions any two may go on at the same time: their pairs are too many to follow.
+MOST: Final = 1_500
+
+
+class Together:
+    """`runs`: the actions that can run; `reports`: with which outcomes each (or the entry) can report
+    an end, its own or one that it passes on when it is bypassed."""
+
+    def __init__(
+        self, subject: Subject, runs: set[Key], reports: Mapping[Key, set[Precondition]]
+    ) -> None:
+        self.keys = [action.key for action in subject.real]
+        self.place = {key: number for number, key in enumerate(self.keys)}
+        self._subject = subject
+        self._runs = runs
+        self._reports = reports
+        self.known = len(self.keys) <= MOST
+        count = len(self.keys)
+        self._with: list[Mask] = [0] * count  # while it runs
+        #: When it passes on an outcome because it is bypassed, which is none of its own ends.
+        self._passing: dict[tuple[Key, Precondition], Mask] = {}
+        self._lively = {a.key for a in subject.real if a.type == "spontaneous"}
+        self._required = {
+            key: [r.parent for r in listed if r.required and r.parent in self.place]
+            for key, listed in subject.incoming.items()
+        }
+        if self.known:
+            self._after = behind([self._children(key) for key in self.keys])
+            self._starts: dict[tuple[Key, Precondition], Mask] = {}
+            self._open = deque[Key](key for key in reports if key != EXIT)
+            self._waiting = set(self._open)
+            while self._open:
+                key = self._open.popleft()
+                self._waiting.discard(key)
+                self._follow(key)
+
+    def may_run(self, key: Key, other: Key) -> bool:
+        """Whether `key` can run at a moment at which `other` runs."""
+        if key not in self._runs or other not in self._runs:
+            return False
+        return not self.known or bool(self._with[self.place[other]] >> self.place[key] & 1)
+
+    def at_end(self, key: Key, outcome: Precondition, waited: Iterable[Key] = ()) -> set[Key]:
+        """Which actions may run just after `key` reported this outcome, those that it starts included,
+        when the ones that were `waited` for have reported, too. Of a large graph, any."""
+        if outcome not in self._reports.get(key, ()):
+            return set()
+        if not self.known:
+            return self._runs - {key}
+        mask = self._when(key, outcome) | self._started(key, outcome)
+        for other in waited:
+            mask &= self._whenever(other) | self._after[self.place[other]]
+        return {self.keys[place] for place in _places(mask)} - {key}
+
+    def goes_on(self, key: Key, other: Key, outcome: Precondition) -> bool:
+        """Whether `key` can be running when `other` reports this outcome."""
+        if key not in self._runs or outcome not in self._reports.get(other, ()):
+            return False
+        return not self.known or bool(self._when(other, outcome) >> self.place[key] & 1)
+
+    def _when(self, key: Key, outcome: Precondition) -> Mask:
+        own = self._with[self.place[key]] if key in self._runs else 0
+        return own | self._passing.get((key, outcome), 0)
+
+    def _whenever(self, key: Key) -> Mask:
+        found = self._with[self.place[key]] if key in self._runs else 0
+        for outcome in PRECONDITIONS:
+            found |= self._passing.get((key, outcome), 0)
+        return found
+
+    def _children(self, key: Key) -> list[int]:
+        listed = self._subject.outgoing.get(key, [])
+        return [self.place[r.child] for r in listed if r.child in self.place]
+
+    def _answers(self, key: Key, outcome: Precondition) -> Iterator[tuple[Relation, str]]:
+        for relation in self._subject.outgoing.get(key, []):
+            if relation.child in self.place:
+                run = key == ENTRY
+                yield relation, "run" if run else relation.conditions.answer(outcome)
+
+    def _started(self, key: Key, outcome: Precondition) -> Mask:
+        """What an end starts at its instant, also by way of bypasses."""
+        if (key, outcome) not in self._starts:
+            seen, stack, mask = {key}, [key], 0
+            while stack:
+                for relation, answer in self._answers(stack.pop(), outcome):
+                    child = relation.child
+                    if answer == "run" and child in self._runs:
+                        mask |= 1 << self.place[child]
+                    elif answer == "bypass" and child not in seen:
+                        seen.add(child)
+                        stack.append(child)
+            self._starts[key, outcome] = mask
+        return self._starts[key, outcome]
+
+    def _follow(self, key: Key) -> None:
+        for outcome in self._reports[key]:
+            at_once = self._when(key, outcome) | self._started(key, outcome)
+            if key in self._lively:
+                at_once |= 1 << self.place[key]
+            for relation, answer in self._answers(key, outcome):
+                if answer == "bypass":
+                    passing = self._passing.get((relation.child, outcome), 0)
+                    if at_once & ~passing:
+                        self._passing[relation.child, outcome] = passing | at_once
+                        self._again(relation.child)
+                elif answer == "run" and relation.child in self._runs:
+                    self._begin(relation.child, key, at_once)
+
+    def _begin(self, child: Key, parent: Key, around: Mask) -> None:
+        place = self.place[child]
+        for required in self._required.get(child, ()):
+            if required != parent:
+                around &= self._whenever(required) | self._after[self.place[required]]
+        new = around & ~self._with[place] & ~(1 << place)
+        if not new:
+            return
+        self._with[place] |= new
+        self._again(child)
+        for other in _places(new):
+            if not self._with[other] >> place & 1:
+                self._with[other] |= 1 << place
+                self._again(self.keys[other])
+
+    def _again(self, key: Key) -> None:
+        """More goes on with it than was known: its ends have more around them."""
+        for each in (key, *self._beside(key)):
+            if each not in self._waiting and each in self._reports:
+                self._waiting.add(each)
+                self._open.append(each)
+
+    def _beside(self, key: Key) -> Iterator[Key]:
+        """Those whose end may begin what waits for this one, too."""
+        for relation in self._subject.outgoing.get(key, []):
+            if relation.required and relation.child in self.place:
+                for other in self._subject.incoming.get(relation.child, []):
+                    if other.parent != key:
+                        yield other.parent
+
+
+def _places(mask: Mask) -> Iterator[int]:
+    while mask:
+        lowest = mask & -mask
+        yield lowest.bit_length() - 1
+        mask ^= lowest

@@ -1,0 +1,170 @@
+"""H4, H5 and H12 are told of what can happen, all of it, and of nothing else; one thing is told once."""
+
+import json
+from typing import Any
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from action_assistant.umrf.check import check
+from action_assistant.umrf.checks.flow import Reach
+from action_assistant.umrf.checks.places import Subject
+from action_assistant.umrf.checks.together import Together
+from action_assistant.umrf.codec import read
+from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.model import Graph, Problem
+from action_assistant.umrf.semantics import Behaviour, Hazard, NodeResult, NodeState, Script, simulate
+from umrf.drawn import busy_graphs
+
+SAFE = ["on_error -> ignore"]
+Calls = list[tuple[str, float]]
+CALLS = st.lists(
+    st.tuples(st.sampled_from(["on_true", "on_false", "on_error"]), st.sampled_from([0.1, 0.7, 1.3, 3.1])),
+    min_size=24, max_size=24,
+)  # fmt: skip
+
+
+def scripted(graph: Graph, calls: Calls) -> Script:
+    """Two calls for each action."""
+    pairs = zip(calls[::2], calls[1::2], strict=True)
+    return Script(
+        {
+            action.full_name: tuple(Behaviour(result=r, after_s=t) for r, t in each)
+            for action, each in zip(graph.actions, pairs, strict=False)
+        }
+    )
+
+
+@given(busy_graphs(), CALLS)
+@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+def test_what_runs_at_once_in_any_simulation_was_said_to_be_able_to(
+    graph: Graph, calls: Calls
+) -> None:
+    subject = Subject(graph, PINNED)
+    reach = Reach(subject)
+    together = Together(subject, reach.runs, reach.reports)
+    keys = {action.full_name: action.key for action in graph.actions}
+    now: set[str] = set()
+    for trace in simulate(graph, script=scripted(graph, calls), max_events=400, until_ms=60_000):
+        match trace:
+            case NodeState(node=node, state="RUNNING" | "PAUSED" | "STOPPING"):
+                now.add(node)
+                for other in now - {node}:
+                    assert together.may_run(keys[node], keys[other])
+                    assert together.may_run(keys[other], keys[node])
+            case NodeResult(node=node) | NodeState(node=node):  # it informs its children after its end
+                now.discard(node)
+            case _:
+                pass
+
+
+@given(busy_graphs(), CALLS)
+@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+def test_a_hazard_of_any_simulation_is_one_that_check_told(graph: Graph, calls: Calls) -> None:
+    told = {problem.code for problem in check(graph)}
+    for trace in simulate(graph, script=scripted(graph, calls), max_events=400, until_ms=60_000):
+        if isinstance(trace, Hazard) and trace.code in ("H3", "H4", "H12"):
+            assert trace.code in told, trace
+
+
+def action(name: str, parents: Any = (), children: Any = ()) -> dict[str, Any]:
+    sides = {
+        "parents": [{"name": p, "conditions": SAFE} if isinstance(p, str) else p for p in parents],
+        "children": [{"name": c} for c in children],
+    }
+    return {"name": name, "type": "sync"} | sides
+
+
+def graph(*actions: dict[str, Any], entry: Any = ("A",), exits: Any = ()) -> Graph:
+    ends = [{"name": e, "conditions": SAFE} if isinstance(e, str) else e for e in exits]
+    file = {"graph_name": "g", "actions": list(actions), "graph_exit": ends}
+    return read(json.dumps(file | {"graph_entry": [{"name": e} for e in entry]})).graph
+
+
+def found(value: Graph, code: str) -> list[Problem]:
+    return [problem for problem in check(value) if problem.code == code]
+
+
+def asks(name: str, *said: str) -> dict[str, Any]:
+    return {"name": name, "required": False, "conditions": [*said, *SAFE]}
+
+
+def test_a_pause_of_what_cannot_be_running_then_is_no_pause() -> None:
+    """C is asked to pause before it ever ran."""
+    pausing = asks("A", "on_true -> pause")
+    idle = graph(action("A", children=["B", "C"]), action("B", ["A"], ["C"]),
+                 action("C", [pausing, asks("B")]), exits=["C"])  # fmt: skip
+    assert found(idle, "H5") == []
+    assert found(idle, "H4") == []
+    beside = graph(action("A", children=["C"]), action("C", [pausing]), entry=["A", "C"])
+    assert "only a pause and a resume" in found(beside, "H5")[0].message
+
+
+def test_what_runs_one_after_the_other_is_not_run_while_a_stop_is_on_its_way() -> None:
+    """Three in a circle and a timer that stops them all: only one of them runs at a time."""
+    stop = asks("T", "on_true -> stop", "on_false -> stop")
+    names = "ABC"
+    ring = [
+        action(name, [asks(names[n - 1]), stop], [names[(n + 1) % 3]])
+        for n, name in enumerate(names)
+    ]
+    value = graph(action("T", children=names), *ring, entry=["T", "A"])
+    assert found(value, "H4") == []
+    both = graph(action("T", children="B"), action("A", children="B"),
+                 action("B", [asks("A"), stop]), entry=["T", "A", "B"])  # fmt: skip
+    assert "may run B_0 just when" in found(both, "H4")[0].message
+
+
+def test_actions_that_cannot_run_bypass_and_pause_nobody() -> None:
+    value = graph(
+        action("A"),
+        action("X", children=["Y"]),
+        action("Y", [{"name": "X", "conditions": ["on_false -> pause"]}]),
+        exits=["A"],
+    )
+    assert {p.code for p in check(value)} == {"unreachable"}
+
+
+def test_a_graph_that_waits_for_all_that_it_started_is_never_finished_early() -> None:
+    fork = graph(action("A", children=["B", "C"]), action("B", ["A"], ["D"]), action("C", ["A"], ["D"]),
+                 action("D", ["B", "C"]), exits=[{"name": "D"}])  # fmt: skip
+    assert found(fork, "H12") == []
+    loose = graph(action("A", children=["B", "C"]), action("B", ["A"], ["D"]), action("C", ["A"]),
+                  action("D", ["B"]), exits=[{"name": "D"}])  # fmt: skip
+    assert "while “C_0” may run on" in found(loose, "H12")[0].message
+
+
+def test_thirty_bypasses_are_told_once_with_all_their_places() -> None:
+    names = [f"A{n}" for n in range(31)]
+    chain = [
+        action(name, [{"name": p} for p in names[max(0, n - 1) : n]], names[n + 1 : n + 2])
+        for n, name in enumerate(names)
+    ]
+    (problem,) = found(graph(*chain, entry=names[:1], exits=names[-1:]), "H3")
+    assert "29 more bypasses of this kind" in problem.message
+    places = [problem.where, *problem.also]
+    assert [p.path for p in places] == [f"/actions/{n}/parents/0/conditions" for n in range(1, 31)]
+    assert len({p.relation for p in places}) == 30
+
+
+def test_thirty_ways_out_are_told_once_with_all_their_places() -> None:
+    names = [f"A{n}" for n in range(30)]
+    ends = [asks(name) for name in names]
+    (problem,) = found(graph(*map(action, names), entry=names, exits=ends), "H12")
+    assert "29 more ways to the exit of this kind" in problem.message
+    assert len({p.relation for p in (problem.where, *problem.also)}) == 30
+
+
+def test_what_kills_the_engine_comes_before_what_may() -> None:
+    stop = asks("A", "on_true -> stop")
+    value = graph(
+        action("A", children=["C"]),
+        action("B", children=["C"]),
+        action("C", [stop, {"name": "B", "required": False}], ["D"]),
+        action("D", [{"name": "C"}]),
+        entry=["A", "B", "C"],
+        exits=["D"],
+    )
+    warnings = [p.code for p in check(value) if p.severity == "warning"]
+    assert warnings[0] == "H4"
+    assert warnings.index("H12") < warnings.index("H3")
