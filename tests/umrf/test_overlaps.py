@@ -13,7 +13,14 @@ from action_assistant.umrf.checks.together import Together
 from action_assistant.umrf.codec import read
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.model import Graph, Problem
-from action_assistant.umrf.semantics import Behaviour, Hazard, NodeResult, NodeState, Script, simulate
+from action_assistant.umrf.semantics import (
+    Behaviour,
+    Hazard,
+    NodeResult,
+    NodeState,
+    Script,
+    simulate,
+)
 from umrf.drawn import busy_graphs
 
 SAFE = ["on_error -> ignore"]
@@ -52,7 +59,9 @@ def test_what_runs_at_once_in_any_simulation_was_said_to_be_able_to(
                 for other in now - {node}:
                     assert together.may_run(keys[node], keys[other])
                     assert together.may_run(keys[other], keys[node])
-            case NodeResult(node=node) | NodeState(node=node):  # it informs its children after its end
+            case (
+                NodeResult(node=node) | NodeState(node=node)
+            ):  # it informs its children after its end
                 now.discard(node)
             case _:
                 pass

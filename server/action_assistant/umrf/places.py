@@ -46,11 +46,7 @@ def moved(told: Told, steps: Steps) -> Told:
             path = origin(origins, path)
         return replace(where, path=path)
 
-    match told:
-        case Problem():
-            return replace(told, where=lead(told.where))
-        case Note():
-            return replace(told, where=lead(told.where), also=tuple(map(lead, told.also)))
+    return replace(told, where=lead(told.where), also=tuple(map(lead, told.also)))
 
 
 def located(
@@ -58,8 +54,7 @@ def located(
 ) -> tuple[list[Problem], tuple[Note, ...]]:
     """Problems and notes that have pointers of this text, with lines and columns; of what is not
     there the place is what it would be in. Without a text they stay as they are."""
-    every = [problem.where for problem in problems]
-    every += [where for note in notes for where in (note.where, *note.also)]
+    every = [where for told in (*problems, *notes) for where in (told.where, *told.also)]
     if not text or not every:
         return list(problems), tuple(notes)
     places = places_of(text, {where.path for where in every})
@@ -68,10 +63,7 @@ def located(
         place = places[where.path]
         return replace(where, path=place.path, line=place.line, column=place.column)
 
-    return (
-        [replace(problem, where=find(problem.where)) for problem in problems],
-        tuple(
-            replace(note, where=find(note.where), also=tuple(map(find, note.also)))
-            for note in notes
-        ),
-    )
+    def all_found(told: Told) -> Told:
+        return replace(told, where=find(told.where), also=tuple(map(find, told.also)))
+
+    return [all_found(problem) for problem in problems], tuple(all_found(note) for note in notes)

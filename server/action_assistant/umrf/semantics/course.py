@@ -158,4 +158,3 @@ def stuck(net: Network, waiting: Mask, ended: State, last: int) -> Outcome:
     )
     inputs = bool(net.wants[net.exit] & ~ended.has)
     return Outcome("stuck", waiting=waiting, lacking=lacking, inputs=inputs, last=last)
-

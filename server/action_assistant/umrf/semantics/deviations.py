@@ -19,6 +19,7 @@ from action_assistant.umrf.semantics.network import Mask
 #: Differences that are remembered with what came of them.
 _FEW: Final = 8
 
+
 class Tied(Exception):
     """Two actions end at one moment, in an order that is known to the engine only."""
 
@@ -258,7 +259,9 @@ class _Way:
             if not lively >> place & 1:
                 self._drop(place)
         if not self.apart:
-            return self._joined(course.outcome, self.forgotten | course.outcome.waiting & ~self.dropped)
+            return self._joined(
+                course.outcome, self.forgotten | course.outcome.waiting & ~self.dropped
+            )
         return self._as_before(after)
 
     def _behind(self, place: int) -> Mask:
@@ -307,7 +310,9 @@ class _Way:
 
     def _quiet(self, after: int) -> Outcome:
         """Nothing is left to happen."""
-        return stuck(self.net, self._waiting(after), self._state(self.net.exit, after), self._last())
+        return stuck(
+            self.net, self._waiting(after), self._state(self.net.exit, after), self._last()
+        )
 
     def _came_alone(self, place: int, known: Outcome, after: int) -> Outcome:
         """What is not behind the one that runs stays as it is."""
