@@ -130,3 +130,33 @@ def test_a_body_in_crumbs_is_refused(tmp_path: Path) -> None:
         )
         (one,) = crowd(stack, port, 1, head + b"1\r\nx\r\n" * 1000)
         assert one.recv(100).startswith(b"HTTP/1.1 411")
+
+
+CUT_OFF = b"POST /api/session HTTP/1.1\r\nhost: localhost\r\ncontent-length: 50\r\n\r\n{"
+UPGRADE = (
+    b"GET /api/live HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\n"
+    b"connection: Upgrade\r\nupgrade: websocket\r\nsec-websocket-version: 13\r\n"
+    b"sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+) % TOKEN.encode()
+NO_TEXT = b"\x81\x82\0\0\0\0\xff\xff"
+
+
+def test_what_a_peer_does_not_finish_or_spells_wrongly_is_no_failure_of_ours(
+    tmp_path: Path,
+) -> None:
+    """Each would write a traceback of dozens of lines, as often as anybody likes."""
+    with process("runner", tmp_path) as port, ExitStack() as stack:
+        (one,) = crowd(stack, port, 1, CUT_OFF)
+        time.sleep(0.3)
+        one.close()
+        (two,) = crowd(stack, port, 1, UPGRADE)
+        assert two.recv(100).startswith(b"HTTP/1.1 101")
+        two.send(NO_TEXT)
+        while two.recv(4096):
+            pass
+        httpx.get(f"http://127.0.0.1:{port}/healthz", trust_env=False)
+        time.sleep(0.3)
+        log = (tmp_path / "log").read_text()
+    assert "Invalid UTF-8" in log
+    assert "Traceback" not in log
+    assert "ended early" in log

@@ -19,7 +19,7 @@ from litestar.enums import ScopeType
 from litestar.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from action_assistant.errors import CannotStart
+from action_assistant.errors import BadInput, CannotStart
 from action_assistant.public import Network
 from action_assistant.settings import EVERYWHERE
 from action_assistant.web.access import KNOWN
@@ -37,6 +37,7 @@ _CALLS: Final = frozenset({"http", "websocket"})
 _RECEIVED: Final[ContextVar[tuple[float, float]]] = ContextVar("received", default=(0.0, 0.0))
 _FAILED: Final = 3  # exit code when the application could not be set up
 _BODY_S: Final = 30.0  # between two pieces of a body
+_ENDED_EARLY: Final = "The body ended early."
 _LENGTH_REQUIRED: Final = (
     b"HTTP/1.1 411 Length Required\r\ncontent-type: text/plain; charset=utf-8\r\n"
     b"connection: close\r\ncontent-length: 21\r\n\r\nA body has a length.\n"
@@ -89,6 +90,7 @@ def serve(
     )
     if identity is not None:
         identity.keep(config)
+    logging.getLogger("uvicorn.error").addFilter(_in_one_line)
     server = _Server(config, endings, connections)
     _end_with_parent(server)
     server.run(sockets=sockets)
@@ -190,7 +192,7 @@ class Watched:
             await self._app(scope, receive, send)
             return
         peer: Any = scope.get("client")
-        whole = scope["type"] == ScopeType.WEBSOCKET
+        whole = scope["type"] == ScopeType.WEBSOCKET or not _has_body(scope)
 
         async def received() -> Any:
             nonlocal whole
@@ -201,7 +203,9 @@ class Watched:
                     message: Any = await receive()
             except TimeoutError:
                 self._connections.drop(peer)
-                return {"type": "http.disconnect"}
+                raise BadInput(_ENDED_EARLY) from None
+            if message["type"] == "http.disconnect":
+                raise BadInput(_ENDED_EARLY)
             whole = not message.get("more_body", False)
             return message
 
@@ -213,6 +217,11 @@ class Watched:
         with self._connections.answering(peer and tuple(peer)) as known:
             scope.setdefault("state", {})[KNOWN] = known
             await self._app(scope, received, sent)
+
+
+def _has_body(scope: Scope) -> bool:
+    """Whether a body was announced."""
+    return any(name == b"content-length" and value != b"0" for name, value in scope["headers"])
 
 
 def _own_share() -> tuple[bytes, bytes]:
@@ -294,6 +303,14 @@ class _Server(uvicorn.Server):
         self._endings.begin()
         self._connections.close()
         await super().shutdown(sockets)
+
+
+def _in_one_line(record: logging.LogRecord) -> bool:
+    """A filter: what peers send wrongly is told, without our stack."""
+    if "Invalid UTF-8" in record.msg:
+        record.exc_info = None
+        record.levelno, record.levelname = logging.WARNING, "WARNING"
+    return True
 
 
 def bound(host: str, port: int) -> list[socket.socket]:

@@ -53,7 +53,8 @@ def _response(details: ProblemDetails, headers: dict[str, str] | None = None) ->
     )
 
 
-def _refused(_: Request[Any, Any, Any], error: Refused) -> Response[bytes]:
+def _refused(request: Request[Any, Any, Any], error: Refused) -> Response[bytes]:
+    log.info("refused %s: %s", request.scope["path"], error.detail)
     return _response(
         ProblemDetails(error.type, error.title, error.status, error.detail, error.where)
     )
