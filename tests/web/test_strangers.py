@@ -132,12 +132,15 @@ def test_a_body_in_crumbs_is_refused(tmp_path: Path) -> None:
         assert one.recv(100).startswith(b"HTTP/1.1 411")
 
 
-CUT_OFF = b"POST /api/session HTTP/1.1\r\nhost: localhost\r\ncontent-length: 50\r\n\r\n{"
+CUT_OFF = (
+    b"POST /api/session HTTP/1.1\r\nhost: localhost\r\norigin: http://localhost:%d\r\n"
+    b"content-type: application/json\r\ncontent-length: 50\r\n\r\n{"
+)
 UPGRADE = (
-    b"GET /api/live HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\n"
+    b"GET /api/graphs/%b/room HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\n"
     b"connection: Upgrade\r\nupgrade: websocket\r\nsec-websocket-version: 13\r\n"
     b"sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-) % TOKEN.encode()
+)
 NO_TEXT = b"\x81\x82\0\0\0\0\xff\xff"
 
 
@@ -145,11 +148,14 @@ def test_what_a_peer_does_not_finish_or_spells_wrongly_is_no_failure_of_ours(
     tmp_path: Path,
 ) -> None:
     """Each would write a traceback of dozens of lines, as often as anybody likes."""
-    with process("runner", tmp_path) as port, ExitStack() as stack:
-        (one,) = crowd(stack, port, 1, CUT_OFF)
+    with process("editor", tmp_path) as port, ExitStack() as stack:
+        url = f"http://127.0.0.1:{port}/api/graphs"
+        made = httpx.post(url, json={"name": "g"}, headers=BEARER, trust_env=False).json()
+        (one,) = crowd(stack, port, 1, CUT_OFF % port)
         time.sleep(0.3)
         one.close()
-        (two,) = crowd(stack, port, 1, UPGRADE)
+        upgrade = UPGRADE % (made["id"].encode(), TOKEN.encode())
+        (two,) = crowd(stack, port, 1, upgrade)
         assert two.recv(100).startswith(b"HTTP/1.1 101")
         two.send(NO_TEXT)
         while two.recv(4096):
