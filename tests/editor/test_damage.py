@@ -10,7 +10,7 @@ import pytest
 from pycrdt import Doc, Map
 
 from action_assistant.editor import wire
-from action_assistant.editor.replica import load
+from action_assistant.editor.loading import load
 from action_assistant.editor.rooms import Rooms
 from action_assistant.errors import Conflict
 from action_assistant.journal.events import Draft, nothing

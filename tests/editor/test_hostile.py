@@ -8,8 +8,9 @@ import pytest
 from pycrdt import Array, Doc, Map
 
 from action_assistant.editor import wire
+from action_assistant.editor.loading import load
 from action_assistant.editor.nesting import DEEPEST_TYPES
-from action_assistant.editor.replica import WAITING_UPDATES, Foreign, Replica, load
+from action_assistant.editor.replica import WAITING_UPDATES, Foreign, Replica
 from action_assistant.editor.rooms import Rooms
 from action_assistant.editor.scan import outline
 from action_assistant.editor.wire import Malformed

@@ -18,7 +18,7 @@ from pycrdt import Doc, Map
 from wsproto.utilities import LocalProtocolError
 
 from action_assistant.editor import wire
-from action_assistant.editor.replica import load
+from action_assistant.editor.loading import load
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
 from editor.mortal import NOWHERE, POINTS, Pipe

@@ -9,8 +9,9 @@ import pytest
 from pycrdt import Doc, Map
 
 from action_assistant.editor import replica, wire
+from action_assistant.editor.loading import load
 from action_assistant.editor.member import WAITING_FRAMES
-from action_assistant.editor.replica import Replica, load
+from action_assistant.editor.replica import Replica
 from action_assistant.editor.room import Room
 from action_assistant.editor.rooms import Rooms
 from action_assistant.errors import BadInput, Unavailable
@@ -206,17 +207,21 @@ async def test_a_newcomer_gets_what_waits_too(rooms: Rooms) -> None:
         assert ada.things == {"b": "2"}
 
 
-async def test_no_snapshot_is_made_of_a_document_that_waits(journal: Journal, rooms: Rooms) -> None:
+async def test_a_snapshot_is_made_of_a_document_that_waits_and_of_what_waits(
+    journal: Journal, rooms: Rooms
+) -> None:
     one, two = updates(("a", "1"), ("a", None))
     async with rooms.enter(STREAM) as room:
         await room.submit(two, "x")
         await room.rest(lambda: True)
-        assert await journal.snapshot(STREAM) is None
-        await room.submit(one, "x")
-        await room.rest(lambda: True)
         kept = await journal.snapshot(STREAM)
         assert kept is not None
-        assert kept.seq == 2
+        assert kept.seq == 1
+        await room.submit(one, "x")
+        loaded = await load(journal, STREAM)
+        assert (loaded.kept, loaded.seq, loaded.replica.waiting) == (1, 2, ())
+        assert loaded.replica.doc.get("things", type=Map).to_py() == {}
+        loaded.replica.close()
 
 
 async def test_a_snapshot_is_made_every_thousand_events_and_changes_nothing(

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from pycrdt import Doc, Map
 
 from action_assistant.editor.happenings import DEFERRED, UPDATED
-from action_assistant.editor.replica import Brought, Replica, clocks, load
+from action_assistant.editor.loading import load
+from action_assistant.editor.replica import Brought, Replica, clocks
 from action_assistant.editor.rooms import Rooms
 from action_assistant.journal.journal import Journal
 from editor.client import Client, settle

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pycrdt import Map
+from pycrdt import Doc, Map
 
-from action_assistant.editor.replica import Loaded, load
+from action_assistant.editor.loading import Loaded, load
 from action_assistant.editor.rooms import Rooms
+from action_assistant.errors import BadInput
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
 from editor.client import Client, settle
@@ -106,3 +107,65 @@ async def test_whatever_became_of_the_snapshot_the_document_is_the_same(
     assert before == [(before[0][0],)]
     assert 0 < before[0][0] < replayed.seq
     assert held(found) == held(replayed) == held(whole)
+
+
+def later_edits(count: int) -> list[bytes]:
+    """So many updates of one client, each of which waits for the one before it."""
+    doc, made = Doc[Any](), list[bytes]()
+    subscription = doc.observe(lambda event: made.append(event.update))
+    for n in range(count):
+        doc.get("things", type=Map)[f"late {n}"] = n
+    doc.unobserve(subscription)
+    return made
+
+
+async def test_what_waits_for_ever_does_not_stop_snapshots(tmp_path: Path) -> None:
+    first, second, third = later_edits(3)
+    path = f"sqlite:///{tmp_path / 'editor.db'}"
+    journal = await Journal.open(path, branch="editor", fold=nothing)
+    rooms = Rooms(journal, linger=60, window=0)
+    async with rooms.enter("graph/g") as room:
+        await room.submit(third, "late")
+        await room.submit(second, "late")
+        for update in later_edits(30):
+            await room.submit(update, "ada")
+        newest = room.seq
+    await rooms.close()
+    kept = await journal.snapshot("graph/g")
+    assert kept is not None
+    assert kept.seq == newest
+    loaded = await load(journal, "graph/g")
+    assert loaded.kept == newest
+    assert set(loaded.replica.waiting) == {second, third}
+    loaded.replica.close()
+    rooms = Rooms(journal, linger=60, window=0)
+    async with rooms.enter("graph/g") as room:
+        await room.submit(first, "late")
+        replica = await room.quiet()
+        shown = replica.doc.get("things", type=Map).to_py() or {}
+        assert {key for key in shown if key.startswith("late")} >= {"late 0", "late 1", "late 2"}
+        assert replica.waiting == ()
+        assert replica.owners[min(replica.owners)] in {"late", "ada"}
+    await rooms.close()
+    events = await journal.read("graph/g")
+    assert [second, third] == sorted([e.body for e in events[:2]], key=[second, third].index)
+    await journal.close()
+
+
+async def test_who_waits_for_something_is_still_its_author_after_a_snapshot(
+    tmp_path: Path,
+) -> None:
+    first, second = later_edits(2)
+    path = f"sqlite:///{tmp_path / 'editor.db'}"
+    journal = await Journal.open(path, branch="editor", fold=nothing)
+    rooms = Rooms(journal, linger=60, window=0)
+    async with rooms.enter("graph/g") as room:
+        await room.submit(second, "late")
+    await rooms.close()
+    assert await journal.snapshot("graph/g") is not None
+    rooms = Rooms(journal, linger=60, window=0)
+    async with rooms.enter("graph/g") as room:
+        with pytest.raises(BadInput, match="somebody else"):
+            await room.submit(first, "eve")
+    await rooms.close()
+    await journal.close()

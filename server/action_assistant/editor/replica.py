@@ -5,10 +5,8 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from enum import Enum
-from typing import Any, Final
+from typing import Any, Final, Literal
 
-import anyio
-import anyio.lowlevel
 import msgspec
 from pycrdt import Doc, get_update
 
@@ -16,11 +14,8 @@ from action_assistant.editor.fullness import Fullness
 from action_assistant.editor.happenings import DEFERRED, UPDATED
 from action_assistant.editor.nesting import Nesting
 from action_assistant.editor.scan import Outline, outline
-from action_assistant.editor.tail import Damaged, Tail
 from action_assistant.editor.wire import NOTHING_NEW, Malformed, Reader
-from action_assistant.errors import Unavailable
-from action_assistant.journal.events import Event, Snapshot
-from action_assistant.journal.journal import Journal
+from action_assistant.journal.events import Event
 
 log: Final = logging.getLogger(__name__)
 
@@ -68,15 +63,20 @@ class Replica:
         self._subscription = self.doc.observe(self._observed)
 
     def take(
-        self, update: bytes, author: str, holder: Callable[[int], str | None] = lambda _: None
+        self,
+        update: bytes,
+        author: str,
+        holder: Callable[[int], str | None] = lambda _: None,
+        read: Outline | None = None,
     ) -> Brought:
-        """Apply an update. `holder` may know whose a client is that has written nothing yet.
+        """Apply an update. `holder` may know whose a client is that has written nothing yet; `read`
+        is its outline, where that is known.
 
         Raises Malformed, Foreign, Full, TooMuchWaits, Panicked; the document is then as before.
         """
         if update in self._waiting:
             return Brought.NOTHING
-        read = outline(update)
+        read = read or outline(update)
         new = {client for client, _, end in read.brings if end > self._known.get(client, 0)}
         for client in new:
             if (self.owners.get(client) or holder(client) or author) != author:
@@ -103,12 +103,13 @@ class Replica:
                 self._apply(*(event.body for event in group))
                 self._known = clocks(self.doc.get_state())
 
-    def begin(self, state: bytes, owners: dict[int, str], nesting: Nesting) -> None:
+    def begin(self, kept: "Kept") -> None:
         """Take up where a snapshot was made. Raises Malformed, Panicked."""
-        self._apply(state)
-        self._fullness.took(len(state))
-        self.owners, self.nesting = owners, nesting
+        self._apply(kept.state)
+        self._fullness.took(len(kept.state))
+        self.owners, self.nesting = kept.owners, Nesting(kept.spans)
         self._known = clocks(self.doc.get_state())
+        self._waiting = {update: (outline(update), author) for update, author in kept.waiting}
 
     def _replay_one_by_one(self, events: list[Event]) -> None:
         together: list[bytes] = []
@@ -150,6 +151,10 @@ class Replica:
         """Updates that waited and do not any more, since this was asked last."""
         released, self._released = self._released, []
         return released
+
+    def held_back(self) -> list[tuple[bytes, str]]:
+        """Updates that wait for earlier ones, and who wrote them, in the order in which they came."""
+        return [(update, author) for update, (_, author) in self._waiting.items()]
 
     @property
     def waiting(self) -> tuple[bytes, ...]:
@@ -228,97 +233,56 @@ def _guarded() -> Iterator[None]:
 
 
 class Kept(msgspec.Struct, frozen=True, array_like=True):
-    """What a snapshot keeps of a document that holds nothing pending."""
+    """What a snapshot keeps of a document, and of what waits beside it, with who wrote that.
 
-    version: int
+    `form` was the number 1 before waiting updates were kept: who only knows that form does not take
+    a newer one for theirs.
+    """
+
+    form: Literal["with what waits"] | int
     owners: dict[int, str]
     spans: dict[int, list[tuple[int, int, int]]]
     state: bytes
+    waiting: list[tuple[bytes, str]] = []
 
     @classmethod
     def of(cls, replica: Replica) -> bytes:
         """As bytes."""
         state = replica.doc.get_update()
-        return msgspec.msgpack.encode(cls(1, replica.owners, replica.nesting.spans, state))
+        spans, waiting = replica.nesting.spans, replica.held_back()
+        return msgspec.msgpack.encode(cls("with what waits", replica.owners, spans, state, waiting))
 
     @classmethod
     def replica(cls, kept: bytes) -> Replica | None:
         """The document again; None when these bytes are none of ours."""
-        try:
-            found = msgspec.msgpack.decode(kept, type=cls)
-        except (msgspec.DecodeError, UnicodeDecodeError):
+        found = cls._read(kept)
+        if found is None:
             return None
         replica = Replica()
         try:
-            replica.begin(found.state, found.owners, Nesting(found.spans))
+            replica.begin(found)
         except (Malformed, Panicked):
             replica.close()
             return None
         return replica
 
+    @classmethod
+    def is_form_of(cls, kept: bytes) -> bool:
+        """Whether these bytes look like a snapshot of ours."""
+        return cls._read(kept) is not None
 
-class Loaded(msgspec.Struct, frozen=True):
-    """A document read from the log, at `seq`. `kept` is the seq of the snapshot it began from.
+    @classmethod
+    def state_of(cls, kept: bytes) -> bytes:
+        """The document alone, as one update; nothing new for what is no snapshot."""
+        found = cls._read(kept)
+        return NOTHING_NEW if found is None else found.state
 
-    `damaged`: the log goes on, and this is why the document does not.
-    """
-
-    replica: Replica
-    seq: int
-    kept: int
-    damaged: Damaged | None = None
-
-
-async def load(
-    journal: Journal, stream: str, upto: int | None = None, *, learn: bool | None = None
-) -> Loaded:
-    """The document of a stream, now or after its event `upto`: snapshot and tail, in slices.
-
-    `learn`: what only editing needs; by default for a document as it is now. Raises Unavailable.
-    """
-    learn = upto is None if learn is None else learn
-    snapshot = await _snapshot(journal, stream)
-    replica = None
-    if snapshot is not None and (upto is None or snapshot.seq <= upto):
-        replica = Kept.replica(snapshot.state)
-    start = snapshot.seq if snapshot is not None and replica is not None else 0
-    replica = replica or Replica()
-    tail = Tail(journal, stream, start, upto)
-    while events := await tail.next():
+    @classmethod
+    def _read(cls, kept: bytes) -> "Kept | None":
         try:
-            replica.replay(events, learn=learn)
-        except (Malformed, Panicked):
-            replica.close()
-            bad = await _first_bad(journal, stream, events)
-            good = await load(journal, stream, bad.seq - 1, learn=learn)
-            return msgspec.structs.replace(good, damaged=bad)
-        await anyio.lowlevel.checkpoint()
-    replica.released()
-    return Loaded(replica, tail.seq, start, tail.damaged)
-
-
-async def _snapshot(journal: Journal, stream: str) -> Snapshot | None:
-    """The snapshot; none where it cannot even be read, since the log says all that it could."""
-    try:
-        return await journal.snapshot(stream)
-    except Unavailable as error:
-        log.warning("%s: no use of the snapshot: %s", stream, error.detail)
-        return None
-
-
-async def _first_bad(journal: Journal, stream: str, events: Sequence[Event]) -> Damaged:
-    """Which of these events, that stand as they were written, cannot be applied."""
-    loaded = await load(journal, stream, events[0].seq - 1, learn=True)
-    try:
-        for event in events:
-            try:
-                loaded.replica.replay([event])
-            except (Malformed, Panicked) as error:
-                log.error("%s %d cannot be applied: %s", stream, event.seq, error)
-                return Damaged(event.seq, str(error))
-    finally:
-        loaded.replica.close()
-    raise Unavailable(f"{stream} reads otherwise each time.")
+            return msgspec.msgpack.decode(kept, type=cls)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            return None
 
 
 def clocks(state: bytes) -> dict[int, int]:

@@ -24,17 +24,16 @@ from action_assistant.editor.batch import (
 )
 from action_assistant.editor.fullness import Full
 from action_assistant.editor.happenings import DEFERRED, UPDATED
+from action_assistant.editor.loading import Loaded, load
 from action_assistant.editor.member import Member
 from action_assistant.editor.presence import Attendance, News
 from action_assistant.editor.replica import (
     Brought,
     Foreign,
     Kept,
-    Loaded,
     Panicked,
     Replica,
     TooMuchWaits,
-    load,
 )
 from action_assistant.editor.sameness import Fingerprint, fingerprint
 from action_assistant.editor.window import Window
@@ -42,12 +41,15 @@ from action_assistant.editor.wire import Entry, Malformed
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
+from action_assistant.web.access import done_for_nobody
+from action_assistant.web.workers import Aside, here
 
 log: Final = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
 SNAPSHOT_EVERY: Final = 1000  # events
+SNAPSHOT_BYTES: Final = 16 << 20  # of events
 _CLOSING: Final = "This graph is being closed; try again."
 
 
@@ -62,6 +64,7 @@ class Room:
         gone: Callable[["Room"], None],
         window: Window,
         moments: Window,
+        aside: Aside = here,
     ) -> None:
         self.stream: Final = stream
         self.seq = loaded.seq
@@ -74,6 +77,8 @@ class Room:
         self._gone = gone
         self._window = window
         self._moments = moments
+        self._aside = aside
+        self._unkept = 0  # bytes of updates since the last snapshot
         self._naming = False
         self._said: dict[int, tuple[Entry, Member]] = {}  # in this window, about themselves
         self.divergences = 0
@@ -205,6 +210,7 @@ class Room:
     async def _run(self) -> None:
         """Batch after batch. Whatever goes wrong closes the room; its log opens the next one."""
         reason: Refused = Unavailable(_CLOSING)
+        done_for_nobody()  # whoever came first may leave
         try:
             while True:
                 await self._news.wait()
@@ -228,6 +234,7 @@ class Room:
         if taken.news:
             drafts = [Draft(kind, offer.author, offer.update) for offer, kind in taken.news]
             self.seq = await self._journal.append(self.stream, drafts, expected=self.seq)
+            self._unkept += sum(len(draft.body) for draft in drafts)
         self._in_hand = []
         self._tell(taken)
         if taken.panicked:
@@ -238,7 +245,7 @@ class Room:
             self._compare(compare)
         for look in taken.looks:
             self._show(look)
-        if self.seq - self._kept >= SNAPSHOT_EVERY:
+        if self.seq - self._kept >= SNAPSHOT_EVERY or self._unkept >= SNAPSHOT_BYTES:
             await self._keep_snapshot()
         if not taken.news:
             await asyncio.sleep(0)  # nothing was awaited; others want a turn
@@ -359,19 +366,19 @@ class Room:
 
     async def _reload(self) -> None:
         self._replica.close()
-        loaded = await load(self._journal, self.stream)
+        loaded = await load(self._journal, self.stream, aside=self._aside)
         self._replica, self.seq, self._kept = loaded.replica, loaded.seq, loaded.kept
 
     async def _keep_snapshot(self) -> None:
-        """Cache the document. Not while something waits: no state that it gives out has that."""
-        if self._kept == self.seq or self._replica.waiting or self.damaged is not None:
+        """Cache the document, and what waits beside it: that may be for ever."""
+        if self._kept == self.seq or self.damaged is not None:
             return
         seq, state = self.seq, Kept.of(self._replica)
         try:
             await self._journal.keep_snapshot(self.stream, seq, state)
         except Refused as error:
             log.warning("%s: no snapshot: %s", self.stream, error.detail)
-        self._kept = seq
+        self._kept, self._unkept = seq, 0
 
     def _end(self, reason: Refused) -> None:
         """Nobody is told anything that is not stored; everyone may come again."""

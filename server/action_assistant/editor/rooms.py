@@ -6,11 +6,13 @@ from contextlib import asynccontextmanager
 from typing import Final
 
 from action_assistant.editor import wire
-from action_assistant.editor.replica import load
+from action_assistant.editor.loading import load
 from action_assistant.editor.room import Room
 from action_assistant.editor.window import LENGTH, Window
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
+from action_assistant.web.access import done_for_person
+from action_assistant.web.workers import Aside, here
 
 LINGER: Final = 5.0  # seconds that a room stays after the last one left
 _TICK: Final = 2.0  # seconds
@@ -19,10 +21,18 @@ _SILENCE: Final = 10.0  # seconds without a word after which a socket hears a be
 
 
 class Rooms:
-    """The rooms of this process, by stream."""
+    """The rooms of this process, by stream. What depends on the size of a document is done `aside`."""
 
-    def __init__(self, journal: Journal, *, linger: float = LINGER, window: float = LENGTH) -> None:
+    def __init__(
+        self,
+        journal: Journal,
+        *,
+        linger: float = LINGER,
+        window: float = LENGTH,
+        aside: Aside = here,
+    ) -> None:
         self._journal = journal
+        self._aside = aside
         self._window = Window(window)
         self._moments = Window(_MOMENTS * window)
         self._linger = linger
@@ -101,10 +111,17 @@ class Rooms:
         return await asyncio.shield(loading)  # others may wait for it too
 
     async def _load(self, stream: str) -> Room:
+        done_for_person()  # others may wait for it too, when whoever came first has left
         try:
-            loaded = await load(self._journal, stream)
+            loaded = await load(self._journal, stream, aside=self._aside)
             room = self._rooms[stream] = Room(
-                stream, self._journal, loaded, self._forget, self._window, self._moments
+                stream,
+                self._journal,
+                loaded,
+                self._forget,
+                self._window,
+                self._moments,
+                self._aside,
             )
             return room
         finally:

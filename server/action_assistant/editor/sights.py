@@ -8,7 +8,7 @@ import msgspec
 from action_assistant.editor import document
 from action_assistant.editor.document import Maps
 from action_assistant.editor.happenings import graph_stream
-from action_assistant.editor.replica import load
+from action_assistant.editor.loading import load
 from action_assistant.editor.rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal

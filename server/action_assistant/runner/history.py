@@ -1,7 +1,7 @@
 """Runs as the journal tells them: what is over, and what an earlier process left."""
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Any, Protocol, TypeAlias, TypeVar
+from typing import Any, Protocol, TypeAlias
 
 import msgspec
 from sqlalchemy import Row, Select
@@ -11,8 +11,9 @@ from action_assistant.journal.events import Event
 from action_assistant.runner.events import ModifyRequested, Requested, RunEvent, decode
 from action_assistant.runner.recorder import Store, stream_of
 from action_assistant.runner.runs import Run, replay
+from action_assistant.web.workers import Aside
 
-T = TypeVar("T")
+__all__ = ["Aside", "History", "Ledger", "Past"]
 
 
 class Ledger(Store, Protocol):
@@ -20,15 +21,6 @@ class Ledger(Store, Protocol):
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
         """Rows of the tables. Raises Unavailable."""
-        ...
-
-
-class Aside(Protocol):
-    """A way to do work that takes long without holding up a Stop: in another process, so that it is
-    a function of a module, and what it is given and returns are values."""
-
-    def __call__(self, work: Callable[..., T], /, *args: Any) -> Awaitable[T]:
-        """The outcome of `work(*args)`."""
         ...
 
 

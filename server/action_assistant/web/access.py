@@ -127,6 +127,12 @@ def caller() -> Caller | None:
     return _CALLER.get()
 
 
+def done_for_person() -> None:
+    """From here on this task goes on also when the connection ends that it was begun for."""
+    asking = _CALLER.get()
+    _CALLER.set(None if asking is None else Caller(asking.person))
+
+
 def done_for_nobody() -> None:
     """From here on this task, and those that it begins, go on for themselves."""
     _CALLER.set(None)

@@ -15,12 +15,12 @@ import pickle
 import resource
 import signal
 import threading
-from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Protocol, TypeVar
 
 import anyio
 from anyio import CapacityLimiter, to_thread
@@ -40,6 +40,20 @@ _ALL_WAITING: Final = 256
 _START_S: Final = 30.0
 
 _context: Final = multiprocessing.get_context("forkserver")
+
+
+class Aside(Protocol):
+    """A way to do work that takes long without holding up a Stop, or other people: in another
+    process, so that it is a function of a module, and what it is given and returns are values."""
+
+    def __call__(self, work: Callable[..., T], /, *args: Any) -> Awaitable[T]:
+        """The outcome of `work(*args)`."""
+        ...
+
+
+async def here(work: Callable[..., T], /, *args: Any) -> T:
+    """No way aside: the work is done at once, in this process."""
+    return work(*args)
 
 
 class Crashed(Unavailable):
