@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from action_assistant.editor import wire
 from action_assistant.editor.app import open_house
+from action_assistant.editor.contents import labels_of
 from action_assistant.editor.happenings import graph_stream
-from action_assistant.editor.sights import labels_of
 from action_assistant.settings import EditorSettings
 from action_assistant.umrf.model import Graph
 from editor.client import Client

@@ -16,6 +16,7 @@ from action_assistant.editor import happenings as h
 from action_assistant.editor.api import about, drawing, graphs, invitations, room, versions
 from action_assistant.editor.house import Door, House
 from action_assistant.editor.people import People
+from action_assistant.editor.workers import Workers
 from action_assistant.errors import BadInput
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
@@ -28,6 +29,9 @@ from action_assistant.web.signed_in import SignedInBrowsers
 
 log: Final = logging.getLogger(__name__)
 
+#: Bytes of a body, but where a route says that it takes files.
+SMALL: Final = 100_000
+
 
 @asynccontextmanager
 async def open_house(
@@ -38,8 +42,12 @@ async def open_house(
     journal = await Journal.open(settings.database, branch="editor", fold=h.fold)
     try:
         new = await journal.position() == 0
-        async with epochs.living_in(journal, settings.data) as epoch:
-            house = House(settings, journal, await People.known(journal), epoch, revoked)
+        async with (
+            Workers.opened() as workers,
+            epochs.living_in(journal, settings.data) as epoch,
+        ):
+            people = await People.known(journal)
+            house = House(settings, journal, people, epoch, revoked, workers)
             try:
                 async with house.invitations.opened():
                     if new:
@@ -108,6 +116,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         page=places.page(),
         runner_port=settings.runner_port,
         mount=settings.reached.public.path if settings.reached.public is not None else "",
+        body_limit=SMALL,
     )
 
 

@@ -11,9 +11,11 @@ from action_assistant.editor import wire
 from action_assistant.editor.fullness import Full
 from action_assistant.editor.member import Member
 from action_assistant.editor.replica import Foreign, Panicked, Replica, TooMuchWaits
+from action_assistant.editor.trial import TooSlow
 from action_assistant.editor.wire import Malformed
 from action_assistant.errors import BadInput, Refused, TooLarge
 
+LARGE: Final = 8 * 1024  # bytes of an update that is tried on a copy first, and by itself
 _BATCH: Final = 200  # items of one commit
 _BATCH_BYTES: Final = 512 * 1024
 _MERGED: Final = 50  # updates merged at once; merging more costs their square
@@ -72,7 +74,7 @@ class NotAllowed(Exception):
 
 
 #: Why an edit was not taken.
-Objection: TypeAlias = Malformed | Foreign | Full | TooMuchWaits | Panicked | NotAllowed
+Objection: TypeAlias = Malformed | Foreign | Full | TooMuchWaits | Panicked | NotAllowed | TooSlow
 
 
 def refuse(offer: Offer, error: Objection) -> None:
@@ -98,18 +100,24 @@ def _answer(error: Objection) -> tuple[int, Refused, str | None]:
             return wire.FULL, TooLarge(f"The graph is full: {error}."), str(error)
         case TooMuchWaits():
             return wire.TOO_BIG, TooLarge("Too much waits for what never came."), None
+        case TooSlow():
+            return wire.TOO_BIG, TooLarge(f"{error}."), str(error)
         case NotAllowed():
             return wire.FORBIDDEN, BadInput("Not allowed."), None
 
 
-def batch_of(items: list[Item]) -> tuple[list[Item], list[Item]]:
-    """What one commit takes, and the rest. Small enough for readers that keep up."""
+def batch_of(items: list[Item], *, one: bool = False) -> tuple[list[Item], list[Item]]:
+    """What one commit takes, and the rest. Small enough for readers that keep up; a large update is
+    alone; with `one` each is."""
     size = count = 0
-    for item in items[:_BATCH]:
-        size += len(item.update) if isinstance(item, Offer) else 0
-        if count and size > _BATCH_BYTES:
+    for item in items[: 1 if one else _BATCH]:
+        own = len(item.update) if isinstance(item, Offer) else 0
+        size += own
+        if count and (size > _BATCH_BYTES or own > LARGE):
             break
         count += 1
+        if own > LARGE:
+            break
     return items[:count], items[count:]
 
 

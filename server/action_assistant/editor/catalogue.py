@@ -6,21 +6,20 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row, Select, select
 
-from action_assistant.editor import edits
+from action_assistant.editor import edits, importing
 from action_assistant.editor import happenings as h
+from action_assistant.editor.contents import About, Counts, about_graph
 from action_assistant.editor.document import new_aid
-from action_assistant.editor.fullness import MOST_ACTIONS
 from action_assistant.editor.rooms import Rooms
-from action_assistant.editor.sights import Counts, Sights
-from action_assistant.errors import BadInput, NotFound, NotUmrf, TooLarge
+from action_assistant.editor.sights import Sights
+from action_assistant.errors import BadInput, NotFound
 from action_assistant.journal import tables
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
-from action_assistant.umrf import codec
-from action_assistant.umrf.action_files import ACTION_DIALECTS
 from action_assistant.umrf.check import check
-from action_assistant.umrf.model import Graph, Note, Problem
+from action_assistant.umrf.model import Graph
 from action_assistant.web.keys import Author
+from action_assistant.web.workers import Aside, here
 
 NAME_LIMIT: Final = 200  # characters
 DESCRIPTION_LIMIT: Final = 10_000
@@ -48,31 +47,6 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     damaged: int | None = None
 
 
-class Reading(msgspec.Struct, frozen=True):
-    """What was found in an imported file: its dialect, what was translated, what is wrong.
-
-    `remarks` are the notes with their places; all places are in the file as it was sent.
-    """
-
-    dialect: str
-    notes: tuple[str, ...]
-    problems: tuple[Problem, ...]
-    remarks: tuple[Note, ...] = ()
-
-
-class Preview(msgspec.Struct, frozen=True):
-    """What a file would become. `problems`: those of the file, then those of the graph. `remarks`
-    are the notes with their places; all places are in the file as it was sent.
-    """
-
-    dialect: str
-    notes: tuple[str, ...]
-    problems: tuple[Problem, ...]
-    name: str
-    actions: int
-    remarks: tuple[Note, ...] = ()
-
-
 class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """An empty graph."""
 
@@ -83,8 +57,9 @@ class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Catalogue:
     """All graphs. Raises NotFound for those that are none, or deleted."""
 
-    def __init__(self, journal: Journal, rooms: Rooms, sights: Sights) -> None:
+    def __init__(self, journal: Journal, rooms: Rooms, sights: Sights, aside: Aside = here) -> None:
         self._journal = journal
+        self._aside = aside
         self._rooms = rooms
         self._sights = sights
 
@@ -104,8 +79,9 @@ class Catalogue:
         views = [await self._view(row) for row in rows]
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
 
-    async def create(self, body: bytes, author: str) -> tuple[GraphView, Reading | None]:
-        """A graph from a UMRF file, or an empty one from an object with a name only.
+    async def create(self, body: bytes, author: str) -> tuple[GraphView, bytes | None]:
+        """A graph from a UMRF file, or an empty one from an object with a name only; with JSON of a
+        `Reading` in the first case.
 
         Raises BadInput, NotUmrf, TooLarge with the place; then nothing is stored.
         """
@@ -116,19 +92,20 @@ class Catalogue:
         name, description = _fit(wanted.name, wanted.description)
         graph = Graph(name=name, description=description)
         made = h.draft(h.CREATED, author, h.Created(name, description))
-        return await self._add(graph, [made], author), None
+        about = about_graph(graph, check(graph))
+        return await self._add(edits.first(graph), about, [made], author), None
 
-    async def bring(self, body: bytes, author: str) -> tuple[GraphView, Reading]:
+    async def bring(self, body: bytes, author: str) -> tuple[GraphView, bytes]:
         """A graph from a UMRF file. The log keeps the file as it came."""
-        reading = read_graph(body)
-        graph = reading.graph
+        found = await self._aside(importing.brought, body)
+        about = found.about
         made = h.draft(
             h.CREATED,
             author,
-            h.Created(graph.name, graph.description, reading.dialect, reading.notes),
+            h.Created(about.name, about.description, found.dialect, found.notes),
         )
-        view = await self._add(graph, [made, Draft(h.IMPORTED, author, body)], author)
-        return view, Reading(reading.dialect, reading.notes, reading.problems, reading.remarks)
+        drafts = [made, Draft(h.IMPORTED, author, body)]
+        return await self._add(found.update, about, drafts, author), found.reading
 
     async def describe(
         self, graph: str, author: str, *, name: str | None, description: str | None
@@ -145,6 +122,7 @@ class Catalogue:
                 author,
                 name=None if name is None else new_name,
                 description=None if description is None else new_description,
+                aside=self._aside,
             )
             return await self.get(graph)
 
@@ -161,17 +139,16 @@ class Catalogue:
             await self._journal.append(h.about_stream(graph), [h.draft(h.RECOVERED, author)])
         return await self.get(graph)
 
-    async def _add(self, graph: Graph, about: list[Draft], author: str) -> GraphView:
+    async def _add(self, update: bytes, of: About, about: list[Draft], author: str) -> GraphView:
         made = new_aid()
-        if len(graph.actions) > MOST_ACTIONS:
-            raise TooLarge(f"A graph may have {MOST_ACTIONS:,} actions; here are more.")
-        document = Draft(h.UPDATED, author, edits.first(graph))
+        document = Draft(h.UPDATED, author, update)
         await self._journal.append_all(
             [
                 Addition(h.about_stream(made), tuple(about)),
                 Addition(h.graph_stream(made), (document,)),
             ]
         )
+        self._sights.made(made, update, of)
         return await self.get(made)
 
     async def _row(self, graph: str, *, deleted: bool = False) -> Row[Any]:
@@ -203,52 +180,6 @@ class Catalogue:
             deleted_at=None if row.deleted_at is None else h.when(row.deleted_at),
             damaged=summary.damaged,
         )
-
-
-def read_graph(body: bytes) -> codec.Reading:
-    """The UMRF file of a graph. Raises BadInput, NotUmrf, TooLarge with the place in the text."""
-    reading = read(body)
-    if reading.dialect in ACTION_DIALECTS:
-        raise NotUmrf(
-            f"This is the file of one action, {reading.graph.name or 'without a name'}, and not of a "
-            "graph. To draw with the action, open a graph and paste the text of the file there; "
-            "“action-assistant convert” makes a graph of this action alone.",
-            where={"code": "action-file", "line": 1, "column": 1},
-        )
-    return reading
-
-
-def read(body: bytes) -> codec.Reading:
-    """A UMRF file, of a graph or of one action. Raises BadInput, NotUmrf, TooLarge with the place in the text."""
-    try:
-        return codec.read(body)
-    except codec.Unreadable as error:
-        where: dict[str, object] = {
-            key: value
-            for key, value in (
-                ("path", error.path),
-                ("line", error.line),
-                ("column", error.column),
-                ("code", error.code),
-            )
-            if value not in {None, ""}
-        }
-        kind = {"not-umrf": NotUmrf, "too-large": TooLarge}.get(error.code, BadInput)
-        raise kind(error.message, where=where) from error
-
-
-def preview(body: bytes) -> Preview:
-    """What importing a file would make. Raises as `read` does."""
-    reading = read_graph(body)
-    graph = reading.graph
-    return Preview(
-        reading.dialect,
-        reading.notes,
-        (*reading.problems, *reading.placed(check(graph))),
-        graph.name,
-        sum(not action.missing for action in graph.actions),
-        reading.remarks,
-    )
 
 
 def _rows() -> Select[Any]:

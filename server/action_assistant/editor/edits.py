@@ -7,10 +7,12 @@ from msgspec.structs import replace
 from pycrdt import Doc, merge_updates
 
 from action_assistant.editor import document
+from action_assistant.editor.contents import maps_of
 from action_assistant.editor.document import Maps
 from action_assistant.editor.room import Room
 from action_assistant.editor.wire import NOTHING_NEW
 from action_assistant.umrf.model import Graph
+from action_assistant.web.workers import Aside, here
 
 
 def difference(state: bytes, edit: Callable[[Doc[Any]], None]) -> bytes:
@@ -33,9 +35,25 @@ def first(graph: Graph) -> bytes:
     return difference(b"", lambda doc: document.fill(doc, graph))
 
 
-async def rename(room: Room, author: str, *, name: str | None, description: str | None) -> int:
+async def rename(
+    room: Room, author: str, *, name: str | None, description: str | None, aside: Aside = here
+) -> int:
     """Give the graph another name or description; the seq."""
     state = await room.look(lambda replica, _: replica.doc.get_update())
+    return await room.submit(await aside(renaming, state, name, description), author)
+
+
+async def restore(room: Room, author: str, then: bytes, *, aside: Aside = here) -> int:
+    """Make the graph what it was in this document, as an ordinary edit that can be undone; the seq.
+
+    What people said about it stays.
+    """
+    state = await room.look(lambda replica, _: replica.doc.get_update())
+    return await room.submit(await aside(restoring, state, then), author)
+
+
+def renaming(state: bytes, name: str | None, description: str | None) -> bytes:
+    """The update that gives another name or description. For workers."""
 
     def edit(doc: Doc[Any]) -> None:
         maps = document.maps_of(doc)
@@ -47,21 +65,17 @@ async def rename(room: Room, author: str, *, name: str | None, description: str 
         )
         document.change(doc, changed(maps, old, new))
 
-    return await room.submit(difference(state, edit), author)
+    return difference(state, edit)
 
 
-async def restore(room: Room, author: str, then: Maps) -> int:
-    """Make the graph what it was, as an ordinary edit that can be undone; the seq.
-
-    What people said about it stays.
-    """
-    state = await room.look(lambda replica, _: replica.doc.get_update())
+def restoring(state: bytes, then: bytes) -> bytes:
+    """The update that goes back to another document. For workers."""
 
     def edit(doc: Doc[Any]) -> None:
         comments = document.maps_of(doc)["comments"]
-        document.change(doc, {**then, "comments": comments})
+        document.change(doc, {**maps_of(then), "comments": comments})
 
-    return await room.submit(difference(state, edit), author)
+    return difference(state, edit)
 
 
 def changed(maps: Maps, old: Graph, new: Graph) -> Maps:

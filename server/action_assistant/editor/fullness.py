@@ -5,15 +5,68 @@ since could have reached them: counting is slow. Deletions are always taken, so 
 be made smaller. What is brought back after it was deleted is not counted as new; the bytes bound it.
 """
 
+from collections import Counter
 from typing import Any, Final
 
 from pycrdt import Doc, Map
 
 from action_assistant.editor.scan import Outline
+from action_assistant.errors import TooLarge
+from action_assistant.umrf.model import ENTRY, EXIT, Graph
 
 MOST_ACTIONS: Final = 5_000
 MOST_BYTES: Final = 32 << 20
 _WORTH: Final = 1 << 20  # bytes added since, for which measuring again is worth its time
+
+
+#: Keys of the shared maps that a graph may come with: each is a struct of its first update.
+MOST_FIELDS: Final = 200_000
+MOST_ARROWS: Final = 20_000
+#: Arrows of one action on one side: as many as there can be others.
+MOST_AT_ONE: Final = MOST_ACTIONS
+
+
+def refuse_too_much(graph: Graph, dialect: str) -> None:
+    """Refuse a graph that a document may not hold. Raises TooLarge with the place."""
+    actions = "/umrf_actions" if dialect in {"D1", "D1'"} else "/actions"
+    real = [action for action in graph.actions if not action.missing]
+    if len(graph.actions) > MOST_ACTIONS:
+        ghosts = len(graph.actions) - len(real)
+        told = f", {ghosts:,} of them only named by arrows" if ghosts else ""
+        raise TooLarge(
+            f"A graph may have {MOST_ACTIONS:,} actions; this one has {len(graph.actions):,}{told}.",
+            where={"path": actions},
+        )
+    if len(graph.relations) > MOST_ARROWS:
+        raise TooLarge(
+            f"A graph may have {MOST_ARROWS:,} arrows; this one has {len(graph.relations):,}.",
+            where={"path": actions},
+        )
+    places = {action.key: f"{actions}/{n}" for n, action in enumerate(real)}
+    for side, ends in (
+        ("children", Counter(relation.parent for relation in graph.relations)),
+        ("parents", Counter(relation.child for relation in graph.relations)),
+    ):
+        for key, count in ends.items():
+            if count > MOST_AT_ONE:
+                end = {ENTRY: "/graph_entry", EXIT: "/graph_exit"}
+                place = end.get(key) or f"{places.get(key, actions)}/{side}"
+                raise TooLarge(
+                    f"An action may have {MOST_AT_ONE:,} {side}; here are {count:,}.",
+                    where={"path": place},
+                )
+
+
+def refuse_too_long(update: bytes, fields: int) -> None:
+    """Refuse the first update of a document that no room would take. Raises TooLarge."""
+    if fields > MOST_FIELDS:
+        raise TooLarge(
+            f"A graph may have {MOST_FIELDS:,} fields, parameters and arrows together; this one has "
+            f"{fields:,}.",
+            where={"path": ""},
+        )
+    if len(update) > MOST_BYTES:
+        raise TooLarge(f"A graph may have {MOST_BYTES >> 20} MiB.", where={"path": ""})
 
 
 class Full(Exception):

@@ -9,6 +9,7 @@ from action_assistant.editor.people import People
 from action_assistant.editor.rooms import Rooms
 from action_assistant.editor.sights import Sights
 from action_assistant.editor.versions import Versions
+from action_assistant.editor.workers import Workers
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
 from action_assistant.web.crowd import Crowd
@@ -26,16 +27,18 @@ class House:
         people: People,
         epoch: str,
         revoked: Revoked,
+        workers: Workers,
     ) -> None:
         self.settings = settings
         self.journal = journal
         self.epoch = epoch
         self.people = people
-        self.rooms = Rooms(journal)
+        self.workers = workers
+        self.rooms = Rooms(journal, aside=workers.graphs, tried=workers.edits)
         self.crowd = Crowd(limits=settings.limits)
         self.budget = Budget(limits=settings.limits)
-        self.sights = Sights(journal, self.rooms)
-        self.catalogue = Catalogue(journal, self.rooms, self.sights)
+        self.sights = Sights(journal, self.rooms, workers.graphs)
+        self.catalogue = Catalogue(journal, self.rooms, self.sights, workers.files)
         self.versions = Versions(journal, self.sights)
         self.library = Library(journal, self.sights)
         self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)

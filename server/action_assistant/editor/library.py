@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable
 from datetime import datetime
-from typing import Any
 
 import msgspec
 from sqlalchemy import select
 
 from action_assistant.editor import happenings as h
+from action_assistant.editor.contents import Sight, read
 from action_assistant.editor.sights import Sights
 from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
@@ -43,17 +43,25 @@ class Known(msgspec.Struct, frozen=True):
     first_seen: datetime
 
 
+class Use(msgspec.Struct, frozen=True):
+    """A graph that uses actions, and when it was made, in microseconds."""
+
+    graph: str
+    made_at: int
+
+
 class Library:
     """Reads a graph again only when it has changed."""
 
     def __init__(self, journal: Journal, sights: Sights) -> None:
         self._journal = journal
         self._sights = sights
-        self._read: dict[str, tuple[int, tuple[Action, ...]]] = {}
-        self._shown: tuple[dict[str, int], list[Known]] = {}, []
+        self._read: dict[str, tuple[int, bytes]] = {}
+        self._shown: tuple[dict[str, int], bytes] = {}, b"[]"
 
-    async def all(self) -> list[Known]:
-        """Every action that a graph uses, by name. Graphs that cannot be read are left out."""
+    async def all(self) -> bytes:
+        """Every action that a graph uses, by name: JSON of a list of `Known`. Graphs that cannot be
+        read are left out."""
         graph, event = tables.graph, tables.editor_event
         last = (
             select(event.c.seq)
@@ -77,26 +85,33 @@ class Library:
         if self._shown[0] != seqs:
             self._read = {row.id: self._read[row.id] for row in rows}
             newest_first = sorted(rows, key=lambda row: row.at, reverse=True)
-            self._shown = seqs, self._merged(newest_first)
+            uses = [(Use(row.id, row.made_at), self._read[row.id][1]) for row in newest_first]
+            self._shown = seqs, await self._sights.ask(merged, uses)
         return self._shown[1]
 
     async def _refresh(self, graph: str, seq: int) -> None:
         known = self._read.get(graph)
         if known is None or known[0] < seq:
-            moment = await self._sights.now(graph)
-            self._read[graph] = moment.seq, _distinct(moment.graph)
-
-    def _merged(self, rows: Iterable[Any]) -> list[Known]:
-        """`rows`: graphs, the last changed first."""
-        uses: dict[str, list[tuple[Any, Action]]] = {}
-        for row in rows:
-            for action in self._read[row.id][1]:
-                uses.setdefault(action.name, []).append((row, action))
-        return [_known(name, uses[name]) for name in sorted(uses)]
+            sight = await self._sights.now(graph)
+            self._read[graph] = sight.seq, await self._sights.ask(used, sight)
 
 
-def _known(name: str, uses: list[tuple[Any, Action]]) -> Known:
-    by_age = sorted({(row.made_at, row.id) for row, _ in uses})
+def used(sight: Sight) -> bytes:
+    """The actions of a graph that differ in what a library says of them. For workers."""
+    return msgspec.msgpack.encode(_distinct(read(sight).moment.graph))
+
+
+def merged(graphs: list[tuple[Use, bytes]]) -> bytes:
+    """JSON of what several graphs know, the last changed first. For workers."""
+    uses: dict[str, list[tuple[Use, Action]]] = {}
+    for graph, actions in graphs:
+        for action in msgspec.msgpack.decode(actions, type=tuple[Action, ...]):
+            uses.setdefault(action.name, []).append((graph, action))
+    return msgspec.json.encode([_known(name, uses[name]) for name in sorted(uses)])
+
+
+def _known(name: str, uses: list[tuple[Use, Action]]) -> Known:
+    by_age = sorted({(use.made_at, use.graph) for use, _ in uses})
     actions = [action for _, action in uses]
     return Known(
         name=name,

@@ -10,6 +10,8 @@ from action_assistant.web.keys import Author
 
 WAITING_FRAMES: Final = 256
 WAITING_BYTES: Final = 1 << 20
+_FREE: Final = 0.1  # seconds of work that nobody waits for
+_SHARE: Final = 4.0  # a socket keeps the editor busy for a fifth of the time, at most
 _UNHANDLED_EDITS: Final = 256  # that a socket may have sent ahead of the room
 
 
@@ -33,6 +35,7 @@ class Member:
         self.synced = False  # has been sent the document
         self.refused = False  # nothing more is taken from it
         self.said: str | None = None  # why, where the close code does not tell enough
+        self._spent = 0.0  # seconds of everybody that edits of this socket took
         self.handled = 0  # edits of this socket that the room has dealt with
         self._heard = 0  # edits that the socket brought
         self._frames: list[bytes] = []
@@ -125,6 +128,17 @@ class Member:
     def heard_edit(self) -> None:
         """The socket brought an edit."""
         self._heard += 1
+
+    def cost(self, seconds: float) -> None:
+        """An edit of this socket held the room up for so long."""
+        self._spent += seconds
+
+    def toll(self) -> float:
+        """Seconds to wait before more of this socket is read, so that others get their share."""
+        if self._spent < _FREE:
+            return 0.0
+        wait, self._spent = _SHARE * self._spent, 0.0
+        return wait
 
     def edit_handled(self) -> None:
         """The room has dealt with the next edit of this socket, for good."""

@@ -1,19 +1,17 @@
 """Rehearsals: what a graph would do, played by the engine's rules, and recorded nowhere."""
 
-import asyncio
 from typing import Any, Final, Literal
 
 import msgspec
 
-from action_assistant.errors import BadInput, Conflict, TooMany
+from action_assistant.editor.contents import Sight, read
+from action_assistant.errors import BadInput, Conflict
 from action_assistant.umrf import codec, semantics
 from action_assistant.umrf.check import refused_by_parser
 from action_assistant.umrf.model import Graph
 
 EVENTS: Final = 4_000  # of one rehearsal; the page shows no more
 HOUR_MS: Final = 3_600_000.0
-_AT_ONCE: Final = 2  # each holds the interpreter for some milliseconds at a time
-_WAITING: Final = 16
 _SCRIPT_LIMIT: Final = 500  # behaviours
 
 
@@ -42,28 +40,17 @@ class Rehearsal(msgspec.Struct, frozen=True):
     cut: bool
 
 
-class Stage:
-    """Plays graphs beside the event loop, a few at a time."""
+def rehearsed(sight: Sight, wanted: Rehearsing) -> bytes:
+    """Play a graph to its end, or as far as limits let it: JSON of a `Rehearsal`. For workers.
 
-    def __init__(self) -> None:
-        self._turns = asyncio.Semaphore(_AT_ONCE)
-        self._waiting = 0
-
-    async def play(self, seq: int, graph: Graph, wanted: Rehearsing) -> Rehearsal:
-        """Play a graph to its end, or as far as limits let it. Raises BadInput, Conflict, TooMany."""
-        script = _script(wanted.script)
-        if not 0 < wanted.for_ms <= 24 * HOUR_MS:
-            raise BadInput("A rehearsal lasts up to a day.", where={"path": "/for_ms"})
-        if len(wanted.commands) > 100:
-            raise BadInput("A rehearsal takes up to 100 commands.", where={"path": "/commands"})
-        if self._waiting >= _WAITING:
-            raise TooMany("Too many rehearsals wait already; try again in a moment.")
-        self._waiting += 1
-        try:
-            async with self._turns:
-                return await asyncio.to_thread(_played, seq, graph, script, wanted)
-        finally:
-            self._waiting -= 1
+    Raises BadInput, Conflict.
+    """
+    script = _script(wanted.script)
+    if not 0 < wanted.for_ms <= 24 * HOUR_MS:
+        raise BadInput("A rehearsal lasts up to a day.", where={"path": "/for_ms"})
+    if len(wanted.commands) > 100:
+        raise BadInput("A rehearsal takes up to 100 commands.", where={"path": "/commands"})
+    return msgspec.json.encode(_played(sight.seq, read(sight).moment.graph, script, wanted))
 
 
 def _script(value: Any) -> semantics.Script:

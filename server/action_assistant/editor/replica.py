@@ -152,6 +152,27 @@ class Replica:
         released, self._released = self._released, []
         return released
 
+    def freed_by(self, read: Outline) -> list[bytes]:
+        """What waits and would not wait any more, had this been applied."""
+        known = dict(self._known)
+        freed: dict[bytes, None] = {}
+        news = [read] if read.ready(known) else []
+        while news:
+            for each in news:
+                for client, _, end in each.brings:
+                    known[client] = max(end, known.get(client, 0))
+            ready = {
+                u: w for u, (w, _) in self._waiting.items() if u not in freed and w.ready(known)
+            }
+            freed.update(dict.fromkeys(ready))
+            news = list(ready.values())
+        return list(freed)
+
+    @property
+    def waiting_bytes(self) -> int:
+        """How much waits."""
+        return sum(map(len, self._waiting))
+
     def held_back(self) -> list[tuple[bytes, str]]:
         """Updates that wait for earlier ones, and who wrote them, in the order in which they came."""
         return [(update, author) for update, (_, author) in self._waiting.items()]
@@ -190,7 +211,7 @@ class Replica:
     def _apply(self, *updates: bytes) -> None:
         if not updates:
             return
-        with _guarded(), self.doc.transaction():
+        with applying(), self.doc.transaction():
             for update in updates:
                 self.doc.apply_update(update)
 
@@ -199,14 +220,14 @@ class Replica:
         if update == NOTHING_NEW:
             return True
         outline(update)
-        with _guarded():
+        with applying():
             return bool(get_update(update, self.doc.get_state()) == NOTHING_NEW)
 
     def lacking(self, state: bytes) -> bytes:
         """What somebody with this state vector lacks. Raises Malformed, Panicked."""
         if Reader(state).number() * 2 > len(state):
             raise Malformed("more clients than bytes")
-        with _guarded():
+        with applying():
             return self.doc.get_update(state)
 
     def close(self) -> None:
@@ -220,7 +241,7 @@ class Replica:
 
 
 @contextmanager
-def _guarded() -> Iterator[None]:
+def applying() -> Iterator[None]:
     """Around a call of the CRDT library with foreign bytes, and nothing else."""
     try:
         yield

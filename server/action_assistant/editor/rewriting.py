@@ -14,10 +14,10 @@ import msgspec
 from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
 
-from action_assistant.editor import catalogue, document
+from action_assistant.editor import document, importing
+from action_assistant.editor.contents import Moment, Sight, read
 from action_assistant.editor.document import Maps
 from action_assistant.editor.document_values import ends_of, is_aid, number
-from action_assistant.editor.sights import Moment
 from action_assistant.errors import NotUmrf
 from action_assistant.umrf import codec
 from action_assistant.umrf.check import check
@@ -47,6 +47,12 @@ class Rewriting(msgspec.Struct, frozen=True):
     problems: tuple[Problem, ...]
 
 
+def rewritten(sight: Sight, text: bytes) -> bytes:
+    """What an edited text changes, as JSON of a `Rewriting`. For workers. Raises as `rewriting`."""
+    found = read(sight)
+    return msgspec.json.encode(rewriting(found.moment, text, found.problems))
+
+
 def rewriting(moment: Moment, text: bytes, known: Iterable[Problem] = ()) -> Rewriting:
     """What `text`, edited from the canonical text of `moment`, changes. `known`: the problems that
     the graph has already.
@@ -54,7 +60,7 @@ def rewriting(moment: Moment, text: bytes, known: Iterable[Problem] = ()) -> Rew
     Raises BadInput, NotUmrf, TooLarge with the place; nothing is stored either way.
     """
     shown = codec.read(codec.write(moment.graph))
-    wanted = catalogue.read(text)
+    wanted = importing.read(text)
     _refuse(shown, wanted)
     old = _under_keys(shown.graph, _keys_of(moment.graph, shown.graph))
     new = _under_keys(wanted.graph, _aligned(old, wanted.graph))

@@ -6,11 +6,13 @@ batch: apply, append, commit, and only then tell anyone.
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable, Sequence
 from typing import Final, TypeVar
 
-from action_assistant.editor import document, wire
+from action_assistant.editor import wire
 from action_assistant.editor.batch import (
+    LARGE,
     Ask,
     Compare,
     Item,
@@ -22,6 +24,7 @@ from action_assistant.editor.batch import (
     merged,
     refuse,
 )
+from action_assistant.editor.contents import shown
 from action_assistant.editor.fullness import Full
 from action_assistant.editor.happenings import DEFERRED, UPDATED
 from action_assistant.editor.loading import Loaded, load
@@ -35,7 +38,9 @@ from action_assistant.editor.replica import (
     Replica,
     TooMuchWaits,
 )
-from action_assistant.editor.sameness import Fingerprint, fingerprint
+from action_assistant.editor.sameness import Fingerprint
+from action_assistant.editor.scan import Outline, outline
+from action_assistant.editor.trial import TooSlow, tried_for
 from action_assistant.editor.window import Window
 from action_assistant.editor.wire import Entry, Malformed
 from action_assistant.errors import Conflict, Refused, Unavailable
@@ -65,6 +70,7 @@ class Room:
         window: Window,
         moments: Window,
         aside: Aside = here,
+        tried: Aside = here,
     ) -> None:
         self.stream: Final = stream
         self.seq = loaded.seq
@@ -78,11 +84,14 @@ class Room:
         self._window = window
         self._moments = moments
         self._aside = aside
+        self._tried = tried
         self._unkept = 0  # bytes of updates since the last snapshot
         self._naming = False
         self._said: dict[int, tuple[Entry, Member]] = {}  # in this window, about themselves
         self.divergences = 0
         self._fingerprint: tuple[int, Fingerprint] | None = None
+        self._compares: list[Compare] = []
+        self._comparing: asyncio.Task[None] | None = None
         self._waiting: list[Item] = []
         self._in_hand: list[Item] = []
         self._ended = False
@@ -228,9 +237,14 @@ class Room:
             self._end(reason)
 
     async def _handle(self) -> None:
-        batch, self._waiting = batch_of(self._waiting)
+        much_waits = self._replica.waiting_bytes > LARGE
+        batch, self._waiting = batch_of(self._waiting, one=much_waits)
         self._in_hand = batch
-        taken = self._take(batch)
+        match batch:
+            case [Offer(update) as offer] if much_waits or len(update) > LARGE:
+                taken = await self._take_large(offer)
+            case _:
+                taken = self._take(batch)
         if taken.news:
             drafts = [Draft(kind, offer.author, offer.update) for offer, kind in taken.news]
             self.seq = await self._journal.append(self.stream, drafts, expected=self.seq)
@@ -268,15 +282,46 @@ class Room:
                 break
         return taken
 
-    def _take_in(self, offer: Offer, taken: Taken) -> None:
-        """Apply one edit, or refuse it."""
+    async def _take_large(self, offer: Offer) -> Taken:
+        """Apply one edit that was tried on a copy first: how long an update takes cannot be told from
+        its size, and some end the process."""
+        taken = Taken()
+        member = offer.member
         try:
-            brought = self._brought(offer)
+            read = None
+            if member is None or (member.edits and not member.refused):
+                read = await self._tried_first(offer)
+        except (Malformed, TooSlow, Panicked) as error:
+            log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
+            refuse(offer, error)
+            return taken
+        self._take_in(offer, taken, read)
+        return taken
+
+    async def _tried_first(self, offer: Offer) -> Outline:
+        """Its outline. Raises Malformed, Panicked, TooSlow."""
+        large = len(offer.update) > LARGE
+        read = None if large else outline(offer.update)
+        released = [] if read is None else self._replica.freed_by(read)
+        if read is not None and sum(map(len, released)) <= LARGE:
+            return read
+        state = self._replica.doc.get_update()
+        waiting = released or self._replica.waiting
+        return await tried_for(offer.author, self._tried, state, offer.update, waiting)
+
+    def _take_in(self, offer: Offer, taken: Taken, read: Outline | None = None) -> None:
+        """Apply one edit, or refuse it."""
+        begun = time.perf_counter()
+        try:
+            brought = self._brought(offer, read)
         except (Malformed, Foreign, Full, TooMuchWaits, Panicked, NotAllowed) as error:
             log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
             taken.panicked = isinstance(error, Panicked)
             refuse(offer, error)
             return
+        finally:
+            if offer.member is not None:
+                offer.member.cost(time.perf_counter() - begun)
         if brought is None:
             return
         taken.handled.append(offer)
@@ -288,7 +333,7 @@ class Room:
             taken.shown += [offer.update, *released]
             taken.for_all = taken.for_all or bool(released)
 
-    def _brought(self, offer: Offer) -> Brought | None:
+    def _brought(self, offer: Offer, read: Outline | None) -> Brought | None:
         """Apply one edit; None when it was refused, or comes from a socket that was."""
         member = offer.member
         if member is not None and member.refused:
@@ -297,7 +342,7 @@ class Room:
             if not self._replica.adds_nothing(offer.update):
                 raise NotAllowed
             return Brought.NOTHING
-        return self._replica.take(offer.update, offer.author, self.attendance.holder)
+        return self._replica.take(offer.update, offer.author, self.attendance.holder, read)
 
     # --- telling --------------------------------------------------------------------------------
 
@@ -344,15 +389,42 @@ class Room:
         said = compare.shown
         if said.seq != self.seq:
             return
-        if self._fingerprint is None or self._fingerprint[0] != self.seq:
-            self._fingerprint = self.seq, fingerprint(document.maps_of(self._replica.doc))
-        found = self._fingerprint[1]
+        self._compares.append(compare)
+        if self._comparing is None:
+            self._comparing = asyncio.create_task(self._compare_all())
+
+    async def _compare_all(self) -> None:
+        """What a document shows is looked at aside: that takes a second for a large one."""
+        try:
+            while self._compares:
+                found = await self._shown()
+                asked, self._compares = self._compares, []
+                for compare in asked:
+                    if compare.shown.seq == found[0]:
+                        self._say_whether_same(compare, found[1])
+        except Refused as error:
+            log.warning("%s: nothing was compared: %s", self.stream, error.detail)
+            self._compares = []
+        finally:
+            self._comparing = None
+
+    async def _shown(self) -> tuple[int, Fingerprint]:
+        """What is shown, and at which seq. Nothing is on its way meanwhile that was not there."""
+        replica = await self.quiet()
+        seq = self.seq
+        if self._fingerprint is None or self._fingerprint[0] != seq:
+            state = replica.doc.get_update()
+            self._fingerprint = seq, await self._aside(shown, state)
+        return self._fingerprint
+
+    def _say_whether_same(self, compare: Compare, found: Fingerprint) -> None:
+        said = compare.shown
         if (said.entries, said.total) != (found.entries, found.total):
             self.divergences += 1
             log.error(
-                "%s: %s shows something else at %d", self.stream, compare.member.person.id, self.seq
+                "%s: %s shows something else at %d", self.stream, compare.member.person.id, said.seq
             )
-        compare.member.post(wire.compared(self.seq, found.entries, found.total))
+        compare.member.post(wire.compared(said.seq, found.entries, found.total))
 
     def _show(self, look: Look) -> None:
         if look.done.done():  # nobody waits any more
@@ -391,6 +463,8 @@ class Room:
             ):
                 item.done.set_exception(reason)
         self._waiting = []
+        if self._comparing is not None:
+            self._comparing.cancel()
         self._quiet.set()
         for member in self.members:
             member.close(wire.RESTARTING)

@@ -21,7 +21,8 @@ _SILENCE: Final = 10.0  # seconds without a word after which a socket hears a be
 
 
 class Rooms:
-    """The rooms of this process, by stream. What depends on the size of a document is done `aside`."""
+    """The rooms of this process, by stream. What depends on the size of a document is done `aside`;
+    large updates are `tried` in another process before a room takes them."""
 
     def __init__(
         self,
@@ -30,9 +31,11 @@ class Rooms:
         linger: float = LINGER,
         window: float = LENGTH,
         aside: Aside = here,
+        tried: Aside = here,
     ) -> None:
         self._journal = journal
         self._aside = aside
+        self._tried = tried
         self._window = Window(window)
         self._moments = Window(_MOMENTS * window)
         self._linger = linger
@@ -122,6 +125,7 @@ class Rooms:
                 self._window,
                 self._moments,
                 self._aside,
+                self._tried,
             )
             return room
         finally:

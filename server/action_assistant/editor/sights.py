@@ -1,42 +1,25 @@
-"""Graphs as they are or were: read from rooms and from the log, checked, remembered for a while."""
+"""Graphs as they are or were: found in rooms and in the log, asked about aside, remembered for a while."""
 
 from collections import OrderedDict
-from typing import Final, Generic, TypeVar
+from collections.abc import Callable
+from typing import Any, Final, Generic, TypeVar
 
 import msgspec
 
-from action_assistant.editor import document
-from action_assistant.editor.document import Maps
+from action_assistant.editor import contents
+from action_assistant.editor.contents import About, Counts, Sight
 from action_assistant.editor.happenings import graph_stream
-from action_assistant.editor.loading import load
+from action_assistant.editor.loading import stored
+from action_assistant.editor.replica import Kept
 from action_assistant.editor.rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.umrf.check import check_written
-from action_assistant.umrf.jsontext import parse_small
-from action_assistant.umrf.model import Graph, Problem
+from action_assistant.web.workers import Aside, here
 
 T = TypeVar("T")
 
 _REMEMBERED: Final = 32  # moments of graphs
 _COUNTED: Final = 5000
-_LABELS: Final = 20  # of one graph
-_LABEL: Final = 60  # characters
-
-
-class Moment(msgspec.Struct, frozen=True):
-    """A graph at one seq of its log."""
-
-    seq: int
-    maps: Maps
-    graph: Graph
-
-
-class Counts(msgspec.Struct, frozen=True):
-    """How many problems of each severity."""
-
-    error: int
-    warning: int
 
 
 class Summary(msgspec.Struct, frozen=True):
@@ -55,14 +38,15 @@ class Summary(msgspec.Struct, frozen=True):
 class Sights:
     """Reads graphs. Nothing that it remembers is needed; it only saves reading again."""
 
-    def __init__(self, journal: Journal, rooms: Rooms) -> None:
+    def __init__(self, journal: Journal, rooms: Rooms, aside: Aside = here) -> None:
         self._journal = journal
         self._rooms = rooms
-        self._moments = _Recent[tuple[str, int], Moment](_REMEMBERED)
-        self._problems = _Recent[tuple[str, int], list[Problem]](_REMEMBERED)
+        self._aside = aside
+        self._sights = _Recent[tuple[str, int], Sight](_REMEMBERED)
+        self._problems = _Recent[tuple[str, int], bytes](_REMEMBERED)
         self._summaries = _Recent[str, Summary](_COUNTED)
 
-    async def now(self, graph: str) -> Moment:
+    async def now(self, graph: str) -> Sight:
         """The graph as it is; of one whose history is damaged, what can be read of it.
 
         Raises Unavailable, NotFound.
@@ -70,17 +54,17 @@ class Sights:
         room = self._rooms.open_room(graph_stream(graph))
         if room is None:
             newest = await self._newest(graph)
-            return self._moments.get((graph, newest)) or await self._loaded(graph, newest)
+            return self._sights.get((graph, newest)) or await self._loaded(graph, newest)
         found = await room.look(
             lambda replica, seq: (
-                self._moments.get((graph, seq)) or _moment(seq, document.maps_of(replica.doc))
+                self._sights.get((graph, seq)) or Sight(graph, seq, replica.doc.get_update())
             )
         )
-        return self._moments.put((graph, found.seq), found)
+        return self._sights.put((graph, found.seq), found)
 
-    async def at(self, graph: str, seq: int) -> Moment:
+    async def at(self, graph: str, seq: int) -> Sight:
         """The graph after its change `seq`. Raises NotFound, Conflict, Unavailable."""
-        known = self._moments.get((graph, seq))
+        known = self._sights.get((graph, seq))
         if known is not None and known.seq == seq:
             return known
         room = self._rooms.open_room(graph_stream(graph))
@@ -102,47 +86,43 @@ class Sights:
             )
         return found
 
-    async def _loaded(self, graph: str, seq: int) -> Moment:
+    async def _loaded(self, graph: str, seq: int) -> Sight:
         """The graph after its change `seq`, or after the last one before it that can be read."""
-        loaded = await load(self._journal, graph_stream(graph), upto=seq)
-        try:
-            maps = document.maps_of(loaded.replica.doc)
-        finally:
-            loaded.replica.close()
-        return self._moments.put((graph, seq), _moment(loaded.seq, maps))
+        found = await stored(
+            self._journal, graph_stream(graph), seq, learn=False, aside=self._aside
+        )
+        sight = Sight(graph, found.seq, Kept.state_of(found.document))
+        return self._sights.put((graph, seq), sight)
 
-    async def moment(self, graph: str, seq: int | None) -> Moment:
+    async def moment(self, graph: str, seq: int | None) -> Sight:
         """The graph at `seq`, or as it is."""
         return await (self.now(graph) if seq is None else self.at(graph, seq))
 
-    def problems(self, graph: str, moment: Moment) -> list[Problem]:
-        """What is wrong with a graph at a moment."""
-        found = self._problems.get((graph, moment.seq))
+    async def ask(self, work: Callable[..., T], /, *values: Any) -> T:
+        """The outcome of a function of `contents`, of sights and other values."""
+        return await self._aside(work, *values)
+
+    async def problems(self, sight: Sight) -> bytes:
+        """What is wrong with a graph at a moment, as JSON."""
+        key = sight.graph, sight.seq
+        found = self._problems.get(key)
         if found is None:
-            found = self._problems.put((graph, moment.seq), check_written(moment.graph))
+            found = self._problems.put(key, await self._aside(contents.problems, sight))
         return found
+
+    def made(self, graph: str, state: bytes, about: About) -> None:
+        """A graph has been made of this document, and this is to be said of it."""
+        self._sights.put((graph, 1), Sight(graph, 1, state))
+        self._summaries.put(graph, _summary(1, about))
 
     async def summary(self, graph: str, newest: int) -> Summary:
         """What a list shows of a graph whose last change is `newest`."""
         known = self._summaries.get(graph)
         if known is not None and known.seq >= newest:
             return known
-        moment = await self.now(graph)
-        problems = self.problems(graph, moment)
-        errors = sum(problem.severity == "error" for problem in problems)
-        return self._summaries.put(
-            graph,
-            Summary(
-                moment.seq,
-                moment.graph.name,
-                moment.graph.description,
-                sum(not action.missing for action in moment.graph.actions),
-                Counts(errors, len(problems) - errors),
-                tuple(sorted({action.actor for action in moment.graph.actions} - {""})),
-                labels_of(moment.graph),
-                moment.seq + 1 if moment.seq < newest else None,
-            ),
-        )
+        sight = await self.now(graph)
+        about = await self._aside(contents.about, sight)
+        return self._summaries.put(graph, _summary(sight.seq, about, newest))
 
     async def _newest(self, graph: str) -> int:
         newest = await self._journal.newest(graph_stream(graph))
@@ -151,16 +131,17 @@ class Sights:
         return newest
 
 
-def labels_of(graph: Graph) -> tuple[str, ...]:
-    """What people sort the graph under: `labels` in its `gui_attributes`, which no engine reads."""
-    attributes = parse_small(dict(graph.extra).get("gui_attributes", "null"))
-    labels = attributes.get("labels") if isinstance(attributes, dict) else None
-    texts = [text for text in labels if isinstance(text, str)] if isinstance(labels, list) else []
-    return tuple(dict.fromkeys(text.strip()[:_LABEL] for text in texts if text.strip()))[:_LABELS]
-
-
-def _moment(seq: int, maps: Maps) -> Moment:
-    return Moment(seq, maps, document.read_maps(maps))
+def _summary(seq: int, about: About, newest: int = 0) -> Summary:
+    return Summary(
+        seq,
+        about.name,
+        about.description,
+        about.actions,
+        about.problems,
+        about.robots,
+        about.labels,
+        seq + 1 if seq < newest else None,
+    )
 
 
 K = TypeVar("K")

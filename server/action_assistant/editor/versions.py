@@ -6,6 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row, select
 
+from action_assistant.editor import contents
 from action_assistant.editor import happenings as h
 from action_assistant.editor.document import new_aid
 from action_assistant.editor.sights import Sights
@@ -13,7 +14,6 @@ from action_assistant.errors import BadInput, NotFound
 from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf import codec
-from action_assistant.umrf.digest import digest
 from action_assistant.web.keys import Author
 
 LABEL_LIMIT: Final = 200  # characters
@@ -50,19 +50,20 @@ class Versions:
         label = " ".join(label.split())
         if len(label) > LABEL_LIMIT:
             raise BadInput(f"A label has up to {LABEL_LIMIT} characters.", where={"path": "/label"})
-        moment = await self._sights.moment(graph, seq)
+        sight = await self._sights.moment(graph, seq)
         if not label:
-            for row in await self._rows(graph, moment.seq):
+            for row in await self._rows(graph, sight.seq):
                 return await self.get(row.id), False
         made = new_aid()
         stamp = codec.Stamp(graph=graph, version=made, run=None)
+        digest, text = await self._sights.ask(contents.released, sight, stamp)
         published = h.Published(
             id=made,
             label=label,
-            digest=digest(moment.graph),
-            seq=moment.seq,
+            digest=digest,
+            seq=sight.seq,
             author_name=author.name,
-            umrf=msgspec.Raw(codec.write(moment.graph, stamp).strip().encode()),
+            umrf=msgspec.Raw(text),
         )
         await self._journal.append(
             h.about_stream(graph), [h.draft(h.PUBLISHED, author.id, published)]

@@ -46,7 +46,8 @@ def moved(told: Told, steps: Steps) -> Told:
             path = origin(origins, path)
         return replace(where, path=path)
 
-    return replace(told, where=lead(told.where), also=tuple(map(lead, told.also)))
+    where, also = lead(told.where), tuple(map(lead, told.also))
+    return replace(told, where=where, also=also)
 
 
 def located(
@@ -64,6 +65,7 @@ def located(
         return replace(where, path=place.path, line=place.line, column=place.column)
 
     def all_found(told: Told) -> Told:
-        return replace(told, where=find(told.where), also=tuple(map(find, told.also)))
+        where, also = find(told.where), tuple(map(find, told.also))
+        return replace(told, where=where, also=also)
 
     return [all_found(problem) for problem in problems], tuple(all_found(note) for note in notes)

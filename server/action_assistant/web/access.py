@@ -4,7 +4,8 @@ import asyncio
 import getpass
 import logging
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, Final, NamedTuple
 
@@ -131,6 +132,16 @@ def done_for_person() -> None:
     """From here on this task goes on also when the connection ends that it was begun for."""
     asking = _CALLER.get()
     _CALLER.set(None if asking is None else Caller(asking.person))
+
+
+@contextmanager
+def acting_for(person: str) -> Iterator[None]:
+    """What is asked for inside is asked for by this person."""
+    token = _CALLER.set(Caller(person))
+    try:
+        yield
+    finally:
+        _CALLER.reset(token)
 
 
 def done_for_nobody() -> None:

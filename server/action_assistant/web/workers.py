@@ -6,6 +6,7 @@ threads, and a new one is there within milliseconds. What is asked of them has t
 module, with values that can be pickled.
 """
 
+import asyncio
 import contextlib
 import gc
 import logging
@@ -192,15 +193,15 @@ class Lane:
 @asynccontextmanager
 async def kept_warm(*lanes: Lane) -> AsyncIterator[None]:
     """Workers for these lanes, as long as you are inside. The first ones are made meanwhile."""
-    async with anyio.create_task_group() as tasks:
+    tasks = [asyncio.create_task(_keep_warm(lane)) for lane in lanes]
+    try:
+        yield
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
         for lane in lanes:
-            tasks.start_soon(_keep_warm, lane)
-        try:
-            yield
-        finally:
-            tasks.cancel_scope.cancel()
-            for lane in lanes:
-                lane.close()
+            lane.close()
 
 
 async def _keep_warm(lane: Lane) -> None:

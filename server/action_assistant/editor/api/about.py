@@ -16,6 +16,7 @@ from action_assistant.editor import happenings as h
 from action_assistant.editor.house import Door
 from action_assistant.editor.library import Known
 from action_assistant.editor.presence import colour_of
+from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.version import VERSION
@@ -95,7 +96,8 @@ def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         operation_id="listActions",
     )
     async def list_actions() -> list[Known]:
-        return await door.house.library.all()
+        known: list[Known] = encoded(await door.house.library.all())
+        return known
 
     @get(
         "/api/events",

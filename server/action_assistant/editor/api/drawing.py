@@ -1,35 +1,23 @@
 """Routes that help to draw and keep nothing: UMRF text as pieces to paste, and rehearsals."""
 
-import asyncio
-from typing import Any
+from typing import Any, Final
 
-import msgspec
 from litestar import Request, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor import catalogue, document
+from action_assistant.editor import importing
 from action_assistant.editor.house import Door
-from action_assistant.editor.rehearsal import Rehearsal, Rehearsing, Stage
-from action_assistant.umrf.model import Note
+from action_assistant.editor.importing import Pieces
+from action_assistant.editor.rehearsal import Rehearsal, Rehearsing, rehearsed
+from action_assistant.editor.workers import encoded
 from action_assistant.web.access import Needs
+from action_assistant.web.asgi import BODY_LIMIT
 
-
-class Pieces(msgspec.Struct, frozen=True):
-    """A UMRF text as the keys that a document would hold. `notes`: what was translated; `remarks`
-    are the same with their places in the text."""
-
-    dialect: str
-    notes: tuple[str, ...]
-    name: str
-    actions: dict[str, Any]
-    relations: dict[str, Any]
-    positions: dict[str, Any]
-    remarks: tuple[Note, ...] = ()
+_SCRIPT: Final = 1_000_000  # bytes of a body that says what to play
 
 
 def routes(door: Door) -> list[ControllerRouterHandler]:
     """Everything that only helps to draw."""
-    stage = Stage()
 
     @post(
         "/api/pieces",
@@ -38,9 +26,12 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         "nothing is stored",
         operation_id="readPieces",
         guards=[Needs("see")],
+        request_max_body_size=BODY_LIMIT,
     )
     async def read_pieces(request: Request[Any, Any, Any]) -> Pieces:
-        return await asyncio.to_thread(_pieces, await request.body())
+        found = await door.house.workers.files(importing.pieces, await request.body())
+        pieces: Pieces = encoded(found)
+        return pieces
 
     @post(
         "/api/graphs/{graph_id:str}/rehearsal",
@@ -48,25 +39,13 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         summary="What a graph would do by the engine's rules: its trace; nothing is recorded",
         operation_id="rehearse",
         guards=[Needs("see")],
+        request_max_body_size=_SCRIPT,
     )
     async def rehearse(graph_id: str, data: Rehearsing) -> Rehearsal:
         house = door.house
         await house.catalogue.require(graph_id)
-        moment = await house.sights.moment(graph_id, data.seq)
-        return await stage.play(moment.seq, moment.graph, data)
+        sight = await house.sights.moment(graph_id, data.seq)
+        played: Rehearsal = encoded(await house.workers.files(rehearsed, sight, data))
+        return played
 
     return [read_pieces, rehearse]
-
-
-def _pieces(body: bytes) -> Pieces:
-    reading = catalogue.read(body)
-    maps = document.flatten(document.with_aids(reading.graph))
-    return Pieces(
-        reading.dialect,
-        reading.notes,
-        reading.graph.name,
-        dict(maps["actions"]),
-        dict(maps["relations"]),
-        dict(maps["positions"]),
-        reading.remarks,
-    )

@@ -1,6 +1,5 @@
 """Routes of graphs: the catalogue, what a graph is or was, what is wrong with it, its past."""
 
-import asyncio
 from typing import Annotated, Any
 
 import msgspec
@@ -8,16 +7,18 @@ from litestar import Request, Response, delete, get, patch, post
 from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor import catalogue, edits
+from action_assistant.editor import contents, edits, importing
 from action_assistant.editor import happenings as h
-from action_assistant.editor.catalogue import GraphView, Preview, Reading
+from action_assistant.editor.catalogue import GraphView
 from action_assistant.editor.history import Entry
 from action_assistant.editor.house import Door
-from action_assistant.editor.rewriting import Rewriting, rewriting
-from action_assistant.umrf import codec
-from action_assistant.umrf.difference import Difference, difference
+from action_assistant.editor.importing import Preview, Reading
+from action_assistant.editor.rewriting import Rewriting, rewritten
+from action_assistant.editor.workers import encoded
+from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.model import Problem
 from action_assistant.web.access import Needs, person_of
+from action_assistant.web.asgi import BODY_LIMIT
 
 Asking = Request[Any, Any, Any]
 Seq = Annotated[int, Parameter(ge=1)]
@@ -65,16 +66,18 @@ def _catalogue(door: Door) -> list[ControllerRouterHandler]:
         "with `preview` only say what a file would become, and store nothing",
         operation_id="createGraph",
         guards=[Needs("edit")],
+        request_max_body_size=BODY_LIMIT,
     )
     async def create_graph(
         request: Asking, preview: bool = False
     ) -> Response[MadeGraph] | Response[Preview]:
         if preview:
-            content = await request.body()
-            return Response(await asyncio.to_thread(catalogue.preview, content), status_code=200)
+            found = await door.house.workers.files(importing.preview, await request.body())
+            return Response(encoded(found), status_code=200)
         house, person = door.house, person_of(request)
         await house.people.seen(person)
-        made, reading = await house.catalogue.create(await request.body(), person.id)
+        made, told = await house.catalogue.create(await request.body(), person.id)
+        reading = None if told is None else encoded(told)
         body = MadeGraph(**msgspec.structs.asdict(made), reading=reading)
         return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 
@@ -130,11 +133,9 @@ def _contents(door: Door) -> list[ControllerRouterHandler]:
     async def get_umrf(graph_id: str, at: Seq | None = None) -> Response[bytes]:
         house = door.house
         await house.catalogue.require(graph_id)
-        moment = await house.sights.moment(graph_id, at)
-        text = codec.write(moment.graph)
-        return Response(
-            text.encode(), media_type="application/json", headers={"x-seq": str(moment.seq)}
-        )
+        sight = await house.sights.moment(graph_id, at)
+        text = await house.sights.ask(contents.umrf, sight)
+        return Response(text, media_type="application/json", headers={"x-seq": str(sight.seq)})
 
     @get(
         "/api/graphs/{graph_id:str}/problems",
@@ -144,8 +145,8 @@ def _contents(door: Door) -> list[ControllerRouterHandler]:
     async def get_problems(graph_id: str, seq: Seq | None = None) -> Problems:
         house = door.house
         await house.catalogue.require(graph_id)
-        moment = await house.sights.moment(graph_id, seq)
-        return Problems(moment.seq, tuple(house.sights.problems(graph_id, moment)))
+        sight = await house.sights.moment(graph_id, seq)
+        return Problems(sight.seq, encoded(await house.sights.problems(sight)))
 
     @post(
         "/api/graphs/{graph_id:str}/rewriting",
@@ -153,13 +154,15 @@ def _contents(door: Door) -> list[ControllerRouterHandler]:
         summary="What an edited text of a graph would change, key by key; stores nothing",
         operation_id="getRewriting",
         guards=[Needs("see")],
+        request_max_body_size=BODY_LIMIT,
     )
     async def get_rewriting(graph_id: str, seq: Seq, request: Asking) -> Rewriting:
         house = door.house
+        text = await request.body()
         await house.catalogue.require(graph_id)
         then = await house.sights.at(graph_id, seq)
-        known = house.sights.problems(graph_id, then)
-        return await asyncio.to_thread(rewriting, then, await request.body(), known)
+        answer: Rewriting = encoded(await house.workers.files(rewritten, then, text))
+        return answer
 
     return [get_umrf, get_problems, get_rewriting]
 
@@ -193,7 +196,8 @@ def _past(door: Door) -> list[ControllerRouterHandler]:
         await house.catalogue.require(graph_id)
         then = await house.sights.at(graph_id, before)
         later = await house.sights.moment(graph_id, after)
-        return difference((then.seq, then.graph), (later.seq, later.graph))
+        found: Difference = encoded(await house.sights.ask(contents.differing, then, later))
+        return found
 
     @post(
         "/api/graphs/{graph_id:str}/restore",
@@ -209,7 +213,7 @@ def _past(door: Door) -> list[ControllerRouterHandler]:
         then = await house.sights.at(graph_id, data.seq)
         async with house.rooms.enter(h.graph_stream(graph_id)) as room:
             before = room.seq
-            seq = await edits.restore(room, person.id, then.maps)
+            seq = await edits.restore(room, person.id, then.state, aside=house.workers.graphs)
         if seq > before:
             deed = h.draft(h.RESTORED, person.id, h.Restored(data.seq, seq))
             await house.journal.append(h.about_stream(graph_id), [deed])

@@ -122,7 +122,7 @@ async def _listen(receive: Receive, room: Room, member: Member, budget: Budget) 
             if member.far_ahead:
                 await member.until_heard()
             spend = budget.spend if isinstance(message, wire.Edit) else budget.speak
-            wait = spend(member.person.id, len(data))
+            wait = spend(member.person.id, len(data)) + member.toll()
             if wait > 0:
                 await anyio.sleep(wait)
 

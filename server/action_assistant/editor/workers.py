@@ -1,0 +1,46 @@
+"""The editor's workers: whatever grows with what one person sends happens in them, so that nobody
+else waits for it."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any, Final
+
+import msgspec
+from anyio import CapacityLimiter
+
+from action_assistant.web.workers import Lane, kept_warm
+
+#: What the server process has imported before it forks anybody.
+_PRELOADED: Final = (
+    "action_assistant.editor.importing",
+    "action_assistant.editor.library",
+    "action_assistant.editor.loading",
+    "action_assistant.editor.rehearsal",
+    "action_assistant.editor.rewriting",
+)
+_NICE: Final = 5
+
+
+class Workers:
+    """The lanes of an editor. `files`: what people bring, and what is played for them. `graphs`: what
+    is read of stored graphs. `edits`: large updates before a room takes them."""
+
+    def __init__(self) -> None:
+        threads = CapacityLimiter(8)
+        self.files: Final = Lane("files", 2, 30.0, _NICE, threads, _PRELOADED)
+        self.graphs: Final = Lane("graphs", 2, 60.0, _NICE, threads, _PRELOADED)
+        self.edits: Final = Lane("edits", 1, 20.0, _NICE, threads, _PRELOADED)
+
+    @classmethod
+    @asynccontextmanager
+    async def opened(cls) -> "AsyncIterator[Workers]":
+        """Workers, as long as you are inside. The first ones are made meanwhile."""
+        lanes = cls()
+        async with kept_warm(lanes.files, lanes.graphs, lanes.edits):
+            yield lanes
+
+
+def encoded(answer: bytes) -> Any:
+    """JSON text that a worker made, for a route that answers what it stands for: encoding a large
+    answer would hold up everybody else."""
+    return msgspec.Raw(answer)
