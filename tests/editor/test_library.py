@@ -8,7 +8,7 @@ import pytest
 
 from action_assistant.editor.app import open_house
 from action_assistant.editor.house import House
-from action_assistant.editor.library import Known
+from action_assistant.editor.uses import Known
 from action_assistant.settings import EditorSettings
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text, get_update, merge_updates
 
-from action_assistant.editor import document, edits
+from action_assistant.editor import changes, document
 from action_assistant.editor.scan import DEEPEST, outline
 from action_assistant.editor.wire import Malformed, Reader, number
 from action_assistant.umrf.model import Action, Graph
@@ -71,7 +71,7 @@ def test_a_large_graph_is_within_the_bounds() -> None:
         )
         for n in range(1000)
     )
-    read = outline(edits.first(Graph(name="large", actions=actions)))
+    read = outline(changes.first(Graph(name="large", actions=actions)))
     assert read.ready({})
 
 

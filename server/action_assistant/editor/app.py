@@ -26,6 +26,7 @@ from action_assistant.web.keys import Keys
 from action_assistant.web.revoked import Revoked
 from action_assistant.web.sessions import session_routes
 from action_assistant.web.signed_in import SignedInBrowsers
+from action_assistant.web.workers import here
 
 log: Final = logging.getLogger(__name__)
 
@@ -125,7 +126,8 @@ async def _greet(house: House, folder: Path) -> None:
     files = [path async for path in anyio.Path(folder).glob("*.umrf.graph.json")]
     for path in sorted(files, reverse=True):  # the last one made stands first in the list
         try:
-            await house.catalogue.bring(await path.read_bytes(), h.EXAMPLES)
+            # At once: they are small, ours, and nobody is here whom that could hold up.
+            await house.catalogue.bring(await path.read_bytes(), h.EXAMPLES, aside=here)
         except BadInput as error:
             log.error("the example %s cannot be read: %s", path.name, error.detail)
 

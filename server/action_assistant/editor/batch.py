@@ -1,7 +1,7 @@
 """What enters a room, and what became of a batch of it."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final, TypeAlias
 
 import msgspec
@@ -11,9 +11,12 @@ from action_assistant.editor import wire
 from action_assistant.editor.fullness import Full
 from action_assistant.editor.member import Member
 from action_assistant.editor.replica import Foreign, Panicked, Replica, TooMuchWaits
-from action_assistant.editor.trial import TooSlow
+from action_assistant.editor.scan import Outline
+from action_assistant.editor.trial import TooSlow, tried
 from action_assistant.editor.wire import Malformed
 from action_assistant.errors import BadInput, Refused, TooLarge
+from action_assistant.web.access import acting_for
+from action_assistant.web.workers import Aside, Crashed
 
 LARGE: Final = 8 * 1024  # bytes of an update that is tried on a copy first, and by itself
 _BATCH: Final = 200  # items of one commit
@@ -104,6 +107,23 @@ def _answer(error: Objection) -> tuple[int, Refused, str | None]:
             return wire.TOO_BIG, TooLarge(f"{error}."), str(error)
         case NotAllowed():
             return wire.FORBIDDEN, BadInput("Not allowed."), None
+
+
+async def tried_for(
+    person: str, aside: Aside, state: bytes, update: bytes, released: Sequence[bytes] = ()
+) -> Outline:
+    """The outline of an update that may be applied to a document of this state, and after it the
+    updates that waited for it.
+
+    Raises Malformed, Panicked, TooSlow.
+    """
+    try:
+        with acting_for(person):
+            return await aside(tried, state, update, released)
+    except Crashed as error:
+        raise Malformed("an update that ends the process") from error
+    except Refused as error:
+        raise TooSlow(f"This change cannot be taken: {error.detail}") from error
 
 
 def batch_of(items: list[Item], *, one: bool = False) -> tuple[list[Item], list[Item]]:

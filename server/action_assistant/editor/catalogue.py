@@ -6,7 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row, Select, select
 
-from action_assistant.editor import edits, importing
+from action_assistant.editor import changes, edits, importing
 from action_assistant.editor import happenings as h
 from action_assistant.editor.contents import About, Counts, about_graph
 from action_assistant.editor.document import new_aid
@@ -93,11 +93,13 @@ class Catalogue:
         graph = Graph(name=name, description=description)
         made = h.draft(h.CREATED, author, h.Created(name, description))
         about = about_graph(graph, check(graph))
-        return await self._add(edits.first(graph), about, [made], author), None
+        return await self._add(changes.first(graph), about, [made], author), None
 
-    async def bring(self, body: bytes, author: str) -> tuple[GraphView, bytes]:
+    async def bring(
+        self, body: bytes, author: str, *, aside: Aside | None = None
+    ) -> tuple[GraphView, bytes]:
         """A graph from a UMRF file. The log keeps the file as it came."""
-        found = await self._aside(importing.brought, body)
+        found = await (aside or self._aside)(importing.brought, body)
         about = found.about
         made = h.draft(
             h.CREATED,

@@ -1,38 +1,8 @@
 """Edits that the server makes itself: on a copy, entering the room as the difference (rule R9)."""
 
-from collections.abc import Callable
-from typing import Any
-
-from msgspec.structs import replace
-from pycrdt import Doc, merge_updates
-
-from action_assistant.editor import document
-from action_assistant.editor.contents import maps_of
-from action_assistant.editor.document import Maps
+from action_assistant.editor.changes import renaming, restoring
 from action_assistant.editor.room import Room
-from action_assistant.editor.wire import NOTHING_NEW
-from action_assistant.umrf.model import Graph
 from action_assistant.web.workers import Aside, here
-
-
-def difference(state: bytes, edit: Callable[[Doc[Any]], None]) -> bytes:
-    """What `edit` changes in a document with this content, as one update."""
-    copy: Doc[Any] = Doc()
-    if state:
-        copy.apply_update(state)
-    made: list[bytes] = []
-    subscription = copy.observe(lambda event: made.append(event.update))
-    try:
-        edit(copy)
-    finally:
-        copy.unobserve(subscription)
-    made = [update for update in made if update != NOTHING_NEW]
-    return merge_updates(*made) if made else NOTHING_NEW
-
-
-def first(graph: Graph) -> bytes:
-    """The update that makes a document of a graph."""
-    return difference(b"", lambda doc: document.fill(doc, graph))
 
 
 async def rename(
@@ -50,41 +20,3 @@ async def restore(room: Room, author: str, then: bytes, *, aside: Aside = here) 
     """
     state = await room.look(lambda replica, _: replica.doc.get_update())
     return await room.submit(await aside(restoring, state, then), author)
-
-
-def renaming(state: bytes, name: str | None, description: str | None) -> bytes:
-    """The update that gives another name or description. For workers."""
-
-    def edit(doc: Doc[Any]) -> None:
-        maps = document.maps_of(doc)
-        old = document.read_maps(maps)
-        new = replace(
-            old,
-            name=old.name if name is None else name,
-            description=old.description if description is None else description,
-        )
-        document.change(doc, changed(maps, old, new))
-
-    return difference(state, edit)
-
-
-def restoring(state: bytes, then: bytes) -> bytes:
-    """The update that goes back to another document. For workers."""
-
-    def edit(doc: Doc[Any]) -> None:
-        comments = document.maps_of(doc)["comments"]
-        document.change(doc, {**maps_of(then), "comments": comments})
-
-    return difference(state, edit)
-
-
-def changed(maps: Maps, old: Graph, new: Graph) -> Maps:
-    """The maps with the difference between two graphs applied, and nothing else touched."""
-    before, after = document.flatten(old), document.flatten(new)
-    result = {root: dict(fields) for root, fields in maps.items()}
-    for root, fields in after.items():
-        mine = result.setdefault(root, {})
-        for key in before[root].keys() - fields.keys():
-            mine.pop(key, None)
-        mine.update({k: v for k, v in fields.items() if before[root].get(k) != v})
-    return result

@@ -5,18 +5,18 @@ document. Everything else about a graph is in `about/ID`; names of people are in
 """
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from typing import Any, Final
 
 import msgspec
 from sqlalchemy import Executable, delete, insert, update
 
+from action_assistant.editor.kinds import DEFERRED as DEFERRED
+from action_assistant.editor.kinds import UPDATED as UPDATED
+from action_assistant.editor.kinds import when as when
 from action_assistant.journal import tables
 from action_assistant.journal.events import Draft, Event
 from action_assistant.web.roles import Role
 
-UPDATED: Final = "graph.updated.v1"  # the body is the Yjs update as it came
-DEFERRED: Final = "graph.deferred.v1"  # one that waits for others, which come later in the log
 CREATED: Final = "graph.created.v1"
 IMPORTED: Final = "graph.imported.v1"  # the body is the file as it came
 DESCRIBED: Final = "graph.described.v1"
@@ -118,11 +118,6 @@ def graph_of(stream: str) -> str | None:
 def draft(kind: str, author: str, body: msgspec.Struct | None = None) -> Draft:
     """An event with a JSON body."""
     return Draft(kind, author, msgspec.json.encode(body) if body is not None else b"")
-
-
-def when(at: int) -> datetime:
-    """Microseconds since 1970 as a time."""
-    return datetime.fromtimestamp(at / 1_000_000, UTC)
 
 
 def fold(event: Event) -> Sequence[Executable]:

@@ -4,7 +4,7 @@ from typing import Any
 
 import msgspec
 
-from action_assistant.editor import document, edits
+from action_assistant.editor import changes, document
 from action_assistant.editor.contents import About, about_graph
 from action_assistant.editor.fullness import refuse_too_long, refuse_too_much
 from action_assistant.errors import BadInput, NotUmrf, TooLarge
@@ -67,7 +67,7 @@ def brought(body: bytes) -> Brought:
     found = read_graph(body)
     refuse_too_much(found.graph, found.dialect)
     fields = sum(len(keys) for keys in document.flatten(document.with_aids(found.graph)).values())
-    update = edits.first(found.graph)
+    update = changes.first(found.graph)
     refuse_too_long(update, fields)
     told = Reading(found.dialect, found.notes, found.problems, found.remarks)
     about = about_graph(found.graph, check(found.graph))

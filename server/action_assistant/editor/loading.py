@@ -1,16 +1,15 @@
 """Documents read from the log: snapshot and tail, put together aside, piece by piece."""
 
 import logging
-from collections.abc import Sequence
 from typing import Final
 
 import msgspec
 
-from action_assistant.editor.replica import Kept, Panicked, Replica
-from action_assistant.editor.tail import Damaged, Tail
-from action_assistant.editor.wire import Malformed
+from action_assistant.editor.folding import Damaged, fold
+from action_assistant.editor.replica import Kept, Replica
+from action_assistant.editor.tail import Tail
 from action_assistant.errors import Unavailable
-from action_assistant.journal.events import Event, Snapshot
+from action_assistant.journal.events import Snapshot
 from action_assistant.journal.journal import Journal
 from action_assistant.web.workers import Aside, here
 
@@ -35,14 +34,6 @@ class Stored(msgspec.Struct, frozen=True):
     document: bytes
     seq: int
     kept: int
-    damaged: Damaged | None = None
-
-
-class Folded(msgspec.Struct, frozen=True):
-    """A document after some events, `seq` the last one; `damaged` is the one that cannot be applied."""
-
-    document: bytes
-    seq: int
     damaged: Damaged | None = None
 
 
@@ -114,50 +105,3 @@ async def _snapshot(journal: Journal, stream: str) -> Snapshot | None:
     except Unavailable as error:
         log.warning("%s: no use of the snapshot: %s", stream, error.detail)
         return None
-
-
-def fold(document: bytes, events: Sequence[Event], learn: bool) -> Folded | None:
-    """A document, as the bytes of a snapshot or nothing, after some events that follow it; None when
-    these bytes are no document. For workers."""
-    replica = Kept.replica(document) if document else Replica()
-    if replica is None:
-        return None
-    try:
-        replica.replay(events, learn=learn)
-        return Folded(Kept.of(replica), events[-1].seq)
-    except (Malformed, Panicked):
-        return _before_the_bad(document, events, learn=learn)
-    finally:
-        replica.close()
-
-
-def _before_the_bad(document: bytes, events: Sequence[Event], *, learn: bool) -> Folded:
-    """As `fold`, up to the first event that cannot be applied. A replica in which something failed
-    is not gone on with."""
-    bad, why = _first_bad(document, events)
-    good = events[:bad]
-    damaged = Damaged(events[bad].seq, why)
-    if not good:
-        return Folded(document, events[bad].seq - 1, damaged)
-    replica = Kept.replica(document) if document else Replica()
-    assert replica is not None
-    try:
-        replica.replay(good, learn=learn)
-        return Folded(Kept.of(replica), good[-1].seq, damaged)
-    finally:
-        replica.close()
-
-
-def _first_bad(document: bytes, events: Sequence[Event]) -> tuple[int, str]:
-    """Which of these events cannot be applied, and why."""
-    replica = Kept.replica(document) if document else Replica()
-    assert replica is not None
-    try:
-        for n, event in enumerate(events):
-            try:
-                replica.replay([event])
-            except (Malformed, Panicked) as error:
-                return n, str(error)
-    finally:
-        replica.close()
-    raise Unavailable(f"{events[0].stream} reads otherwise each time.")

@@ -11,7 +11,7 @@ import msgspec
 from pycrdt import Doc, get_update
 
 from action_assistant.editor.fullness import Fullness
-from action_assistant.editor.happenings import DEFERRED, UPDATED
+from action_assistant.editor.kinds import DEFERRED, UPDATED
 from action_assistant.editor.nesting import Nesting
 from action_assistant.editor.scan import Outline, outline
 from action_assistant.editor.wire import NOTHING_NEW, Malformed, Reader

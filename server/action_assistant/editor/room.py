@@ -23,6 +23,7 @@ from action_assistant.editor.batch import (
     batch_of,
     merged,
     refuse,
+    tried_for,
 )
 from action_assistant.editor.contents import shown
 from action_assistant.editor.fullness import Full
@@ -40,7 +41,7 @@ from action_assistant.editor.replica import (
 )
 from action_assistant.editor.sameness import Fingerprint
 from action_assistant.editor.scan import Outline, outline
-from action_assistant.editor.trial import TooSlow, tried_for
+from action_assistant.editor.trial import TooSlow
 from action_assistant.editor.window import Window
 from action_assistant.editor.wire import Entry, Malformed
 from action_assistant.errors import Conflict, Refused, Unavailable

@@ -4,9 +4,9 @@ import logging
 from collections.abc import Sequence
 from typing import Any, Final
 
-import msgspec
 from sqlalchemy import Select, select
 
+from action_assistant.editor.folding import Damaged
 from action_assistant.errors import Unavailable
 from action_assistant.journal import tables
 from action_assistant.journal.chain import START, link
@@ -18,13 +18,6 @@ log: Final = logging.getLogger(__name__)
 SLICE: Final = 500  # events that are read at once
 _COLUMNS: Final = (*Event.__struct_fields__, "chain")
 _TYPES: Final = (str, int, str, str, int, bytes, int, bytes)
-
-
-class Damaged(msgspec.Struct, frozen=True):
-    """A stream is sound before its event `seq`, and not at it."""
-
-    seq: int
-    why: str
 
 
 class Tail:

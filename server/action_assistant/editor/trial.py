@@ -10,12 +10,9 @@ from typing import Any, Final
 
 from pycrdt import Doc
 
-from action_assistant.editor.replica import Panicked, applying
+from action_assistant.editor.replica import applying
 from action_assistant.editor.scan import Outline, outline
 from action_assistant.editor.wire import Malformed
-from action_assistant.errors import Refused
-from action_assistant.web.access import acting_for
-from action_assistant.web.workers import Aside, Crashed
 
 SECONDS: Final = 0.25  # of a processor that one update may take
 _INSIDE: Final = 5_000  # structs of an update in which something lies inside something else
@@ -25,25 +22,9 @@ class TooSlow(Exception):
     """An update that holds everybody up"""
 
 
-async def tried_for(
-    person: str, aside: Aside, state: bytes, update: bytes, released: Sequence[bytes] = ()
-) -> Outline:
-    """The outline of an update that may be applied to a document of this state, and after it the
-    updates that waited for it.
-
-    Raises Malformed, Panicked, TooSlow.
-    """
-    try:
-        with acting_for(person):
-            return await aside(tried, state, update, released)
-    except Crashed as error:
-        raise Malformed("an update that ends the process") from error
-    except Refused as error:
-        raise TooSlow(f"This change cannot be taken: {error.detail}") from error
-
-
 def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> Outline:
-    """As `tried_for`. For workers."""
+    """The outline of an update that may be applied to a document of this state, and after it the
+    updates that waited for it. For workers. Raises Malformed, Panicked, TooSlow."""
     read = outline(update)
     if not any(each.inside for each in read.placed):
         read = Outline(read.brings, read.needs, (), read.actions)
@@ -59,6 +40,3 @@ def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> Outline:
     if spent > SECONDS:
         raise TooSlow("This change takes so long that everybody would have to wait for it")
     return read
-
-
-__all__ = ["SECONDS", "Panicked", "TooSlow", "tried", "tried_for"]

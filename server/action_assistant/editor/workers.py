@@ -12,11 +12,13 @@ from action_assistant.web.workers import Lane, kept_warm
 
 #: What the server process has imported before it forks anybody.
 _PRELOADED: Final = (
+    "action_assistant.web.hands",
+    "action_assistant.editor.folding",
     "action_assistant.editor.importing",
-    "action_assistant.editor.library",
-    "action_assistant.editor.loading",
     "action_assistant.editor.rehearsal",
     "action_assistant.editor.rewriting",
+    "action_assistant.editor.trial",
+    "action_assistant.editor.uses",
 )
 _NICE: Final = 5
 

@@ -1,10 +1,12 @@
 """What a journal keeps: events in streams, and caches of what a stream adds up to."""
 
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import msgspec
-from sqlalchemy import Executable
+
+if TYPE_CHECKING:  # workers read events too, and need no database
+    from sqlalchemy import Executable
 
 
 class Event(msgspec.Struct, frozen=True):
@@ -49,9 +51,9 @@ class Snapshot(msgspec.Struct, frozen=True):
 
 
 #: Which statements an event means for the tables. Pure; runs in the transaction of the event.
-Fold: TypeAlias = Callable[[Event], Sequence[Executable]]
+Fold: TypeAlias = "Callable[[Event], Sequence[Executable]]"
 
 
-def nothing(_: Event) -> Sequence[Executable]:
+def nothing(_: Event) -> "Sequence[Executable]":
     """The fold of a journal without tables."""
     return ()

@@ -55,7 +55,8 @@ def located(
 ) -> tuple[list[Problem], tuple[Note, ...]]:
     """Problems and notes that have pointers of this text, with lines and columns; of what is not
     there the place is what it would be in. Without a text they stay as they are."""
-    every = [where for told in (*problems, *notes) for where in (told.where, *told.also)]
+    every = [where for problem in problems for where in (problem.where, *problem.also)]
+    every += [where for note in notes for where in (note.where, *note.also)]
     if not text or not every:
         return list(problems), tuple(notes)
     places = places_of(text, {where.path for where in every})

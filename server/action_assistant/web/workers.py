@@ -7,40 +7,30 @@ module, with values that can be pickled.
 """
 
 import asyncio
-import contextlib
-import gc
 import logging
-import multiprocessing
-import os
 import pickle
-import resource
-import signal
-import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
-from pathlib import Path
 from typing import Any, Final, Protocol, TypeVar
 
 import anyio
 from anyio import CapacityLimiter, to_thread
 
-from action_assistant.errors import TooLarge, TooMany, Unavailable
-from action_assistant.plain import make_streams_plain
+from action_assistant.errors import TooMany, Unavailable
 from action_assistant.web.access import Caller, caller
+from action_assistant.web.hands import LAST, child, serve, wire
+
+__all__ = ["Aside", "Crashed", "Lane", "child", "here", "kept_warm"]
 
 log: Final = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
-_MEMORY: Final = 768 << 20  # bytes that a worker may take beyond what it begins with
-_TIRED: Final = 256 << 20  # bytes in use after which a worker makes room for a fresh one
 _WAITING: Final = 32  # requests of one person
 _ALL_WAITING: Final = 256
 _START_S: Final = 30.0
-
-_context: Final = multiprocessing.get_context("forkserver")
 
 
 class Aside(Protocol):
@@ -146,7 +136,7 @@ class Lane:
                 reply = await to_thread.run_sync(
                     worker.asked, request, abandon_on_cancel=True, limiter=self._threads
                 )
-            finished = reply[:1] != _LAST
+            finished = reply[:1] != LAST
         except TimeoutError as late:
             raise Unavailable(
                 f"This took longer than {self._patience:.0f} s and was given up."
@@ -224,8 +214,8 @@ class _Worker:
     @classmethod
     def born(cls, name: str, nice: int, preloaded: Sequence[str]) -> "_Worker":
         """Start one. Takes milliseconds, but for the first."""
-        ours, theirs = _context.Pipe()
-        process = child(_work, theirs, name=name, nice=nice, preloaded=preloaded)
+        ours, theirs = wire()
+        process = child(serve, theirs, name=name, nice=nice, preloaded=preloaded)
         theirs.close()
         return cls(process, ours)
 
@@ -244,85 +234,3 @@ class _Worker:
         if self._process.is_alive():  # a number that has been given back may be somebody else's
             self._process.kill()
         # Its thread may still read from the wire: that ends by itself, since the other end is closed.
-
-
-def child(
-    work: Callable[..., None], *args: Any, name: str, nice: int, preloaded: Sequence[str]
-) -> ForkServerProcess:
-    """A process of low priority that ends with this one, in which `work(*args)` runs. Waits for it
-    to exist. `preloaded`: the modules that the server process imports before it forks the first one.
-    Raises OSError, EOFError."""
-    _context.set_forkserver_preload(list(preloaded))
-    process = _context.Process(target=_humbly, args=(work, args, nice), name=name, daemon=True)
-    process.start()
-    return process
-
-
-def _humbly(work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
-    """In the process: others first, when time or memory runs short."""
-    make_streams_plain()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for our parent, which ends us
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    with contextlib.suppress(OSError):
-        os.nice(nice)
-    with contextlib.suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text("1000")
-    with contextlib.suppress(OSError, ValueError):
-        limit = _mapped() + _MEMORY
-        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    gc.freeze()
-    work(*args)
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(0)
-
-
-def _mapped() -> int:
-    """Bytes of address space in use."""
-    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-
-
-def _in_use() -> int:
-    """Bytes of memory in use; 0 where nobody says."""
-    try:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-    except OSError:
-        return 0
-
-
-_MORE: Final = b"+"
-_LAST: Final = b"."  # this worker does nothing more
-
-
-def _work(wire: Connection) -> None:
-    """Do one thing after the other, until whoever asks has gone."""
-    with contextlib.suppress(EOFError, OSError):
-        while True:
-            wire.send_bytes(_reply(wire.recv_bytes()))
-
-
-def _reply(request: bytes) -> bytes:
-    try:
-        work, args = pickle.loads(request)
-        reply = pickle.dumps(("returned", work(*args)), pickle.HIGHEST_PROTOCOL)
-    except MemoryError:
-        large = TooLarge("This takes more memory than one request may have.")
-        return _LAST + pickle.dumps(("raised", large))
-    except Exception as error:  # noqa: BLE001 - it is raised where it was asked for
-        reply = _raised(error)
-    return (_LAST if _in_use() > _TIRED else _MORE) + reply
-
-
-def _raised(error: Exception) -> bytes:
-    """An error that reaches the other side as it is, where that is possible."""
-    try:
-        reply = pickle.dumps(("raised", error))
-        pickle.loads(reply)
-    except Exception:
-        logging.getLogger(__name__).exception("a worker cannot say what went wrong")
-        reply = pickle.dumps(("raised", RuntimeError(repr(error)[:2000])))
-    return reply

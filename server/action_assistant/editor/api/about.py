@@ -14,8 +14,8 @@ from litestar.types import ControllerRouterHandler
 from action_assistant import places
 from action_assistant.editor import happenings as h
 from action_assistant.editor.house import Door
-from action_assistant.editor.library import Known
 from action_assistant.editor.presence import colour_of
+from action_assistant.editor.uses import Known
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event

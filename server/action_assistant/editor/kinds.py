@@ -1,0 +1,12 @@
+"""The kinds of events in the stream of a graph's document, and when they happened."""
+
+from datetime import UTC, datetime
+from typing import Final
+
+UPDATED: Final = "graph.updated.v1"  # the body is the Yjs update as it came
+DEFERRED: Final = "graph.deferred.v1"  # one that waits for others, which come later in the log
+
+
+def when(at: int) -> datetime:
+    """Microseconds since 1970 as a time."""
+    return datetime.fromtimestamp(at / 1_000_000, UTC)
