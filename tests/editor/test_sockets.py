@@ -47,18 +47,20 @@ async def acks(
                 return durable, seq
 
 
-async def goodbye(session: httpx_ws.AsyncWebSocketSession) -> tuple[int, str | None]:
-    """Read until the server closes; its code and what it says."""
+async def goodbye(
+    session: httpx_ws.AsyncWebSocketSession, patience: float = 5
+) -> tuple[int, str | None]:
+    """Read until the server closes; its code and what it says. `patience` in s for each frame."""
     try:
         while True:
-            await session.receive(timeout=5)
+            await session.receive(timeout=patience)
     except httpx_ws.WebSocketDisconnect as ended:
         return ended.code, ended.reason
 
 
-async def closed(session: httpx_ws.AsyncWebSocketSession) -> int:
+async def closed(session: httpx_ws.AsyncWebSocketSession, patience: float = 5) -> int:
     """Read until the server closes; its code."""
-    return (await goodbye(session))[0]
+    return (await goodbye(session, patience))[0]
 
 
 async def test_stock_clients_converge(editor: Editor, http: httpx.Client, graph: str) -> None:

@@ -6,10 +6,12 @@ be made smaller. What is brought back after it was deleted is not counted as new
 """
 
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any, Final
 
 from pycrdt import Doc, Map
 
+from action_assistant.editor.document_values import ROOTS
 from action_assistant.editor.scan import Outline
 from action_assistant.errors import TooLarge
 from action_assistant.umrf.model import ENTRY, EXIT, Graph
@@ -57,14 +59,19 @@ def refuse_too_much(graph: Graph, dialect: str) -> None:
                 )
 
 
-def refuse_too_long(update: bytes, fields: int) -> None:
-    """Refuse the first update of a document that no room would take. Raises TooLarge."""
+def refuse_too_wide(maps: Mapping[str, Mapping[str, object]]) -> None:
+    """Refuse a graph for what all its actions and arrows say together. Raises TooLarge."""
+    fields = sum(map(len, maps.values()))
     if fields > MOST_FIELDS:
         raise TooLarge(
-            f"A graph may have {MOST_FIELDS:,} fields, parameters and arrows together; this one has "
-            f"{fields:,}.",
+            f"A graph may have {MOST_FIELDS:,} fields, those of parameters and arrows among them; "
+            f"this one has {fields:,}.",
             where={"path": ""},
         )
+
+
+def refuse_too_long(update: bytes) -> None:
+    """Refuse the first update of a document that no room would take. Raises TooLarge."""
     if len(update) > MOST_BYTES:
         raise TooLarge(f"A graph may have {MOST_BYTES >> 20} MiB.", where={"path": ""})
 
@@ -81,6 +88,8 @@ class Fullness:
         self._bytes = 0
         self._measured = 0
         self._spare = 0
+        self._spare_fields = 0
+        self._fields_changed = True
         self._changed = True  # since actions were counted
 
     def check(self, update: bytes, read: Outline) -> None:
@@ -90,19 +99,30 @@ class Fullness:
             self._spare = MOST_ACTIONS - actions_in(self._doc)
         if read.actions > max(self._spare, 0):
             raise Full(f"a graph may have {MOST_ACTIONS:,} actions")
+        if read.fields > self._spare_fields and self._fields_changed:
+            self._fields_changed = False
+            self._spare_fields = MOST_FIELDS - fields_in(self._doc)
+        if read.fields > max(self._spare_fields, 0):
+            raise Full(f"a graph may have {MOST_FIELDS:,} fields")
         if read.brings and self._bytes + len(update) > MOST_BYTES:
             if self._bytes - self._measured >= _WORTH:
                 self._bytes = self._measured = len(self._doc.get_update())
             if self._bytes + len(update) > MOST_BYTES:
                 raise Full(f"a graph may have {MOST_BYTES >> 20} MiB")
 
-    def took(self, size: int, actions: int = 0) -> None:
-        """So many bytes were applied, with so many new actions in them."""
+    def took(self, size: int, actions: int = 0, fields: int = 0) -> None:
+        """So many bytes were applied, with so many new actions and fields in them."""
         self._bytes += size
         self._spare -= actions
-        self._changed = True
+        self._spare_fields -= fields
+        self._changed = self._fields_changed = True
 
 
 def actions_in(doc: "Doc[Any]") -> int:
     """How many actions a document has: their keys are those without a field."""
     return sum("|" not in key for key in doc.get("actions", type=Map).keys())  # noqa: SIM118
+
+
+def fields_in(doc: "Doc[Any]") -> int:
+    """How many keys the maps of a document hold."""
+    return sum(len(doc.get(root, type=Map)) for root in ROOTS)

@@ -6,7 +6,7 @@ import msgspec
 
 from action_assistant.editor import changes, document
 from action_assistant.editor.contents import About, about_graph
-from action_assistant.editor.fullness import refuse_too_long, refuse_too_much
+from action_assistant.editor.fullness import refuse_too_long, refuse_too_much, refuse_too_wide
 from action_assistant.errors import BadInput, NotUmrf, TooLarge
 from action_assistant.umrf import codec
 from action_assistant.umrf.action_files import ACTION_DIALECTS
@@ -64,11 +64,9 @@ class Brought(msgspec.Struct, frozen=True):
 
 def brought(body: bytes) -> Brought:
     """What is stored of a file. Raises BadInput, NotUmrf, TooLarge with the place."""
-    found = read_graph(body)
-    refuse_too_much(found.graph, found.dialect)
-    fields = sum(len(keys) for keys in document.flatten(document.with_aids(found.graph)).values())
+    found = _fitting(read_graph(body))
     update = changes.first(found.graph)
-    refuse_too_long(update, fields)
+    refuse_too_long(update)
     told = Reading(found.dialect, found.notes, found.problems, found.remarks)
     about = about_graph(found.graph, check(found.graph))
     return Brought(found.dialect, found.notes, msgspec.json.encode(told), update, about)
@@ -76,8 +74,7 @@ def brought(body: bytes) -> Brought:
 
 def preview(body: bytes) -> bytes:
     """What importing a file would make, as JSON of a `Preview`. Raises as `brought` does."""
-    found = read_graph(body)
-    refuse_too_much(found.graph, found.dialect)
+    found = _fitting(read_graph(body))
     graph = found.graph
     problems = (*found.problems, *found.placed(check(graph)))
     actions = sum(not action.missing for action in graph.actions)
@@ -88,8 +85,7 @@ def preview(body: bytes) -> bytes:
 
 def pieces(body: bytes) -> bytes:
     """JSON of `Pieces`. Raises as `brought` does."""
-    found = read(body)
-    refuse_too_much(found.graph, found.dialect)
+    found = _fitting(read(body))
     maps = document.flatten(document.with_aids(found.graph))
     return msgspec.json.encode(
         Pieces(
@@ -114,6 +110,13 @@ def read_graph(body: bytes) -> codec.Reading:
             "“action-assistant convert” makes a graph of this action alone.",
             where={"code": "action-file", "line": 1, "column": 1},
         )
+    return found
+
+
+def _fitting(found: codec.Reading) -> codec.Reading:
+    """Raises TooLarge for more than a document may hold."""
+    refuse_too_much(found.graph, found.dialect)
+    refuse_too_wide(document.flatten(document.with_aids(found.graph)))
     return found
 
 

@@ -192,7 +192,7 @@ class Replica:
         return self._fired
 
     def _count(self, read: Outline, size: int) -> None:
-        self._fullness.took(size, read.actions)
+        self._fullness.took(size, read.actions, read.fields)
         for client, _, end in read.brings:
             self._known[client] = max(end, self._known.get(client, 0))
 

@@ -5,7 +5,7 @@ several updates that wait for an earlier one. So nothing reaches it that was not
 Yjs update format, version 1.
 """
 
-from typing import Final, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 import msgspec
 
@@ -25,13 +25,14 @@ _NAMED_TYPES: Final = frozenset({3, 5})
 
 class Outline(msgspec.Struct, frozen=True):
     """What an update brings, `(client, from clock, to clock)`, and what must be there before it:
-    of each client so many clocks. `placed`: what need not lie in a root. `actions`: how many keys of
-    new actions are among it."""
+    of each client so many clocks. `placed`: what need not lie in a root. `fields`: how many keys that
+    may be new are among it, `actions`: how many of them are new actions."""
 
     brings: tuple[tuple[int, int, int], ...]
     needs: dict[int, int]
     placed: tuple[Placed, ...] = ()
     actions: int = 0
+    fields: int = 0
 
     def ready(self, known: dict[int, int]) -> bool:
         """Whether everything that it builds on is known, or comes with it."""
@@ -56,7 +57,7 @@ def outline(update: bytes) -> Outline:
     clients = reader.number()
     if clients > MOST_CLIENTS or clients * 3 > reader.left:
         raise Malformed("too many clients")
-    structs = actions = 0
+    structs = actions = fields = 0
     for _ in range(clients):
         count, client, clock = reader.number(), _client(reader), reader.number()
         if client in seen:
@@ -71,9 +72,10 @@ def outline(update: bytes) -> Outline:
             if info & 31 == _SKIP:
                 clock += reader.number()
                 continue
-            length, reference, action = _struct(reader, info, needs)
+            length, reference, fresh = _struct(reader, info, needs)
             clock += length
-            actions += action
+            fields += fresh is not _NONE
+            actions += fresh is _ACTION
             if reference is not None:
                 placed.append(Placed((client, start, clock), *reference))
             if brings and brings[-1][0] == client and brings[-1][2] == start:
@@ -85,7 +87,7 @@ def outline(update: bytes) -> Outline:
     _deletions(reader, needs)
     if reader.left:
         raise Malformed("something follows the update")
-    return Outline(tuple(brings), needs, tuple(placed), actions)
+    return Outline(tuple(brings), needs, tuple(placed), actions, fields)
 
 
 def _client(reader: Reader) -> int:
@@ -107,17 +109,22 @@ def _deletions(reader: Reader, needs: dict[int, int]) -> None:
 
 #: A struct that tells where this one lies, and whether inside it.
 _Reference: TypeAlias = tuple[int, int, bool]
+#: What kind of key in a root a struct may add.
+_Fresh: TypeAlias = Literal["none", "field", "action"]
+_NONE: Final = "none"
+_FIELD: Final = "field"
+_ACTION: Final = "action"
 
 
 def _struct(
     reader: Reader, info: int, needs: dict[int, int]
-) -> tuple[int, _Reference | None, bool]:
-    """One struct; how many clocks it takes, and whether it names a new action."""
+) -> tuple[int, _Reference | None, _Fresh]:
+    """One struct; how many clocks it takes, and which key may be new with it."""
     kind = info & 31
     if kind == _GC:
-        return _length(reader), None, False
+        return _length(reader), None, _NONE
     reference: _Reference | None = None
-    action = False
+    fresh: _Fresh = _NONE
     if info & 0x80:
         reference = *_need(reader, needs), False
     if info & 0x40:
@@ -126,14 +133,15 @@ def _struct(
     if not info & 0xC0:
         parent = reader.number()
         if parent == 1:
-            action = reader.text() == b"actions" and kind != _DELETED
+            fresh = _ACTION if reader.text() == b"actions" else _FIELD
+            fresh = _NONE if kind == _DELETED else fresh
         elif parent == 0:
             reference = *_need(reader, needs), True
         else:
             raise Malformed("a struct without a parent")
         if info & 0x20:
-            action = b"|" not in reader.text() and action
-    return _content(reader, kind), reference, action
+            fresh = _FIELD if b"|" in reader.text() and fresh is _ACTION else fresh
+    return _content(reader, kind), reference, fresh
 
 
 def _need(reader: Reader, needs: dict[int, int]) -> tuple[int, int]:

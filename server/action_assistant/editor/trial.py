@@ -27,7 +27,7 @@ def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> Outline:
     updates that waited for it. For workers. Raises Malformed, Panicked, TooSlow."""
     read = outline(update)
     if not any(each.inside for each in read.placed):
-        read = Outline(read.brings, read.needs, (), read.actions)
+        read = Outline(read.brings, read.needs, (), read.actions, read.fields)
     elif len(read.placed) > _INSIDE:
         raise Malformed("too much that lies inside something else")
     doc: Doc[Any] = Doc()

@@ -1,0 +1,252 @@
+"""Whatever one person sends: the editor goes on answering the others."""
+
+import asyncio
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+import httpx
+import pytest
+from pycrdt import Doc, Map
+
+from action_assistant.editor import trial, wire
+from action_assistant.editor.rooms import Rooms
+from editor.client import Client, settle
+from editor.process import BEARER, Editor
+from editor.test_sockets import closed
+
+Body = dict[str, Any]
+
+
+def arrows(count: int, *, parents: bool = False, name: str = "B") -> Body:
+    """So many arrows from one action to another, all alike."""
+    one, other = ({"name": n, "instance_id": 0} for n in ("A", name))
+    actions = [
+        {"name": "A", "instance_id": 0, "type": "sync", "children": [other] * count},
+        {"name": "B", "instance_id": 0, "type": "sync", "parents": [one] * count * parents},
+    ]
+    return {"graph_name": "g", "actions": actions, "graph_entry": [one], "graph_exit": [one]}
+
+
+def wide(count: int) -> Body:
+    """An action with so many parameters."""
+    made = arrows(1, parents=True)
+    made["actions"][0]["input_parameters"] = {f"p{n}": {"pvf_type": "number"} for n in range(count)}
+    return made
+
+
+def star(count: int) -> Body:
+    """Arrows from so many actions to so many others."""
+    many = [{"name": "A", "instance_id": n} for n in range(count)]
+    actions = [{**one, "type": "sync", "children": many} for one in many]
+    return {"graph_name": "g", "actions": actions, "graph_entry": many, "graph_exit": many}
+
+
+async def longest_silence(editor: Editor, deed: Callable[[], Any]) -> tuple[float, float]:
+    """How long the editor once took to say that it is there while it did something, and how long
+    that took."""
+    longest = 0.0
+    begun = time.perf_counter()
+    task = asyncio.ensure_future(deed())
+    async with httpx.AsyncClient(base_url=editor.url, trust_env=False, timeout=60) as http:
+        while not task.done():
+            asked = time.perf_counter()
+            (await http.get("/healthz")).raise_for_status()
+            longest = max(longest, time.perf_counter() - asked)
+            await asyncio.sleep(0.005)
+    await task
+    return longest, time.perf_counter() - begun
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("/api/graphs", arrows(4_900, parents=True)),
+        ("/api/graphs", arrows(60_000)),
+        ("/api/graphs?preview=true", arrows(60_000)),
+        ("/api/pieces", arrows(60_000)),
+        ("/api/graphs", wide(15_000)),
+        ("/api/graphs", star(140)),
+    ],
+    ids=["arrows", "60,000 arrows", "a preview", "pieces", "parameters", "a star"],
+)
+async def test_a_large_file_holds_nobody_up(editor: Editor, path: str, body: Body) -> None:
+    text = json.dumps(body).encode()
+
+    async def bring() -> None:
+        async with httpx.AsyncClient(base_url=editor.url, trust_env=False, timeout=120) as http:
+            answer = await http.post(path, content=text, headers=BEARER)
+            assert answer.status_code in {200, 201, 413}, answer.text
+
+    await asyncio.to_thread(httpx.get, f"{editor.url}/api/graphs", headers=BEARER, trust_env=False)
+    await bring()  # somebody is there to do it
+    longest, took = await longest_silence(editor, bring)
+    assert longest < took / 3
+
+
+WAYS_IN = ("/api/graphs", "/api/graphs?preview=true", "/api/pieces")
+
+
+@pytest.mark.parametrize(
+    ("body", "place"),
+    [
+        (arrows(60_000), "/actions"),
+        (arrows(5_001), "/actions/0/children"),
+        (arrows(5_001, name="ghost"), "/actions/0/children"),
+        ({**arrows(1), "graph_entry": [{"name": "A"}] * 5_001}, "/graph_entry"),
+        ({**arrows(1), "actions": [{}] * 5_001}, "/actions"),
+        ({"graph_name": "g", "umrf_actions": [{"effect": "x"}] * 5_001}, "/umrf_actions"),
+        (wide(200_001), ""),
+    ],
+    ids=["graph", "action", "to a ghost", "entry", "actions", "an old file", "fields"],
+)
+def test_a_file_with_too_much_is_refused_with_the_place(
+    http: httpx.Client, body: Body, place: str
+) -> None:
+    before = len(http.get("/api/graphs").json())
+    text = json.dumps(body).encode()
+    for path in WAYS_IN if place else WAYS_IN[:1]:
+        refused = http.post(path, content=text, timeout=120)
+        assert refused.status_code == 413, (path, refused.text[:300])
+        assert refused.json()["where"]["path"] == place
+        assert "may have" in refused.json()["detail"]
+    assert len(http.get("/api/graphs").json()) == before
+
+
+def test_what_was_taken_can_be_opened_and_edited(http: httpx.Client) -> None:
+    made = http.post("/api/graphs", content=json.dumps(wide(60_000)).encode()).json()
+    renamed = http.patch(f"/api/graphs/{made['id']}", json={"name": "other"})
+    assert renamed.status_code == 200
+    assert (renamed.json()["name"], renamed.json()["seq"]) == ("other", 2)
+
+
+async def test_what_nobody_waits_for_is_not_read_to_its_end(editor: Editor) -> None:
+    text = json.dumps(arrows(60_000)).encode()
+
+    async def pieces(content: bytes, patience: float) -> float:
+        begun = time.perf_counter()
+        async with httpx.AsyncClient(base_url=editor.url, trust_env=False) as http:
+            answer = await http.post(
+                "/api/pieces", content=content, headers=BEARER, timeout=patience
+            )
+        assert answer.status_code in {200, 413}
+        return time.perf_counter() - begun
+
+    small = json.dumps(arrows(1)).encode()
+    await pieces(small, 60)
+    whole = await pieces(text, 60)
+    for _ in range(5):
+        with pytest.raises(httpx.ReadTimeout):
+            await pieces(text, whole / 8)
+    assert await pieces(small, 60) < 2 * whole  # the five would take five times as long
+
+
+def at_once(count: int, client: int = 7, clock: int = 0, *, needs: int | None = None) -> bytes:
+    """So many values for one key, none of which knows of another; perhaps after something that is
+    not there."""
+    number, text = wire.number, wire.text
+    items = count + (needs is not None)
+    made = b"\x01" + number(items) + number(client) + number(clock)
+    if needs is not None:
+        made += b"\x88" + number(needs) + b"\x00\x01\x7e"
+    return made + (b"\x28\x01\x01a" + text(b"k") + b"\x01\x7e") * count + b"\x00"
+
+
+@pytest.fixture
+def strict(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing may take long."""
+    monkeypatch.setattr(trial, "SECONDS", 0.05)
+
+
+@pytest.mark.usefixtures("strict")
+async def test_an_update_that_takes_long_is_refused_and_others_go_on(rooms: Rooms) -> None:
+    ada, eve = Client("ada"), Client("eve")
+    async with rooms.enter("graph/g") as room:
+        ada.join(room)
+        eve.join(room)
+        await settle(ada, eve)
+        eve.deliver(wire.change(at_once(8_000)))
+        await room.quiet()
+        assert eve.member is not None
+        assert await eve.member.ended() == wire.TOO_BIG
+        assert "so long" in (eve.member.said or "")
+        ada.map["k"] = "v"
+        await settle(ada)
+        assert ada.durable == ada.sent
+        assert room.seq == 1
+
+
+async def test_an_update_that_would_hold_the_process_up_is_refused_to_its_sender(
+    editor: Editor, http: httpx.Client, graph: str
+) -> None:
+    async def bring() -> None:
+        async with editor.socket(graph) as session:
+            await session.send_bytes(wire.change(at_once(12_000)))
+            assert await closed(session, 60) == wire.TOO_BIG
+
+    await bring()
+    longest, took = await longest_silence(editor, bring)
+    assert longest < took / 3
+    patched = await asyncio.to_thread(http.patch, f"/api/graphs/{graph}", json={"name": "goes on"})
+    assert patched.status_code == 200
+
+
+async def test_a_large_edit_of_an_honest_client_is_taken(rooms: Rooms) -> None:
+    ada, bob = Client("ada"), Client("bob")
+    async with rooms.enter("graph/g") as room:
+        ada.join(room)
+        bob.join(room)
+        await settle(ada, bob)
+        for n in range(5):
+            with ada.doc.transaction():
+                for m in range(2_000):
+                    ada.map[f"key {m}"] = n
+            ada.map["last"] = n
+        await settle(ada, bob)
+        assert bob.things == ada.things
+        assert ada.durable == ada.sent
+
+
+def two_edits() -> tuple[bytes, bytes]:
+    doc, made = Doc[Any](client_id=9), list[bytes]()
+    subscription = doc.observe(lambda event: made.append(event.update))
+    for n in range(2):
+        doc.get("things", type=Map)[f"k{n}"] = n
+    doc.unobserve(subscription)
+    return made[0], made[1]
+
+
+@pytest.mark.usefixtures("strict")
+async def test_what_waits_is_looked_at_before_it_is_let_in(rooms: Rooms) -> None:
+    """It would be applied with the small update that it waits for."""
+    ada, eve = Client("ada"), Client("eve")
+    first, _ = two_edits()
+    async with rooms.enter("graph/g") as room:
+        for client in (ada, eve):
+            client.join(room)
+        await settle(ada, eve)
+        eve.deliver(wire.change(at_once(8_000, client=11, needs=9)))
+        await settle(ada, eve)
+        assert (await room.quiet()).waiting_bytes > 50_000
+        ada.map["k"] = "v"
+        await settle(ada)
+        assert ada.durable == ada.sent
+        eve.deliver(wire.change(first))
+        await room.quiet()
+        assert eve.member is not None
+        assert await eve.member.ended() == wire.TOO_BIG
+        ada.map["k"] = "w"
+        await settle(ada)
+        assert ada.durable == ada.sent
+
+
+@pytest.mark.usefixtures("strict")
+async def test_what_waits_and_is_harmless_is_let_in(rooms: Rooms) -> None:
+    first, second = two_edits()
+    large = at_once(1_500, client=11, needs=9)
+    async with rooms.enter("graph/g") as room:
+        assert await room.submit(large, "eve") == 1
+        assert await room.submit(second, "eve") == 2
+        assert await room.submit(first, "eve") == 3
+        assert (await room.quiet()).waiting == ()
