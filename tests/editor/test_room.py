@@ -285,7 +285,7 @@ async def test_an_update_that_breaks_the_library_is_refused_and_harms_nobody(
     original = Replica._apply
 
     def apply(self: Replica, *given: bytes) -> None:
-        with replica._guarded():
+        with replica.applying():
             if poison in given:
                 raise PanicException("index out of bounds")
         original(self, *given)

@@ -15,6 +15,8 @@ from action_assistant.web.workers import Aside, here
 
 log: Final = logging.getLogger(__name__)
 
+_SMALL: Final = 32 * 1024  # bytes that are put together at once: milliseconds, as a way aside takes
+
 
 class Loaded(msgspec.Struct, frozen=True):
     """A document read from the log, at `seq`. `kept` is the seq of the snapshot it began from.
@@ -88,7 +90,8 @@ async def _followed(
     start, document = (0, b"") if snapshot is None else (snapshot.seq, snapshot.state)
     tail = Tail(journal, stream, start, upto)
     while events := await tail.next():
-        folded = await aside(fold, document, events, learn)
+        size = len(document) + sum(len(event.body) for event in events)
+        folded = await (here if size <= _SMALL else aside)(fold, document, events, learn)
         if folded is None:  # not a snapshot of ours
             return await _followed(journal, stream, None, upto, learn=learn, aside=aside)
         document = folded.document
