@@ -3,6 +3,7 @@
 import asyncio
 import json
 from pathlib import Path
+from typing import Any
 
 import httpx
 from hypothesis import given
@@ -14,6 +15,7 @@ from action_assistant.editor.contents import labels_of
 from action_assistant.editor.happenings import graph_stream
 from action_assistant.settings import EditorSettings
 from action_assistant.umrf.model import Graph
+from action_assistant.web.workers import GaveUp
 from editor.client import Client
 from editor.test_api import NAV
 
@@ -60,3 +62,26 @@ async def test_the_list_says_who_is_in_a_graph_now(tmp_path: Path) -> None:
             for client in here[1:]:
                 client.leave()
         assert (await house.catalogue.get(made.id)).people == ()
+
+
+async def test_a_graph_of_which_nothing_can_be_found_out_stays_in_the_list_with_the_others(
+    tmp_path: Path,
+) -> None:
+    settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
+    async with open_house(settings) as house:
+        made, _ = await house.catalogue.bring(json.dumps(NAV).encode(), "ada")
+        others = {view.id for view in await house.catalogue.all()} - {made.id}
+    async with open_house(settings) as house:
+        asked = house.sights._aside
+
+        async def ask(work: Any, *values: Any) -> Any:
+            if getattr(values[0], "graph", "") == made.id:
+                raise GaveUp("This took longer than it may.")
+            return await asked(work, *values)
+
+        house.sights._aside = ask
+        views = {view.id: view for view in await house.catalogue.all()}
+        assert views.keys() == others | {made.id}
+        assert (views[made.id].name, views[made.id].problems) == (made.name, None)
+        assert all(views[other].problems is not None for other in others)
+        assert made.id.encode() not in await house.library.all()

@@ -161,16 +161,18 @@ class Catalogue:
 
     async def _view(self, row: Row[Any]) -> GraphView:
         summary = await self._sights.summary(row.id, row.seq)
-        if (summary.name, summary.description) != (row.name, row.description):
-            now = h.Described(summary.name, summary.description, summary.seq)
+        name = row.name if summary.name is None else summary.name
+        description = row.description if summary.description is None else summary.description
+        if (name, description) != (row.name, row.description):
+            now = h.Described(name, description, summary.seq)
             await self._journal.append(
                 h.about_stream(row.id), [h.draft(h.DESCRIBED, h.SERVER, now)]
             )
         room = self._rooms.open_room(h.graph_stream(row.id))
         return GraphView(
             id=row.id,
-            name=summary.name,
-            description=summary.description,
+            name=name,
+            description=description,
             seq=max(row.seq, summary.seq),
             updated_at=h.when(row.at),
             made_at=h.when(row.made_at),

@@ -3,9 +3,10 @@
 from sqlalchemy import select
 
 from action_assistant.editor.sights import Sights
-from action_assistant.editor.uses import Use, merged, used
+from action_assistant.editor.uses import NOTHING, Use, merged, used
 from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
+from action_assistant.web.workers import HOPELESS
 
 
 class Library:
@@ -51,4 +52,8 @@ class Library:
         known = self._read.get(graph)
         if known is None or known[0] < seq:
             sight = await self._sights.now(graph)
-            self._read[graph] = sight.seq, await self._sights.ask(used, sight)
+            try:
+                actions = await self._sights.ask(used, sight)
+            except HOPELESS:
+                actions = NOTHING
+            self._read[graph] = sight.seq, actions

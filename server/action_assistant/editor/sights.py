@@ -1,5 +1,6 @@
 """Graphs as they are or were: found in rooms and in the log, asked about aside, remembered for a while."""
 
+import logging
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any, Final, Generic, TypeVar
@@ -14,7 +15,9 @@ from action_assistant.editor.replica import Kept
 from action_assistant.editor.rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.web.workers import Aside, here
+from action_assistant.web.workers import HOPELESS, Aside, here
+
+log: Final = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
@@ -23,13 +26,14 @@ _COUNTED: Final = 5000
 
 
 class Summary(msgspec.Struct, frozen=True):
-    """What a list shows of a graph. `damaged`: the first change that cannot be read."""
+    """What a list shows of a graph. `damaged`: the first change that cannot be read. What is None is
+    not known, since finding it out takes more than it may."""
 
     seq: int
-    name: str
-    description: str
-    actions: int
-    problems: Counts
+    name: str | None = None
+    description: str | None = None
+    actions: int | None = None
+    problems: Counts | None = None
     robots: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
     damaged: int | None = None
@@ -121,7 +125,11 @@ class Sights:
         if known is not None and known.seq >= newest:
             return known
         sight = await self.now(graph)
-        about = await self._aside(contents.about, sight)
+        try:
+            about = await self._aside(contents.about, sight)
+        except HOPELESS as error:  # others are in the list too
+            log.error("%s: nothing can be said of change %d: %s", graph, sight.seq, error.detail)
+            return self._summaries.put(graph, Summary(sight.seq))
         return self._summaries.put(graph, _summary(sight.seq, about, newest))
 
     async def _newest(self, graph: str) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from datetime import datetime
+from typing import Final
 
 import msgspec
 
@@ -44,6 +45,10 @@ class Use(msgspec.Struct, frozen=True):
 
     graph: str
     made_at: int
+
+
+#: Of a graph that cannot be read.
+NOTHING: Final = msgspec.msgpack.encode(())
 
 
 def used(sight: Sight) -> bytes:

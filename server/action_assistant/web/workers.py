@@ -18,11 +18,11 @@ from typing import Any, Final, Protocol, TypeVar
 import anyio
 from anyio import CapacityLimiter, to_thread
 
-from action_assistant.errors import TooMany, Unavailable
+from action_assistant.errors import TooLarge, TooMany, Unavailable
 from action_assistant.web.access import Caller, caller
 from action_assistant.web.hands import LAST, child, serve, wire
 
-__all__ = ["Aside", "Crashed", "Lane", "child", "here", "kept_warm"]
+__all__ = ["HOPELESS", "Aside", "Crashed", "GaveUp", "Lane", "child", "here", "kept_warm"]
 
 log: Final = logging.getLogger(__name__)
 
@@ -49,6 +49,19 @@ async def here(work: Callable[..., T], /, *args: Any) -> T:
 
 class Crashed(Unavailable):
     """What would have worked on this has died"""
+
+
+class GaveUp(Unavailable):
+    """Not available now"""
+
+    @property
+    def type(self) -> str:
+        """For programs it is unavailable like anything else."""
+        return "unavailable"
+
+
+#: What is wrong with the work itself, so that it will not go better next time.
+HOPELESS: Final = (Crashed, GaveUp, TooLarge)
 
 
 class Lane:
@@ -138,7 +151,7 @@ class Lane:
                 )
             finished = reply[:1] != LAST
         except TimeoutError as late:
-            raise Unavailable(
+            raise GaveUp(
                 f"This took longer than {self._patience:.0f} s and was given up."
             ) from late
         except (OSError, EOFError) as error:
