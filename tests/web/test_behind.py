@@ -145,7 +145,9 @@ def test_stop_is_a_stop_below_the_path_too(product: Product) -> None:
 
 def test_events_are_not_kept_back_by_a_proxy(product: Product) -> None:
     url = f"{product.url}/temoto/api/events?after=0"
-    with httpx.stream("GET", url, headers={**PROXIED, **BEARER}, trust_env=False) as stream:
+    with httpx.stream(
+        "GET", url, headers={**PROXIED, **BEARER}, trust_env=False, timeout=20
+    ) as stream:
         assert stream.headers["x-accel-buffering"] == "no"
 
 

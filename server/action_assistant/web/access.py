@@ -47,8 +47,6 @@ _HEADERS: Final = (
 )
 #: Of a refused upgrade: who gets the same refusal without it is behind a proxy that passes none on.
 REFUSED_SOCKET: Final = (b"x-refused", b"websocket")
-#: Or nginx would pass events on when it has some kilobytes of them.
-_UNBUFFERED: Final = (b"x-accel-buffering", b"no")
 
 
 def cookie_name(page_port: int) -> str:
@@ -327,15 +325,10 @@ class Access:
 
         async def dressed(message: Message) -> None:
             if message["type"] in {"http.response.start", "websocket.http.response.start"}:
-                fields = [*message.get("headers", []), *extra]
-                message["headers"] = [*fields, _UNBUFFERED] if _streams(fields) else fields
+                message["headers"] = [*message.get("headers", []), *extra]
             await send(message)
 
         return dressed
-
-
-def _streams(fields: list[tuple[bytes, bytes]]) -> bool:
-    return any(n == b"content-type" and v.startswith(b"text/event-stream") for n, v in fields)
 
 
 def _nobody(_: str) -> None:
