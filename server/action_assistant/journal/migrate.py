@@ -72,7 +72,7 @@ def recognize(connection: Connection) -> set[str]:
     """The revisions of a database of ours; none of an empty one. Changes nothing. Raises CannotStart
     for another program's, and for one that a newer version of this program made."""
     name = _name_of(connection)
-    current = set(MigrationContext.configure(connection).get_current_heads())
+    current = set(map(str, MigrationContext.configure(connection).get_current_heads()))
     if _is_foreign(connection, current):
         raise CannotStart(
             f"The database {name} is another program's: it is left as it is. Choose another one, "

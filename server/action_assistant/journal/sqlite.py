@@ -148,7 +148,7 @@ class Sqlite:
         log is another one from then on."""
         if not self._path.exists():
             return
-        engine = create_engine(unchanged(self._path), module=self._driver, poolclass=NullPool)
+        engine = create_engine(unchanged(self._path), poolclass=NullPool)
         try:
             with engine.connect() as connection:
                 question(connection)
