@@ -130,7 +130,7 @@ def test_a_way_back_that_is_required_is_named_and_can_be_mended() -> None:
     )
     problem = next(p for p in problems(loop) if p.code == "H8")
     assert (problem.severity, problem.fix) == ("error", "not-required")
-    assert problem.where.path == "/actions/0/parents/0/required"
+    assert problem.where.path == "/actions/0/parents/0"
     assert problem.where.relation == "a2>a1"
     assert "for ever" in problem.message
     loop["actions"][0]["parents"][0]["required"] = False
@@ -158,8 +158,8 @@ def test_two_branches_of_a_decision_that_the_exit_both_requires_are_found() -> N
     )
     found = [p for p in problems(graph) if p.code == "H8"]
     assert [(p.severity, p.where.path, p.fix) for p in found] == [
-        ("error", "/graph_exit/1/required", "not-required"),
-        ("warning", "/graph_exit/0/required", "not-required"),
+        ("error", "/graph_exit/1", "not-required"),
+        ("warning", "/graph_exit/0", "not-required"),
     ]
     assert "If all goes well" in found[0].message
     assert "the exit waits for C_0, which then does not run" in found[0].message
