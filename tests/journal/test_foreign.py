@@ -38,6 +38,20 @@ def _in_wal(path: Path) -> None:
         each.write_bytes(content)
 
 
+def _interrupted(path: Path) -> None:
+    """A program whose power was cut: its next reader takes back what it had begun."""
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        database.execute("CREATE TABLE moz_places (text TEXT)")
+        database.executemany("INSERT INTO moz_places VALUES (?)", [("x" * 3000,)] * 200)
+        database.execute("PRAGMA cache_size=1")
+        database.execute("BEGIN")
+        database.execute("UPDATE moz_places SET text = 'y' || text")
+        copy = {each: each.read_bytes() for each in path.parent.iterdir()}
+    for each, content in copy.items():
+        each.write_bytes(content)
+    assert path.with_name("x.db-journal").stat().st_size > 512
+
+
 def _ours(path: Path) -> None:
     migrate(f"sqlite:///{path}", "editor")
 
@@ -56,6 +70,7 @@ FOREIGN = {
         "is another program's",
     ),
     "another program's, written just now": (_in_wal, "is another program's"),
+    "another program's, interrupted": (_interrupted, "is another program's"),
     "another program's that has a table event": (
         _sql("CREATE TABLE event (id INTEGER, what TEXT)"),
         "is another program's",

@@ -2,11 +2,14 @@
 
 import asyncio
 import os
+import shutil
 import sqlite3
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
 from itertools import chain
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final, TypeVar
 from urllib.parse import quote
 
@@ -148,14 +151,17 @@ class Sqlite:
         log is another one from then on."""
         if not self._path.exists():
             return
-        engine = create_engine(unchanged(self._path), poolclass=NullPool)
-        try:
-            with engine.connect() as connection:
-                question(connection)
-        except self.faults as error:
-            raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
-        finally:
-            engine.dispose()
+        with _readable(self._path) as path:
+            engine = create_engine(unchanged(path), poolclass=NullPool)
+            try:
+                with engine.connect() as connection:
+                    question(connection)
+            except CannotStart as error:  # of the file that it is, also where a copy was read
+                raise CannotStart(str(error).replace(str(path), str(self._path))) from error
+            except self.faults as error:
+                raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
+            finally:
+                engine.dispose()
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
         """Run a change of the schema in one transaction. Raises CannotStart."""
@@ -256,6 +262,23 @@ def sqlite_engine(path: Path, *, wait: float, **options: Any) -> Engine:
         connection.exec_driver_sql("BEGIN IMMEDIATE")
 
     return engine
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[Path]:
+    """A file to look into. What was interrupted while it was no log yet has to be taken back before it
+    can be read, so that is done to a copy."""
+    undone = path.with_name(f"{path.name}-journal")
+    if not undone.exists() or not undone.stat().st_size:
+        yield path
+        return
+    with TemporaryDirectory() as folder:
+        for each in (path, undone):
+            shutil.copyfile(each, Path(folder) / each.name)
+        copy = Path(folder) / path.name
+        with closing(sqlite3.connect(copy)) as database:
+            database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        yield copy
 
 
 def unchanged(path: Path) -> str:
