@@ -126,7 +126,7 @@ export function Gate({ children }: { children: ReactNode }) {
     const goOn = () => {
       timer = setTimeout(goOn, wait);
       // Nobody else may come for hours: whoever comes back to this page is let in at once.
-      if (ended) wait = Math.min(2 * wait, 60_000);
+      if (ended) wait = Math.min(2 * wait, 10_000);
       look();
     };
     if (ended) goOn();
