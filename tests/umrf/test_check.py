@@ -116,7 +116,10 @@ def test_a_sound_graph_has_no_problems() -> None:
         (file(A, B | {"input_parameters": {"p": TEXT}}), "H8", "error"),
         (file(A | {"actor": "x"}, B | {"actor": "y"}), "actors", "error"),
         (file(A, action("B", parents=[{"name": "A", "conditions": ["on_true -> restart", *SAFE]}])), "restart", "warning"),
-        (file(A, action("B", parents=[{"name": "A", "conditions": ["on_true -> pause", *SAFE]}])), "H5", "warning"),
+        (
+            file(A, action("B", parents=[{"name": "A", "conditions": ["on_true -> pause", *SAFE]}]), entry=["A", "B"]),
+            "H5", "warning",
+        ),
     ],
 )  # fmt: skip
 def test_each_mistake_has_its_code(value: Any, code: str, severity: str) -> None:

@@ -145,6 +145,8 @@ def _early(
                 bypassed.append(outcome)
                 left |= around
             continue
+        if not together.known and not begun and (relation.required or len(incoming) == 1):
+            continue  # it waits for others, and for which is not known
         if not around or _comes_after(subject, relation.parent, others):
             continue
         started = started or bool(begun)

@@ -6,19 +6,23 @@ not looked at. But an action that a join waits for is over when the join begins.
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
 from typing import Final
 
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
 from action_assistant.umrf.semantics.network import Mask, behind
 
-#: Above so many actions any two may go on at the same time: their pairs are too many to follow.
-MOST: Final = 1_500
+#: Above so many pairs that may go on at the same time the rest is not followed: any two may, then.
+PAIRS: Final = 150_000
+#: Above so many actions nothing is followed.
+MOST: Final = 20_000
 
 
 class Together:
     """`runs`: the actions that can run; `reports`: with which outcomes each (or the entry) can report
-    an end, its own or one that it passes on when it is bypassed."""
+    an end, its own or one that it passes on when it is bypassed. `known`: whether it was followed; if
+    not, anything that can run may run at any time."""
 
     def __init__(
         self, subject: Subject, runs: set[Key], reports: Mapping[Key, set[Precondition]]
@@ -39,14 +43,18 @@ class Together:
             for key, listed in subject.incoming.items()
         }
         if self.known:
-            self._after = behind([self._children(key) for key in self.keys])
             self._starts: dict[tuple[Key, Precondition], Mask] = {}
             self._open = deque[Key](key for key in reports if key != EXIT)
             self._waiting = set(self._open)
-            while self._open:
-                key = self._open.popleft()
-                self._waiting.discard(key)
-                self._follow(key)
+            self._pairs = 0
+            self._joins: set[Key] = set()
+            while (self._open or self._joins) and self.known:
+                if self._open:
+                    key = self._open.popleft()
+                    self._waiting.discard(key)
+                    self._follow(key)
+                else:
+                    self._join(self._joins.pop())
 
     def may_run(self, key: Key, other: Key) -> bool:
         """Whether `key` can run at a moment at which `other` runs."""
@@ -81,6 +89,11 @@ class Together:
         for outcome in PRECONDITIONS:
             found |= self._passing.get((key, outcome), 0)
         return found
+
+    @cached_property
+    def _after(self) -> list[Mask]:
+        """What comes after each action, by arrows."""
+        return behind([self._children(key) for key in self.keys])
 
     def _children(self, key: Key) -> list[int]:
         listed = self._subject.outgoing.get(key, [])
@@ -120,9 +133,23 @@ class Together:
                         self._again(relation.child)
                 elif answer == "run" and relation.child in self._runs:
                     self._begin(relation.child, key, at_once)
+                if len(self._required.get(relation.child, ())) > relation.required:
+                    self._joins.add(relation.child)
+
+    def _join(self, child: Key) -> None:
+        """What it waits for has more around it than was known when its parents were followed."""
+        for relation in self._subject.incoming.get(child, []):
+            for outcome in self._reports.get(relation.parent, ()):
+                run = relation.parent == ENTRY or relation.conditions.answer(outcome) == "run"
+                if run and child in self._runs:
+                    at_once = self._when(relation.parent, outcome)
+                    at_once |= self._started(relation.parent, outcome)
+                    self._begin(child, relation.parent, at_once)
 
     def _begin(self, child: Key, parent: Key, around: Mask) -> None:
         place = self.place[child]
+        if not around & ~self._with[place] & ~(1 << place):
+            return
         for required in self._required.get(child, ()):
             if required != parent:
                 around &= self._whenever(required) | self._after[self.place[required]]
@@ -131,25 +158,18 @@ class Together:
             return
         self._with[place] |= new
         self._again(child)
-        for other in _places(new):
+        self._pairs += new.bit_count()
+        self.known = self._pairs <= PAIRS
+        for other in _places(new) if self.known else ():
             if not self._with[other] >> place & 1:
                 self._with[other] |= 1 << place
                 self._again(self.keys[other])
 
     def _again(self, key: Key) -> None:
         """More goes on with it than was known: its ends have more around them."""
-        for each in (key, *self._beside(key)):
-            if each not in self._waiting and each in self._reports:
-                self._waiting.add(each)
-                self._open.append(each)
-
-    def _beside(self, key: Key) -> Iterator[Key]:
-        """Those whose end may begin what waits for this one, too."""
-        for relation in self._subject.outgoing.get(key, []):
-            if relation.required and relation.child in self.place:
-                for other in self._subject.incoming.get(relation.child, []):
-                    if other.parent != key:
-                        yield other.parent
+        if key not in self._waiting and key in self._reports:
+            self._waiting.add(key)
+            self._open.append(key)
 
 
 def _places(mask: Mask) -> Iterator[int]:
