@@ -73,6 +73,8 @@ export interface Problem {
   where: Where;
   message: string;
   fix?: string | null;
+  /** The other places of the same thing, which is told once. */
+  also?: { path?: string; aid?: string; relation?: string }[];
 }
 
 export interface Problems {

@@ -8,7 +8,8 @@ from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics.course import LAPS, MORE, Kind, Outcome
 from action_assistant.umrf.semantics.engine import Engine
 from action_assistant.umrf.semantics.network import Network
-from action_assistant.umrf.semantics.parts import EXIT_NODE, Node, Outcome as Result, Running
+from action_assistant.umrf.semantics.parts import EXIT_NODE, Node, Running
+from action_assistant.umrf.semantics.parts import Outcome as Result
 from action_assistant.umrf.semantics.script import Behaviour, Script
 from action_assistant.umrf.semantics.trace import (
     Dispatch,
