@@ -214,6 +214,32 @@ def test_a_simulation_that_is_cut_off_says_so(tmp_path: Path, trace: list[str]) 
         assert "hazard events: The simulation ends here" in last
 
 
+def test_a_sub_graph_is_judged_as_it_is_inside_the_graph_that_uses_it(tmp_path: Path) -> None:
+    leaf = {"p": {"pvf_type": "string"}}
+    inner = {
+        "graph_name": "Inner",
+        "actions": [{"name": "A", "type": "sync", "input_parameters": leaf}],
+    }
+    given = {"p": {"pvf_type": "string", "pvf_value": "x"}}
+    outer = {
+        "graph_name": "outer",
+        "actions": [{"name": "Inner", "type": "sync", "input_parameters": given}],
+    }
+    paths = []
+    for name, value in (("inner", inner), ("outer", outer)):
+        path = tmp_path / f"{name}.graph.json"
+        path.write_text(json.dumps(value))
+        paths.append(str(path))
+    together = run("check", "--json", *paths)
+    assert together.returncode == 0
+    assert [verdict["problems"] for verdict in json.loads(together.stdout)] == [[], []]
+    alone = run("check", "--json", paths[0])
+    assert alone.returncode == 0
+    (problem,) = json.loads(alone.stdout)[0]["problems"]
+    assert (problem["code"], problem["severity"]) == ("H7", "warning")
+    assert "Unless it is used inside another graph" in problem["message"]
+
+
 def test_the_file_of_an_action_is_checked_as_such(tmp_path: Path) -> None:
     path = written(tmp_path, {"name": "Go", "type": "sync", "input_parameters": {"x": 5}})
     answer = run("check", "--json", path)

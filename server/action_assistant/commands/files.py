@@ -3,7 +3,7 @@
 import argparse
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,6 +13,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.umrf import check as checks
 from action_assistant.umrf import codec, semantics
 from action_assistant.umrf.action_files import ACTION_DIALECTS
+from action_assistant.umrf.codes import rank
 from action_assistant.umrf.facts import PINNED, SIMULATED, EngineFacts, facts_for
 from action_assistant.umrf.fixes import with_examples
 from action_assistant.umrf.model import Graph, Note, Problem, Signature, Where
@@ -119,7 +120,10 @@ def _check(options: argparse.Namespace) -> int:
     facts = facts_for(options.facts) if options.facts else PINNED
     actions = _actions(options.actions) if options.actions else None
     graphs = _library(options.graphs) if options.graphs else None
-    verdicts = [_verdict(path, facts, actions, graphs) for path in options.files]
+    if len(options.files) > 1:
+        graphs = {**_given(options.files), **(graphs or {})}
+    used = {action.name for graph in (graphs or {}).values() for action in graph.actions}
+    verdicts = [_verdict(path, facts, actions, graphs, used) for path in options.files]
     if options.json:
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(verdicts)).decode() + "\n")
     else:
@@ -134,6 +138,7 @@ def _verdict(
     facts: EngineFacts,
     actions: Mapping[str, Signature] | None,
     graphs: Mapping[str, Graph] | None,
+    used: Collection[str],
 ) -> Verdict:
     text = _text(path)
     try:
@@ -146,8 +151,34 @@ def _verdict(
         where = Where(path=error.path, line=error.line, column=error.column)
         problem = Problem(code=error.code, severity="error", where=where, message=error.message)
         return Verdict(str(path), None, (problem,))
+    inside = reading.graph.name in used
     found = checks.check_reading(reading, actions, facts, graphs)
+    found = [_as_sub_graph(problem) for problem in found if not (inside and problem.code == "H7")]
+    found.sort(key=rank)
     return Verdict(str(path), reading.dialect, tuple(dict.fromkeys(found)), reading.remarks)
+
+
+def _as_sub_graph(problem: Problem) -> Problem:
+    """A file may be meant for use inside another graph, which gives its entries their values; a start
+    of it by itself is refused all the same."""
+    if problem.code != "H7":
+        return problem
+    message = problem.message.removesuffix(" (As a sub-graph it may get one.)")
+    message += " Unless it is used inside another graph: check it together with that one."
+    return msgspec.structs.replace(problem, severity="warning", message=message)
+
+
+def _given(paths: Sequence[Path]) -> dict[str, Graph]:
+    """The graphs of several files by name: each may be used inside another."""
+    found: dict[str, Graph] = {}
+    for path in paths:
+        try:
+            reading = codec.read(_text(path))
+        except codec.Unreadable:
+            continue  # told when it is checked itself
+        if reading.dialect not in ACTION_DIALECTS and not checks.refused_by_parser(reading):
+            found.setdefault(reading.graph.name, reading.graph)
+    return found
 
 
 def _print(verdict: Verdict) -> None:

@@ -104,7 +104,7 @@ CODES: Final[dict[str, Code]] = {
         "the action ends in ERROR, stays PAUSED, or the engine blocks itself",
     ),
     "H7": Code(
-        "hazard", _ERROR, "an entry action whose required input has no value",
+        "hazard", _BOTH, "an entry action whose required input has no value",
         "the engine says nothing and never starts the graph", ("take-example",),
     ),
     "H8": Code(

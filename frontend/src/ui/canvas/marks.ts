@@ -28,15 +28,17 @@ export function bySeverity(problems: readonly Problem[]): Problem[] {
 export function marksOf(problems: readonly Problem[]): Marks {
   const marks = new Map<string, Mark>();
   for (const problem of bySeverity(problems)) {
-    const place = placeOf(problem);
-    if (place === null) continue;
-    const { error = 0, warning = 0, reasons = "" } = marks.get(place) ?? {};
     const line = `${problem.code}: ${problem.message}`;
-    marks.set(place, {
-      error: error + (problem.severity === "error" ? 1 : 0),
-      warning: warning + (problem.severity === "warning" ? 1 : 0),
-      reasons: reasons === "" ? line : `${reasons}\n${line}`,
-    });
+    const others = (problem.also ?? []).map(({ relation, aid }) => relation ?? aid ?? null);
+    for (const place of new Set([placeOf(problem), ...others])) {
+      if (place === null) continue;
+      const { error = 0, warning = 0, reasons = "" } = marks.get(place) ?? {};
+      marks.set(place, {
+        error: error + (problem.severity === "error" ? 1 : 0),
+        warning: warning + (problem.severity === "warning" ? 1 : 0),
+        reasons: reasons === "" ? line : `${reasons}\n${line}`,
+      });
+    }
   }
   return marks;
 }

@@ -174,7 +174,7 @@ def _asked(
     if edge.child is None or link is None:
         return None
     child = places[id(edge.child)]
-    responses = {outcome: link.conditions.answer(outcome) for outcome in PRECONDITIONS}
+    responses: dict[str, str] = {o: link.conditions.answer(o) for o in PRECONDITIONS}
     bit = bits[child].get(parent.full_name, 0)
     try:
         found = renamed(parent.outputs, edge.remap, edge.child.inputs)

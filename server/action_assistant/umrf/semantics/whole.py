@@ -53,7 +53,9 @@ class _Timed(Engine):
 def whole(net: Network, graph: Graph, full_name: str, result: str) -> tuple[Outcome, int]:
     """How a graph ends in which the first run of an action ends with `result`, and how many events
     that took. "" is nobody."""
-    calls = {full_name: (Behaviour(result=result), Behaviour())} if full_name else {}
+    calls: dict[str, tuple[Behaviour, ...]] = {}
+    if full_name:
+        calls[full_name] = (Behaviour(result=result), Behaviour())
     engine = _Timed(net, Script(calls))
     seen = _Seen(net)
     traces = engine.start(graph, 0.0)
