@@ -43,7 +43,7 @@ class Together:
             for key, listed in subject.incoming.items()
         }
         if self.known:
-            self._starts: dict[tuple[Key, Precondition], Mask] = {}
+            self._starts: dict[Precondition, list[Mask]] = {}
             self._open = deque[Key](key for key in reports if key != EXIT)
             self._waiting = set(self._open)
             self._pairs = 0
@@ -107,18 +107,29 @@ class Together:
 
     def _started(self, key: Key, outcome: Precondition) -> Mask:
         """What an end starts at its instant, also by way of bypasses."""
-        if (key, outcome) not in self._starts:
-            seen, stack, mask = {key}, [key], 0
-            while stack:
-                for relation, answer in self._answers(stack.pop(), outcome):
-                    child = relation.child
-                    if answer == "run" and child in self._runs:
-                        mask |= 1 << self.place[child]
-                    elif answer == "bypass" and child not in seen:
-                        seen.add(child)
-                        stack.append(child)
-            self._starts[key, outcome] = mask
-        return self._starts[key, outcome]
+        if key == ENTRY:
+            return sum(
+                {1 << place for place in self._children(key) if self.keys[place] in self._runs}
+            )
+        if outcome not in self._starts:
+            self._starts[outcome] = self._all_started(outcome)
+        return self._starts[outcome][self.place[key]]
+
+    def _all_started(self, outcome: Precondition) -> list[Mask]:
+        """Of each action: bypasses are ways, what they start lies at their ends, counted from behind
+        the last action."""
+        count = len(self.keys)
+        ways: list[list[int]] = []
+        for key in self.keys:
+            own: list[int] = []
+            for relation, answer in self._answers(key, outcome):
+                place = self.place[relation.child]
+                if answer == "run" and relation.child in self._runs:
+                    own.append(count + place)
+                elif answer == "bypass":
+                    own.append(place)
+            ways.append(own)
+        return [mask >> count for mask in behind(ways)]
 
     def _follow(self, key: Key) -> None:
         for outcome in self._reports[key]:
