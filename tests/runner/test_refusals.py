@@ -215,7 +215,9 @@ def log() -> StartLog:
         id="r", number=1, request_id="q", author=ANN, graph=None, graph_name="patrol", version="",
         digest="", engine="David", simulated=False, requested_at=0,
     )  # fmt: skip
-    return StartLog(run)
+    found = StartLog(run)
+    found.begins()
+    return found
 
 
 @pytest.mark.parametrize(
@@ -247,3 +249,14 @@ def test_once_somebody_else_has_started_something_no_line_counts() -> None:
     found.doubt()
     found.hear("map::at")
     assert found.words == ""
+
+
+def test_a_runner_that_takes_a_run_up_cannot_tell_whose_start_is_refused() -> None:
+    run = Run(
+        id="r", number=1, request_id="q", author=ANN, graph=None, graph_name="patrol", version="",
+        digest="", engine="David", simulated=False, requested_at=0,
+    )  # fmt: skip
+    taken_up = StartLog(run)
+    for line in (RECEIVED, REFUSAL):
+        taken_up.hear(line)
+    assert taken_up.words == ""

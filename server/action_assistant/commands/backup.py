@@ -55,11 +55,15 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
             "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
         )
     backup.add_argument(
-        "--database", metavar="URL", help="of the editor; default: the one that was served last"
+        "--database",
+        metavar="URL",
+        default=settings.database(),
+        help="of the editor; default: the one that was served last",
     )
     back.add_argument(
         "--database",
         metavar="URL",
+        default=settings.database(),
         help="where the graphs shall be, an empty database; default: where those of the folder are",
     )
     backup.set_defaults(deed=_backup)

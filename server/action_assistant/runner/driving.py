@@ -290,7 +290,7 @@ class OpenRun:
     async def _publish(self, order: Order, incarnation: str) -> None:
         """Send the one start message. Whatever happens, it is never sent again."""
         at = self._wall()
-        self.watch.sends(order.umrf)
+        self.watch.starts(order.umrf)
         if self.run.desired == "stopped":
             self.end("stopped", "Stopped before anything was sent.")
             return

@@ -31,16 +31,22 @@ _LONGEST: Final = 300  # characters of the engine's words in a sentence
 class StartLog:
     """The lines about the one start of `run`, from the moment on that it is handed over.
 
-    `words`: why the engine refused it; "" while it has not, or nobody can tell whose start it was.
+    `words`: why the engine refused it; "" while it has not, or nobody can tell whose start it was. A
+    runner that takes a run up has not heard everything, so that lines prove nothing to it any more;
+    what was proven before is an alarm of the run.
     """
 
     def __init__(self, run: Run) -> None:
         self._graph = run.graph_name
         self._next = False  # the next line tells what became of it
         told = next((each for each in run.alarms if each.code == REFUSED), None)
-        self._over = run.graph_state is not None or told is not None
+        self._over = True
         others = any(each.code in _STARTED_BY_OTHERS for each in run.alarms)
         self.words = "" if told is None or others else _between_quotes(told.text)
+
+    def begins(self) -> None:
+        """The start is handed over now: lines from here on may be about it."""
+        self._over = False
 
     def hear(self, text: str) -> bool:
         """One more line. Whether it says that the start was refused."""

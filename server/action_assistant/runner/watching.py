@@ -119,8 +119,13 @@ class Watch:
         """Ask now."""
         self._look.set()
 
+    def starts(self, umrf: str) -> None:
+        """This graph is being started, now: the engine's log may tell what becomes of it."""
+        self._start.begins()
+        self.sends(umrf)
+
     def sends(self, umrf: str) -> None:
-        """This graph is being started: what the engine shows is compared with it, once."""
+        """This graph is handed over: what the engine shows is compared with it, once."""
         self._sent = self.umrf = umrf
 
     def hear(self, line: str) -> None:
