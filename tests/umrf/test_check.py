@@ -117,7 +117,7 @@ def test_a_sound_graph_has_no_problems() -> None:
         (file(A | {"actor": "x"}, B | {"actor": "y"}), "actors", "error"),
         (file(A, action("B", parents=[{"name": "A", "conditions": ["on_true -> restart", *SAFE]}])), "restart", "warning"),
         (
-            file(A, action("B", parents=[{"name": "A", "conditions": ["on_true -> pause", *SAFE]}]), entry=["A", "B"]),
+            file(A, action("B", parents=[{"name": "A", "required": False, "conditions": ["on_true -> pause", *SAFE]}]), entry=["A", "B"]),
             "H5", "warning",
         ),
     ],

@@ -177,3 +177,14 @@ def test_what_kills_the_engine_comes_before_what_may() -> None:
     warnings = [p.code for p in check(value) if p.severity == "warning"]
     assert warnings[0] == "H4"
     assert warnings.index("H12") < warnings.index("H3")
+
+
+def test_what_waits_for_another_does_not_begin_beside_it() -> None:
+    """B and C both follow A, and C waits for B, too."""
+    value = graph(
+        action("A", children=["B", "C"]),
+        action("B", ["A"], ["C"]),
+        action("C", ["A", "B"]),
+        exits=[{"name": "C", "conditions": ["on_error -> run"]}],
+    )
+    assert found(value, "H12") == []

@@ -133,19 +133,23 @@ class Together:
 
     def _follow(self, key: Key) -> None:
         for outcome in self._reports[key]:
-            at_once = self._when(key, outcome) | self._started(key, outcome)
-            if key in self._lively:
-                at_once |= 1 << self.place[key]
             for relation, answer in self._answers(key, outcome):
+                child = relation.child
                 if answer == "bypass":
-                    passing = self._passing.get((relation.child, outcome), 0)
+                    passing = self._passing.get((child, outcome), 0)
+                    at_once = self._around(key, outcome) | self._started(key, outcome)
                     if at_once & ~passing:
-                        self._passing[relation.child, outcome] = passing | at_once
-                        self._again(relation.child)
-                elif answer == "run" and relation.child in self._runs:
-                    self._begin(relation.child, key, at_once)
-                if len(self._required.get(relation.child, ())) > relation.required:
-                    self._joins.add(relation.child)
+                        self._passing[child, outcome] = passing | at_once
+                        self._again(child)
+                elif answer == "run" and child in self._runs:
+                    self._begin(child, key, outcome)
+                if len(self._subject.incoming[child]) > 1:
+                    self._joins.add(child)
+
+    def _around(self, key: Key, outcome: Precondition) -> Mask:
+        """What goes on already when it reports; a spontaneous one goes on itself."""
+        own = 1 << self.place[key] if key in self._lively else 0
+        return own | self._when(key, outcome)
 
     def _join(self, child: Key) -> None:
         """What it waits for has more around it than was known when its parents were followed."""
@@ -153,18 +157,23 @@ class Together:
             for outcome in self._reports.get(relation.parent, ()):
                 run = relation.parent == ENTRY or relation.conditions.answer(outcome) == "run"
                 if run and child in self._runs:
-                    at_once = self._when(relation.parent, outcome)
-                    at_once |= self._started(relation.parent, outcome)
-                    self._begin(child, relation.parent, at_once)
+                    self._begin(child, relation.parent, outcome)
 
-    def _begin(self, child: Key, parent: Key, around: Mask) -> None:
+    def _begin(self, child: Key, parent: Key, outcome: Precondition) -> None:
+        if not self.known:
+            return
         place = self.place[child]
-        if not around & ~self._with[place] & ~(1 << place):
+        around, started = self._around(parent, outcome), self._started(parent, outcome)
+        found = (around | started) & ~self._with[place] & ~(1 << place)
+        if not found:
             return
         for required in self._required.get(child, ()):
             if required != parent:
-                around &= self._whenever(required) | self._after[self.place[required]]
-        new = around & ~self._with[place] & ~(1 << place)
+                found &= self._whenever(required) | self._after[self.place[required]]
+        new = found
+        for other in _places(found & started & ~around):
+            if not self._is_ready(self.keys[other], parent, place):
+                new ^= 1 << other
         if not new:
             return
         self._with[place] |= new
@@ -175,6 +184,15 @@ class Together:
             if not self._with[other] >> place & 1:
                 self._with[other] |= 1 << place
                 self._again(self.keys[other])
+
+    def _is_ready(self, key: Key, parent: Key, beside: int) -> bool:
+        """Whether what the same end would start can begin while the other (a place) goes on: what it
+        waits for besides has to have reported by then."""
+        return all(
+            required == parent
+            or (self._whenever(required) | self._after[self.place[required]]) >> beside & 1
+            for required in self._required.get(key, ())
+        )
 
     def _again(self, key: Key) -> None:
         """More goes on with it than was known: its ends have more around them."""
