@@ -117,14 +117,7 @@ class Invitations:
             raise Conflict(f"There are {_MOST} links already; revoke some.")
         made = new_aid()
         await self._append(h.INVITED, author, h.MadeInvitation(made, role, label))
-        self._made[made] = Invitation(
-            id=made,
-            role=role,
-            label=label,
-            made_at=datetime.now(UTC),
-            made_by=Author(author, ""),
-            guests=[],
-        )
+        await self._read(made)
         return self.get(made)
 
     def get(self, invitation: str) -> Invitation:
@@ -211,15 +204,21 @@ class Invitations:
         if any(each.person.id == person.id for each in guests):
             return
         await self._append(h.ACCEPTED, person.id, h.AcceptedInvitation(invitation, person.name))
+        guest = tables.guest.c
+        mine = select(guest.at).where(guest.invitation == invitation, guest.person == person.id)
+        (row,) = await self._journal.query(mine)
         if not any(each.person.id == person.id for each in guests):
-            guests.append(Guest(Author(person.id, person.name), datetime.now(UTC)))
+            guests.append(Guest(Author(person.id, person.name), h.when(row.at)))
 
     async def _append(self, kind: str, author: str, body: msgspec.Struct) -> None:
         await self._journal.append(h.INVITATIONS, [h.draft(kind, author, body)])
 
-    async def _read(self) -> None:
-        """What the log says."""
-        for row in await self._journal.query(select(tables.invitation)):
+    async def _read(self, new: str | None = None) -> None:
+        """What the log says, of all or of a new one."""
+        which = select(tables.invitation)
+        if new is not None:
+            which = which.where(tables.invitation.c.id == new)
+        for row in await self._journal.query(which):
             over = row.revoked_at is not None
             self._made[row.id] = Invitation(
                 id=row.id,
@@ -231,6 +230,8 @@ class Invitations:
                 revoked_at=h.when(row.revoked_at) if over else None,
                 revoked_by=Author(row.revoked_by, "") if over else None,
             )
+        if new is not None:
+            return
         for each in await self._journal.query(select(tables.guest).order_by(tables.guest.c.at)):
             if each.invitation in self._made:
                 guest = Guest(Author(each.person, each.name), h.when(each.at))
