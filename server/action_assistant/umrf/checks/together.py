@@ -13,8 +13,8 @@ from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
 from action_assistant.umrf.semantics.network import Mask, behind
 
-#: Above so many pairs that may go on at the same time the rest is not followed: any two may, then.
-PAIRS: Final = 150_000
+#: Pairs that are looked at; where there are more the rest is not followed: any two may meet, then.
+PAIRS: Final = 400_000
 #: Above so many actions nothing is followed.
 MOST: Final = 20_000
 
@@ -89,6 +89,12 @@ class Together:
         for outcome in PRECONDITIONS:
             found |= self._passing.get((key, outcome), 0)
         return found
+
+    @cached_property
+    def _needs(self) -> list[Mask]:
+        """What each action waits for."""
+        listed = (self._required.get(key, ()) for key in self.keys)
+        return [sum(1 << self.place[each] for each in set(own)) for own in listed]
 
     @cached_property
     def _after(self) -> list[Mask]:
@@ -167,31 +173,42 @@ class Together:
         found = (around | started) & ~self._with[place] & ~(1 << place)
         if not found:
             return
+        self._count(1 + len(self._required.get(child, ())))
         for required in self._required.get(child, ()):
             if required != parent:
                 found &= self._whenever(required) | self._after[self.place[required]]
         new = found
         for other in _places(found & started & ~around):
+            self._count(1)
+            if not self.known:
+                return
             if not self._is_ready(self.keys[other], parent, place):
                 new ^= 1 << other
         if not new:
             return
         self._with[place] |= new
         self._again(child)
-        self._pairs += new.bit_count()
-        self.known = self._pairs <= PAIRS
+        self._count(new.bit_count())
         for other in _places(new) if self.known else ():
             if not self._with[other] >> place & 1:
                 self._with[other] |= 1 << place
                 self._again(self.keys[other])
 
+    def _count(self, looked_at: int) -> None:
+        self._pairs += looked_at
+        self.known = self._pairs <= PAIRS
+
     def _is_ready(self, key: Key, parent: Key, beside: int) -> bool:
         """Whether what the same end would start can begin while the other (a place) goes on: what it
         waits for besides has to have reported by then."""
+        listed = self._required.get(key, ())
+        if self._needs[self.place[key]] >> beside & ~self._after[beside] >> beside & 1:
+            return False
+        self._count(len(listed))
         return all(
             required == parent
             or (self._whenever(required) | self._after[self.place[required]]) >> beside & 1
-            for required in self._required.get(key, ())
+            for required in listed
         )
 
     def _again(self, key: Key) -> None:
