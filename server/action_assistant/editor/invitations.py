@@ -171,6 +171,8 @@ class Invitations:
                 if by.name:
                     await self._people.seen(by)
                 await self._append(h.REVOKED, by.id, h.RevokedInvitation(invitation))
+                when = select(tables.invitation.c.revoked_at)
+                row = await self._journal.query(when.where(tables.invitation.c.id == invitation))
                 self._revoked.write_again()
             except Unavailable as error:
                 if not told:
@@ -181,7 +183,9 @@ class Invitations:
                 await asyncio.sleep(_AGAIN_S)
                 continue
             self._unrecorded.pop(0)
-            self._made[invitation] = replace(self._made[invitation], unrecorded=False)
+            self._made[invitation] = replace(
+                self._made[invitation], unrecorded=False, revoked_at=h.when(row[0].revoked_at)
+            )
         if told:
             log.info("the log says now what is revoked")
 
