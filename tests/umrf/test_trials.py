@@ -49,6 +49,19 @@ def test_a_deviation_ends_as_when_the_engine_goes_through_all_of_it(
         assert told(found) == told(whole(net, graph, name, outcome)[0]), (name, outcome)
 
 
+def test_what_runs_on_when_the_usual_course_is_finished_is_not_finished_with_it() -> None:
+    """A graph that A0 ends while A1 begins; if A0 is false, A1 goes on to an end of its own."""
+    arrows = [
+        Relation(parent=ENTRY, child="k0", conditions=ENTRY_CONDITIONS),
+        Relation(parent="k0", child="k1", conditions=Conditions("run", "run")),
+        Relation(parent="k1", child="k2", conditions=Conditions("run")),
+        Relation(parent="k0", child=EXIT, conditions=Conditions("run")),
+    ]
+    actions = tuple(Action(key=f"k{n}", name=f"A{n}") for n in range(3))
+    ends = {t.outcome: t.end.kind for t in Trials(Graph(name="g", actions=actions, relations=tuple(arrows))) if t.action is None or t.action.name == "A0"}  # fmt: skip
+    assert ends == {"": "finished", "on_false": "halted", "on_error": "halted"}
+
+
 @given(busy_graphs(8))
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 def test_what_is_not_tried_cannot_end_otherwise(graph: Graph) -> None:

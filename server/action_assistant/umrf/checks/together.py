@@ -166,7 +166,7 @@ class Together:
                     self._begin(child, relation.parent, outcome)
 
     def _begin(self, child: Key, parent: Key, outcome: Precondition) -> None:
-        if not self.known:
+        if self._is_enough():
             return
         place = self.place[child]
         around, started = self._around(parent, outcome), self._started(parent, outcome)
@@ -180,7 +180,7 @@ class Together:
         new = found
         for other in _places(found & started & ~around):
             self._count(1)
-            if not self.known:
+            if self._is_enough():
                 return
             if not self._is_ready(self.keys[other], parent, place):
                 new ^= 1 << other
@@ -189,10 +189,13 @@ class Together:
         self._with[place] |= new
         self._again(child)
         self._count(new.bit_count())
-        for other in _places(new) if self.known else ():
+        for other in _places(new) if not self._is_enough() else ():
             if not self._with[other] >> place & 1:
                 self._with[other] |= 1 << place
                 self._again(self.keys[other])
+
+    def _is_enough(self) -> bool:
+        return self._pairs > PAIRS
 
     def _count(self, looked_at: int) -> None:
         self._pairs += looked_at

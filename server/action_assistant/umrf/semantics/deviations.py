@@ -38,7 +38,7 @@ class Deviations:
         self.alone: dict[int, Outcome] = {}
         #: How it goes on from these differences; and who had been left out of them till then.
         self.known: dict[_Key, tuple[Outcome, Mask]] = {}
-        for number, active in enumerate(course.active):
+        for number, active in enumerate(course.active[:-1]):  # with the last it ended
             if active == 1:
                 self._note_alone(number)
 
