@@ -11,7 +11,15 @@ from hypothesis import strategies as st
 from action_assistant.umrf.check import check
 from action_assistant.umrf.checks.trials import Trials
 from action_assistant.umrf.codec import read
-from action_assistant.umrf.model import Graph
+from action_assistant.umrf.model import (
+    ENTRY,
+    ENTRY_CONDITIONS,
+    EXIT,
+    Action,
+    Conditions,
+    Graph,
+    Relation,
+)
 from action_assistant.umrf.semantics.course import Course, Outcome
 from action_assistant.umrf.semantics.deviations import Deviations, Tied
 from action_assistant.umrf.semantics.network import Network

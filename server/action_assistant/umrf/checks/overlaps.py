@@ -2,6 +2,7 @@
 leave something running (SPEC 2.3, 2.5; H4, H5, H12). Only what can happen is told."""
 
 from collections.abc import Collection, Mapping
+from typing import Final
 
 import msgspec
 
@@ -9,6 +10,8 @@ from action_assistant.umrf.checks.places import Subject, joined, more
 from action_assistant.umrf.checks.together import Together
 from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
 
+#: Ways to the exit that are looked at one by one; of more, those count that say the same as the first.
+_ENDS: Final = 200
 _Reports = Mapping[Key, Collection[Precondition]]
 
 
@@ -96,7 +99,7 @@ def check_stragglers(subject: Subject, reports: _Reports, together: Together) ->
     incoming = [r for r in subject.incoming.get(EXIT, []) if not r.listing]
     found = [
         early
-        for relation in incoming
+        for relation in incoming[:_ENDS]
         if (early := _early(subject, relation, incoming, reports, together)) is not None
     ]
     if not found:
@@ -108,12 +111,17 @@ def check_stragglers(subject: Subject, reports: _Reports, together: Together) ->
     else:
         how = f"ends with {' or '.join(first.bypassed)}" if first.bypassed else "ends first"
         start = f"If {end} {how}, the graph is FINISHED while {who} may run on"
-    rest = more(len(found) - 1, "way to the exit", "ways to the exit")
+    alike = [r for r in incoming[_ENDS:] if _same(r, first.relation)]
+    rest = more(len(found) - 1 + len(alike), "way to the exit", "ways to the exit")
     message = f"{start}: the engine then ignores every stop of the graph.{rest}"
-    others = (early.relation for early in found[1:])
+    others = [early.relation for early in found[1:]] + alike
     subject.report(
         "H12", "warning", message, relation=first.relation, member="/conditions", also=others
     )
+
+
+def _same(one: Relation, other: Relation) -> bool:
+    return one.required == other.required and one.conditions == other.conditions
 
 
 def _left(subject: Subject, early: _Early) -> str:

@@ -32,7 +32,7 @@ class Together:
         self._subject = subject
         self._runs = runs
         self._reports = reports
-        self.known = len(self.keys) <= MOST
+        self._pairs = 0 if len(self.keys) <= MOST else PAIRS + 1
         count = len(self.keys)
         self._with: list[Mask] = [0] * count  # while it runs
         #: When it passes on an outcome because it is bypassed, which is none of its own ends.
@@ -46,7 +46,6 @@ class Together:
             self._starts: dict[Precondition, list[Mask]] = {}
             self._open = deque[Key](key for key in reports if key != EXIT)
             self._waiting = set(self._open)
-            self._pairs = 0
             self._joins: set[Key] = set()
             while (self._open or self._joins) and self.known:
                 if self._open:
@@ -55,6 +54,11 @@ class Together:
                     self._follow(key)
                 else:
                     self._join(self._joins.pop())
+
+    @property
+    def known(self) -> bool:
+        """See the class."""
+        return self._pairs <= PAIRS
 
     def may_run(self, key: Key, other: Key) -> bool:
         """Whether `key` can run at a moment at which `other` runs."""
@@ -91,6 +95,12 @@ class Together:
         return found
 
     @cached_property
+    def _first(self) -> Mask:
+        """What the graph begins with."""
+        places = {place for place in self._children(ENTRY) if self.keys[place] in self._runs}
+        return sum(1 << place for place in places)
+
+    @cached_property
     def _needs(self) -> list[Mask]:
         """What each action waits for."""
         listed = (self._required.get(key, ()) for key in self.keys)
@@ -114,9 +124,7 @@ class Together:
     def _started(self, key: Key, outcome: Precondition) -> Mask:
         """What an end starts at its instant, also by way of bypasses."""
         if key == ENTRY:
-            return sum(
-                {1 << place for place in self._children(key) if self.keys[place] in self._runs}
-            )
+            return self._first
         if outcome not in self._starts:
             self._starts[outcome] = self._all_started(outcome)
         return self._starts[outcome][self.place[key]]
@@ -199,7 +207,6 @@ class Together:
 
     def _count(self, looked_at: int) -> None:
         self._pairs += looked_at
-        self.known = self._pairs <= PAIRS
 
     def _is_ready(self, key: Key, parent: Key, beside: int) -> bool:
         """Whether what the same end would start can begin while the other (a place) goes on: what it

@@ -106,7 +106,7 @@ class _Way:
                         raise Tied
                     root = place
             found = self._at(at, root, "on_true")
-            if found is None and self._is_over and self._is_lap(at, root):
+            if found is None and root >= 0 and self._is_over and self._is_lap(at, root):
                 found = Outcome("endless")
         return self._remembered(found)
 
