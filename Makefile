@@ -144,6 +144,8 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	@$(BIN)/pip install --quiet --require-hashes --requirement requirements/dev.txt
 	@$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
+	@# Where interpreters may write no bytecode, every process of ours would compile all of it anew.
+	@$(BIN)/python -m compileall -q server tests
 	@touch $@
 
 # The wheels of rclpy start every interpreter of their environment anew, so they have one of their own.

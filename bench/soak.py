@@ -89,6 +89,11 @@ PARTS: Final[dict[str, Part]] = {
         {"SOAK_ARCHIVE_EVERY": "1"},
         ("tests/runner/review/test_retention.py", "-k", "kill"),
     ),
+    "long": Part(
+        "what CI has no time for: one more product, database or command each",
+        {"TEST_LONG": "1"},
+        ("-m", "long", "tests"),
+    ),
     "clients": Part(
         "stock clients in a room that is silent for a minute",
         {"TEST_IDLE_SECONDS": "61"},

@@ -19,6 +19,15 @@ settings.register_profile("default", deadline=None)
 settings.load_profile("default")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """CI has time for some of each kind; `make test` elsewhere has time for all."""
+    if "CI" not in os.environ or "TEST_LONG" in os.environ:
+        return
+    for item in items:
+        if item.get_closest_marker("long"):
+            item.add_marker(pytest.mark.skip(reason="takes long: `make soak ARGS=long`"))
+
+
 @pytest.fixture(scope="session")
 def anyio_backend() -> str:
     """The servers run on asyncio; so do the tests."""

@@ -129,6 +129,7 @@ def _try_secrets(product: Product) -> None:
     assert TOKEN in (product.data / "open.html").read_text()
 
 
+@pytest.mark.long
 def test_what_prints_an_address_of_a_database_leaves_out_its_password(tmp_path: Path) -> None:
     for command in ("migrate", "doctor", "verify"):
         for url in ("postgresql://me:hunter2@127.0.0.1:1/x", "postgresql:/me:hunter2@[/x"):

@@ -85,6 +85,7 @@ class Child:
         self._arguments = arguments
         self._process: subprocess.Popen[bytes] | None = None
         self._deaths = 0
+        self._starts = 0
         self._born = 0.0
         self._again = 0.0  # when to start, by the monotonic clock
 
@@ -93,6 +94,7 @@ class Child:
         environment = {**self._interpreter.environment(os.environ), **self._settings}
         environment["_ACTION_ASSISTANT_PARENT"] = str(parent)
         self._born = time.monotonic()
+        self._starts += 1
         self._process = subprocess.Popen(
             [self._interpreter.path, "-m", "action_assistant", *self._arguments],
             env=environment,
@@ -111,7 +113,9 @@ class Child:
         if code is None:
             return None
         self._process = None
-        if code == 2:  # it said itself that it cannot start
+        # It said itself that it cannot start. Once both have worked, neither ends the other: a runner
+        # stops robots while the editor's database is away.
+        if code == 2 and self._starts == 1:
             return code
         self._deaths = 1 if now - self._born > _STEADY else self._deaths + 1
         wait = _BACK_OFF[min(self._deaths, len(_BACK_OFF)) - 1]
@@ -241,8 +245,13 @@ def _greet(
     shown_at = f"{plan.reached.public.page}/#t={keys.token}" if plan.reached.public else url
     # Through a file that only this user can read: arguments of a browser are visible to all.
     redirect = plan.data / "open.html"
-    with open(redirect, "w", opener=opener) as out:
-        out.write(f'<!doctype html><meta http-equiv="refresh" content="0;url={url}">')
+    opens = plan.opens and _has_screen()
+    try:
+        with open(redirect, "w", opener=opener) as out:
+            out.write(f'<!doctype html><meta http-equiv="refresh" content="0;url={url}">')
+    except OSError as error:
+        _say(f"{redirect} cannot be written: {error.strerror}")
+        opens = False
     at_terminal = sys.stderr.isatty()  # a log is kept, and read by others
     if at_terminal:
         _say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {shown_at}\n")
@@ -252,7 +261,7 @@ def _greet(
         _say(f"ready at {base}. {redirect} signs you in; the link is shown at a terminal only.")
     if plan.share:
         _say(invitations_as_text(base, keys, trust, secret=not at_terminal))
-    if plan.opens and _has_screen():
+    if opens:
         webbrowser.open(redirect.as_uri())
 
 

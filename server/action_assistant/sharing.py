@@ -74,7 +74,7 @@ def is_ours(base: str, keys: Keys, trust: ssl.SSLContext | None = None) -> bool:
     challenge = secrets.token_urlsafe(32)
     url = f"{base}/api/server?challenge={challenge}"
     try:
-        with urllib.request.urlopen(url, timeout=1, context=trust) as answer:
+        with _opener(trust).open(url, timeout=1) as answer:
             proof = msgspec.json.decode(answer.read(_PROOF), type=Proof)
     except (OSError, urllib.error.URLError, msgspec.DecodeError, HTTPException):
         return False
@@ -121,6 +121,13 @@ def _drawn(link: str) -> str:
     return "".join(f"    {line}\n" for line in out.getvalue().splitlines())
 
 
+def _opener(trust: ssl.SSLContext | None) -> urllib.request.OpenerDirector:
+    """Straight to our own processes: no proxy of the environment is shown the token."""
+    return urllib.request.build_opener(
+        urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=trust)
+    )
+
+
 def _ask(
     base: str, keys: Keys, trust: ssl.SSLContext | None, method: str, body: object = None
 ) -> bytes:
@@ -129,6 +136,6 @@ def _ask(
     request = urllib.request.Request(
         f"{base}/api/invitations", data=data, headers=headers, method=method
     )
-    with urllib.request.urlopen(request, timeout=_PATIENCE_S, context=trust) as answer:
+    with _opener(trust).open(request, timeout=_PATIENCE_S) as answer:
         found: Any = answer.read()
         return bytes(found)

@@ -32,6 +32,7 @@ def names(editor: Editor) -> set[str]:
         return {each["name"] for each in http.get("/api/graphs").json()}
 
 
+@pytest.mark.long
 def test_another_database_than_before_is_refused_unless_told(
     tmp_path: Path, postgres: Server
 ) -> None:

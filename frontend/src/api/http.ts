@@ -40,6 +40,12 @@ export function leavesOpen(error: unknown): boolean {
 /** The `type` of an answer that none of ours gave, as a proxy's. */
 const UNKNOWN_TYPE = "refused";
 
+/** Whether one of ours said no: nothing will come of this request, however often it is sent. */
+export function isFinal(error: unknown): boolean {
+  if (!(error instanceof Refusal)) return false;
+  return error.details.status < 500 && error.details.type !== UNKNOWN_TYPE;
+}
+
 export interface Ask {
   method?: "GET" | "POST" | "PATCH" | "DELETE";
   /** An object is sent as JSON, a string as it is (also JSON). */

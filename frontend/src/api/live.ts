@@ -1,7 +1,7 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
 import { newAid } from "../graph/ids";
 import { sessionEnd } from "./ended";
-import { Refusal, sentence } from "./http";
+import { isFinal, sentence } from "./http";
 import type { Robot } from "./robots";
 import { getRun, postStop, type Run } from "./runs";
 import { forbidden, type Unreached, unreached } from "./unreached";
@@ -135,8 +135,7 @@ export class Live {
         for (const each of late ? meant : [run]) await this.#sendStop(each, id);
         this.#answerStop(id, "heard", "");
       } catch (error) {
-        const final = error instanceof Refusal && error.details.status < 500;
-        this.#answerStop(id, final ? "refused" : "unheard", sentence(error));
+        this.#answerStop(id, isFinal(error) ? "refused" : "unheard", sentence(error));
       }
       const now = this.now.stops.find((stop) => stop.id === id);
       if (this.#closed || now?.state !== "unheard") return;

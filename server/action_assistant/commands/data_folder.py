@@ -36,7 +36,7 @@ _OWN: Final = frozenset(
         *("editor.mark", "editor.database", "open.html", ARCHIVE, RESTORING),
     }
 )
-_PASSING: Final = (".lock", "-wal", "-shm", "-journal", ".part")
+_PASSING: Final = (".lock", ".lock.new", "-wal", "-shm", "-journal", ".part")
 ASIDE: Final = "before-restore-"
 _MAGIC: Final = b"SQLite format 3\0"
 _PAGES: Final = 5_000  # copied between two words about it

@@ -1,6 +1,7 @@
 """`people`: who may come in by which link, and the end of a link."""
 
 import argparse
+import os
 from typing import Any
 
 from action_assistant.commands.client import No, Server, command, print_json, refused, running
@@ -83,10 +84,12 @@ def _revoke(options: argparse.Namespace) -> int:
         with running(options) as server:
             return _revoke_at(server, options.id)
     except CannotStart as silent:
-        if options.url:
+        data = options.data.resolve()
+        here = any((data / name).exists() for name in ("editor.db", "editor.database"))
+        if options.url or os.environ.get("ACTION_ASSISTANT_URL") or not here:
             raise
         try:
-            Revoked(own_folder(options.data.resolve())).add(options.id)
+            Revoked(own_folder(data)).add(options.id)
         except (ValueError, Refused) as error:
             raise CannotStart(f"{silent} {error}") from error
         print("No server answers; the link is marked as revoked in the data folder.")

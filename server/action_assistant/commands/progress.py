@@ -4,6 +4,8 @@ import sys
 import time
 from typing import Final
 
+from action_assistant.plain import plain
+
 _EVERY: Final = 1.0  # seconds
 
 
@@ -21,12 +23,21 @@ class Progress:
             return
         self._next = time.monotonic() + _EVERY
         self._shown = sys.stderr.isatty()
-        sys.stderr.write(f"\r\x1b[K{text} …" if self._shown else f"{text} …\n")
-        sys.stderr.flush()
+        if self._shown:
+            _steer(f"\r\x1b[K{plain(text)} …")
+        else:
+            sys.stderr.write(f"{text} …\n")
+            sys.stderr.flush()
 
     def end(self) -> None:
         """Something else is said next."""
         if self._shown:
-            sys.stderr.write("\r\x1b[K")
-            sys.stderr.flush()
+            _steer("\r\x1b[K")
         self._shown = False
+
+
+def _steer(text: str) -> None:
+    """To the terminal itself, past what makes everything else plain."""
+    stream = sys.__stderr__ or sys.stderr
+    stream.write(text)
+    stream.flush()

@@ -65,7 +65,7 @@ def restore(options: argparse.Namespace) -> int:
         _check_names(about, source)
         _check_folder(data, source)
         url = options.database or location.remembered(data) or f"sqlite:///{data / 'editor.db'}"
-        data.mkdir(mode=0o700, parents=True, exist_ok=True)
+        _make(data)
         with workshop(data, _WORK) as folder, ExitStack() as locks:
             for branch in about.journals:
                 locks.callback(os.close, _locked(data, branch))
@@ -79,6 +79,13 @@ def restore(options: argparse.Namespace) -> int:
     progress.end()
     _tell(about, url, data, aside, kept)
     return 0
+
+
+def _make(data: Path) -> None:
+    try:
+        data.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise CannotStart(f"Cannot make {data}: {error.strerror}.") from error
 
 
 def _check_names(about: About, source: Path) -> None:

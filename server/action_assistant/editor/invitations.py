@@ -5,6 +5,7 @@ A link carries the id of an invitation and its secret. The secret follows from t
 """
 
 import asyncio
+import contextlib
 import hmac
 import logging
 from collections.abc import AsyncIterator
@@ -173,7 +174,6 @@ class Invitations:
                 await self._append(h.REVOKED, by.id, h.RevokedInvitation(invitation))
                 when = select(tables.invitation.c.revoked_at)
                 row = await self._journal.query(when.where(tables.invitation.c.id == invitation))
-                self._revoked.write_again()
             except Unavailable as error:
                 if not told:
                     log.warning(
@@ -188,6 +188,8 @@ class Invitations:
             )
         if told:
             log.info("the log says now what is revoked")
+        with contextlib.suppress(Unavailable):  # told when it was tried first; the log has it now
+            await asyncio.to_thread(self._revoked.write_again)
 
     def look(self, proof: str) -> Invited:
         """What a link invites to. Raises Unauthenticated, Withdrawn."""

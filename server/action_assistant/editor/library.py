@@ -51,9 +51,9 @@ class Library:
     async def _refresh(self, graph: str, seq: int) -> None:
         known = self._read.get(graph)
         if known is None or known[0] < seq:
-            sight = await self._sights.now(graph)
             try:
-                actions = await self._sights.ask(used, sight)
+                sight = await self._sights.now(graph)
+                seq, actions = sight.seq, await self._sights.ask(used, sight)
             except HOPELESS:
                 actions = NOTHING
-            self._read[graph] = sight.seq, actions
+            self._read[graph] = seq, actions

@@ -210,7 +210,8 @@ def _asked(url: str, question: Callable[[Connection], T]) -> T:
 
 
 def _is_nowhere(url: str) -> bool:
-    """Whether a URL names a file that is not there."""
+    """Whether a URL names a file that is not there. Raises CannotStart for what is no URL."""
+    database_of(url)
     parsed = make_url(url)
     return parsed.get_backend_name() == "sqlite" and not Path(parsed.database or "").exists()
 

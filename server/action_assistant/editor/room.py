@@ -299,8 +299,9 @@ class Room:
         self._take_in(offer, taken, read)
         return taken
 
-    async def _tried_first(self, offer: Offer) -> Outline:
-        """Its outline. Raises Malformed, Panicked, TooSlow."""
+    async def _tried_first(self, offer: Offer) -> Outline | None:
+        """Its outline; None where it has to be read again, since in a document with depth also what
+        lies beside something deep counts. Raises Malformed, Panicked, TooSlow."""
         large = len(offer.update) > LARGE
         read = None if large else outline(offer.update)
         released = [] if read is None else self._replica.freed_by(read)
@@ -308,7 +309,8 @@ class Room:
             return read
         state = self._replica.doc.get_update()
         waiting = released or self._replica.waiting
-        return await tried_for(offer.author, self._tried, state, offer.update, waiting)
+        tried = await tried_for(offer.author, self._tried, state, offer.update, waiting)
+        return None if self._replica.nesting.spans else tried
 
     def _take_in(self, offer: Offer, taken: Taken, read: Outline | None = None) -> None:
         """Apply one edit, or refuse it."""

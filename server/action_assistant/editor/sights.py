@@ -15,7 +15,7 @@ from action_assistant.editor.replica import Kept
 from action_assistant.editor.rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.web.workers import HOPELESS, Aside, here
+from action_assistant.web.workers import HOPELESS, Aside, Crashed, here
 
 log: Final = logging.getLogger(__name__)
 
@@ -124,12 +124,14 @@ class Sights:
         known = self._summaries.get(graph)
         if known is not None and known.seq >= newest:
             return known
-        sight = await self.now(graph)
         try:
+            sight = await self.now(graph)
             about = await self._aside(contents.about, sight)
         except HOPELESS as error:  # others are in the list too
-            log.error("%s: nothing can be said of change %d: %s", graph, sight.seq, error.detail)
-            return self._summaries.put(graph, Summary(sight.seq))
+            log.error("%s: nothing can be said of change %d: %s", graph, newest, error.detail)
+            nothing = Summary(newest)
+            # What has died once may have been in somebody's way: the next list tries it again.
+            return nothing if isinstance(error, Crashed) else self._summaries.put(graph, nothing)
         return self._summaries.put(graph, _summary(sight.seq, about, newest))
 
     async def _newest(self, graph: str) -> int:

@@ -31,7 +31,7 @@ class Workers:
         threads = CapacityLimiter(8)
         self.files: Final = Lane("files", 2, 30.0, _NICE, threads, _PRELOADED)
         self.graphs: Final = Lane("graphs", 2, 60.0, _NICE, threads, _PRELOADED)
-        self.edits: Final = Lane("edits", 1, 20.0, _NICE, threads, _PRELOADED)
+        self.edits: Final = Lane("edits", 2, 8.0, _NICE, threads, _PRELOADED)
 
     @classmethod
     @asynccontextmanager

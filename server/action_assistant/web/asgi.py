@@ -218,6 +218,9 @@ def _openapi(title: str, api: _OpenApiText) -> OpenAPIConfig:
     )
 
 
+_PASSED_ON: Final = ("x-forwarded-for", "forwarded", "via")
+
+
 def _proving(keys: Keys) -> ControllerRouterHandler:
     keys.prove("", "")  # takes a moment, once
 
@@ -227,7 +230,9 @@ def _proving(keys: Keys) -> ControllerRouterHandler:
         challenge: Annotated[str, Parameter(min_length=20, max_length=100)],
     ) -> Response[Proof]:
         host, port = request.scope.get("server") or ("", 0)
-        proof = keys.prove(challenge, f"{host}:{port}")
+        # Of whoever comes through a proxy the address proves nothing: anybody could pass it on.
+        passed_on = any(name in request.headers for name in _PASSED_ON)
+        proof = keys.prove(challenge, "" if passed_on else f"{host}:{port}")
         return Response(proof, headers={"cache-control": "no-store"})
 
     return prove
