@@ -28,7 +28,10 @@ def told(folder: Path, name: str) -> Any:
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=[path.name for path in FOLDERS])
-@pytest.mark.parametrize("kind", ["SQLite", "Postgres", "a backup"])
+@pytest.mark.parametrize(
+    "kind",
+    ["SQLite", *(pytest.param(kind, marks=pytest.mark.long) for kind in ("Postgres", "a backup"))],
+)
 def test_what_an_earlier_version_left_is_all_there(
     request: pytest.FixtureRequest, tmp_path: Path, folder: Path, kind: str
 ) -> None:

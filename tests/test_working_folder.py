@@ -67,6 +67,7 @@ def test_serve_and_all_that_it_starts_run_nothing_of_it(traps: Path) -> None:
     assert ran(traps) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("arguments", [("doctor", "--json"), ("migrate",)])
 def test_no_command_runs_anything_of_it(traps: Path, arguments: tuple[str, ...]) -> None:
     product = Product(traps.parent / "data", program=PROGRAM, folder=traps)

@@ -10,6 +10,8 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from action_assistant.editor import happenings as h
 from action_assistant.journal.events import Event
 from action_assistant.journal.journal import Journal
@@ -117,6 +119,7 @@ def test_everything_is_there_again_on_an_empty_machine(tmp_path: Path, postgres:
     assert "editor: " in command("verify", "--data", new).stdout
 
 
+@pytest.mark.long
 def test_what_people_do_meanwhile_is_in_it_up_to_one_moment(
     tmp_path: Path, postgres: Server
 ) -> None:
@@ -150,6 +153,7 @@ def test_what_people_do_meanwhile_is_in_it_up_to_one_moment(
     assert 20 < len(some) < len(whole)
 
 
+@pytest.mark.long
 def test_a_database_that_cannot_be_reached_makes_no_backup(
     tmp_path: Path, postgres: Server
 ) -> None:
@@ -170,6 +174,7 @@ def test_a_database_that_cannot_be_reached_makes_no_backup(
     assert command("verify", "--data", data).returncode == 2
 
 
+@pytest.mark.long
 def test_what_is_missing_is_said_and_is_no_success(tmp_path: Path) -> None:
     data = tmp_path / "data"
     with kept(data) as product:

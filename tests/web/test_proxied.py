@@ -68,6 +68,7 @@ def proxied(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Proxied]:
         yield Proxied(product, url, chain)
 
 
+@pytest.mark.long
 def test_a_command_needs_nothing_but_the_public_address(proxied: Proxied, tmp_path: Path) -> None:
     file = tmp_path / "pair.json"
     file.write_text(json.dumps(GRAPH))
@@ -116,6 +117,7 @@ def test_a_large_file_passes_and_one_that_is_too_large_is_refused_by_us(proxied:
     assert answer.headers["content-type"].endswith("json")
 
 
+@pytest.mark.long
 def test_doctor_says_whether_the_proxy_leads_to_both_and_passes_sockets_on(
     proxied: Proxied, tmp_path: Path
 ) -> None:
@@ -129,6 +131,7 @@ def test_doctor_says_whether_the_proxy_leads_to_both_and_passes_sockets_on(
     assert doctor("robots.example.org") == {"public address": "wrong"}
 
 
+@pytest.mark.long
 def test_doctor_tells_a_proxy_that_passes_no_sockets_on(proxied: Proxied, tmp_path: Path) -> None:
     port = free_ports()
     missing = "    proxy_set_header Upgrade $http_upgrade;\n"
