@@ -4,7 +4,7 @@ import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
 import { add, card, saved } from "./bench";
-import { Product } from "./product";
+import { LONG, Product } from "./product";
 
 const product = new Product();
 let graph = "";
@@ -105,6 +105,7 @@ test("after a restore each person decides about the edits that waited, and sees 
 test("who decides later is asked again, can save the changes as a file, and discard them", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   test.setTimeout(120_000);
   const ada = await product.person(browser, "Ada");
   await enter(ada.page);

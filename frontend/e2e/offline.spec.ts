@@ -3,7 +3,7 @@
 import { readFileSync } from "node:fs";
 import { expect, type Page, test } from "@playwright/test";
 import { add, card, saved, umrfOf } from "./bench";
-import { Product } from "./product";
+import { LONG, Product } from "./product";
 
 const product = new Product();
 
@@ -93,6 +93,7 @@ test("edits made while the server is gone survive closing the tab and are merged
 });
 
 test("on a shared tablet nobody's edits are sent under another name", async ({ browser }) => {
+  test.skip(LONG !== "", LONG);
   const ada = await product.person(browser, "Ada");
   const mari = await product.person(browser, "Mari");
   const graph = await newGraph("shared");
@@ -143,6 +144,7 @@ test("on a shared tablet nobody's edits are sent under another name", async ({ b
 test("100 edits without a network and those of others meet: nothing is lost, and Saved means stored", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   test.setTimeout(180_000);
   const ada = await product.person(browser, "Ada");
   const mari = await product.person(browser, "Mari");

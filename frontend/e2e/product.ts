@@ -11,6 +11,10 @@ import type { Browser, BrowserContext, Page } from "@playwright/test";
 const COMMAND = resolve(import.meta.dirname, "../../.venv/bin/action-assistant");
 export const TOKEN = "browser-test-token-0123456789abcdef0123456789";
 
+/** Why CI leaves a test out; nothing elsewhere. */
+export const LONG =
+  process.env.CI && !process.env.TEST_LONG ? "takes long: `make e2e` elsewhere than in CI" : "";
+
 /** A running editor and runner with a data folder of their own. */
 export class Product {
   readonly data = mkdtempSync(join(tmpdir(), "action-assistant-"));

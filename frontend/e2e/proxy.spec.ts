@@ -5,7 +5,7 @@
 
 import { type Browser, expect, type Page, test } from "@playwright/test";
 import { add, card, saved, start } from "./bench";
-import { freePort, type Person, Product, TOKEN } from "./product";
+import { freePort, LONG, type Person, Product, TOKEN } from "./product";
 import { type Kind, missing, NAME, ProxyServer } from "./proxies";
 
 /** A picture for who looks, when a folder for them is named. */
@@ -196,7 +196,7 @@ for (const [kind, path] of CASES) {
 }
 
 test.describe("where the proxy is not as it should be", () => {
-  test.skip(missing("nginx") !== "", missing("nginx"));
+  test.skip((LONG || missing("nginx")) !== "", LONG || missing("nginx"));
   let setting: Setting;
   test.beforeAll(async () => {
     setting = await behind("nginx", "/temoto");
