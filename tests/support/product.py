@@ -97,7 +97,7 @@ class Product:
             )
         self.wait_until_ready()
 
-    def wait_until_ready(self, seconds: float = 40) -> None:
+    def wait_until_ready(self, seconds: float = 120) -> None:
         """Wait until both processes can do their work."""
         deadline = time.monotonic() + seconds
         for url in (self.url, self.runner_url):
