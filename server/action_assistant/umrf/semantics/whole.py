@@ -7,6 +7,7 @@ which stop others as they please, and to hold the two together.
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics.course import LAPS, MORE, Kind, Outcome
 from action_assistant.umrf.semantics.engine import Engine
+from action_assistant.umrf.semantics.graphs import EngineRefused
 from action_assistant.umrf.semantics.network import Network
 from action_assistant.umrf.semantics.parts import EXIT_NODE, Node, Running
 from action_assistant.umrf.semantics.parts import Outcome as Result
@@ -58,7 +59,10 @@ def whole(net: Network, graph: Graph, full_name: str, result: str) -> tuple[Outc
         calls[full_name] = (Behaviour(result=result), Behaviour())
     engine = _Timed(net, Script(calls))
     seen = _Seen(net)
-    traces = engine.start(graph, 0.0)
+    try:
+        traces = engine.start(graph, 0.0)
+    except EngineRefused:  # nothing of it begins, whoever ends how
+        return Outcome("never", seen.early, cut=False), 0
     events = len(traces)
     kind = seen.take(traces)
     left = LAPS * len(net.nodes) + MORE
