@@ -134,11 +134,23 @@ test("a Stop that nobody hears is sent again until somebody does", async () => {
 test("when the runner has nothing to stop it with, a Stop is refused and not repeated", async () => {
   const live = new Live("http://h:1");
   live.open();
-  const problem = { title: "Forbidden", status: 403, detail: "not you" };
+  const problem = { type: "forbidden", title: "Forbidden", status: 403, detail: "not you" };
   vi.stubGlobal("fetch", async () => new Response(JSON.stringify(problem), { status: 403 }));
   live.stop("r");
   await vi.advanceTimersByTimeAsync(5_000);
   expect(live.now.stops.at(-1)).toMatchObject({ state: "refused", detail: "not you" });
+  live.close();
+});
+
+test("when only a proxy says no, a Stop is sent again", async () => {
+  const live = new Live("http://h:1");
+  live.open();
+  const asked = vi.fn(async () => new Response("<h1>429</h1>", { status: 429 }));
+  vi.stubGlobal("fetch", asked);
+  live.stop("r");
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(live.now.stops.at(-1)).toMatchObject({ state: "unheard" });
+  expect(asked.mock.calls.length).toBeGreaterThan(1);
   live.close();
 });
 
