@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -51,17 +52,21 @@ def postgres() -> Iterator[Server]:
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
-    """Makes a file system of so many bytes (`2m`)."""
+def small_disk() -> Iterator[Callable[[str], Path]]:
+    """Makes a file system of so many bytes (`2m`).
+
+    Beside the folders of the tests: a later run that tidies those up fails at the mounts of a test
+    that was killed.
+    """
     places: list[Path] = []
 
     def one(size: str) -> Path:
-        place = tmp_path / f"disk{len(places)}"
-        place.mkdir()
+        place = Path(tempfile.mkdtemp(prefix="action-assistant-disk-"))
         mount = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(place)]
         try:
             subprocess.run(mount, check=True, capture_output=True)
         except (OSError, subprocess.CalledProcessError):
+            place.rmdir()
             pytest.skip("mounting a small file system needs root")
         places.append(place)
         return place
@@ -69,6 +74,7 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
     yield one
     for place in places:
         subprocess.run(["umount", "--lazy", str(place)], check=True)
+        place.rmdir()
 
 
 @pytest.fixture(scope="session")
