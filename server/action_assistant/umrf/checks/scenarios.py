@@ -54,6 +54,7 @@ class _Waiting:
         self.net = net
         self.actions = {action.full_name: action for action in subject.real}
         self._told: set[int] = set()
+        self._firsts: dict[int, int] = {}  # many ways leave the same ones waiting
 
     def report(self, trial: Trial) -> bool:
         """Whether it is told, or was: False for what only the exit waits for."""
@@ -73,12 +74,15 @@ class _Waiting:
 
     def _first(self, waiting: int) -> int:
         """The first that waits for no other that waits."""
-        places = [place for place in range(self.net.exit) if waiting >> place & 1]
-        for place in places:
-            above = (p for p in places if p != place)
-            if not any(self.net.behind[p] >> place & 1 for p in above):
-                return place
-        return places[0]
+        if waiting not in self._firsts:
+            for_others, rest = 0, waiting
+            while rest:
+                lowest = rest & -rest
+                for_others |= self.net.behind[lowest.bit_length() - 1] & ~lowest
+                rest ^= lowest
+            first = waiting & ~for_others or waiting
+            self._firsts[waiting] = (first & -first).bit_length() - 1
+        return self._firsts[waiting]
 
     def _words(self, place: int) -> str | None:
         if place < 0:
