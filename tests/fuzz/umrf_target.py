@@ -77,7 +77,7 @@ def _examine_graph(data: bytes, reading: Reading, started: float) -> bool:
             trace = simulate(reading.graph, states=reading.states, max_events=300, **chosen)
             assert sum(1 for _ in trace) <= 301  # the last one says that it was cut off
     spent = time.process_time() - started
-    allowed = 2 + 20e-6 * len(data) + 400e-6 * data.count(b"{")
+    allowed = 2 + 20e-6 * len(data) + 200e-6 * data.count(b"{")
     assert spent < allowed, f"{spent:.1f} s for {len(data)} bytes"
     used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     assert used < MEGABYTES, f"{used:.0f} MB"

@@ -19,7 +19,13 @@ _BLANK: Final = re.compile(r"[ \t\r\n]*")
 
 def pointer(*keys: str | int) -> str:
     """The JSON pointer (RFC 6901) that leads through these keys."""
-    return "".join("/" + str(key).replace("~", "~0").replace("/", "~1") for key in keys)
+    path = ""
+    for key in keys:
+        if isinstance(key, str) and ("~" in key or "/" in key):
+            path += "/" + key.replace("~", "~0").replace("/", "~1")
+        else:
+            path += f"/{key}"
+    return path
 
 
 class Place(msgspec.Struct, frozen=True):
