@@ -21,6 +21,7 @@ from action_assistant.web.workers import Aside, Crashed
 LARGE: Final = 8 * 1024  # bytes of an update that is tried on a copy first, and by itself
 _BATCH: Final = 200  # items of one commit
 _BATCH_BYTES: Final = 512 * 1024
+_DEATHS: Final = 2  # of processes that try an update, until it is taken for the cause
 _MERGED: Final = 50  # updates merged at once; merging more costs their square
 _MERGED_BYTES: Final = 128 * 1024
 
@@ -76,8 +77,18 @@ class NotAllowed(Exception):
     """The edit of somebody who may only look."""
 
 
+class NotNow(Exception):
+    """The machine has no time for this edit; whoever sends it again may have more luck."""
+
+    def __init__(self, cause: Refused) -> None:
+        super().__init__(cause.detail)
+        self.cause: Final = cause
+
+
 #: Why an edit was not taken.
-Objection: TypeAlias = Malformed | Foreign | Full | TooMuchWaits | Panicked | NotAllowed | TooSlow
+Objection: TypeAlias = (
+    Malformed | Foreign | Full | TooMuchWaits | Panicked | NotAllowed | TooSlow | NotNow
+)
 
 
 def refuse(offer: Offer, error: Objection) -> None:
@@ -107,6 +118,8 @@ def _answer(error: Objection) -> tuple[int, Refused, str | None]:
             return wire.TOO_BIG, TooLarge(f"{error}."), str(error)
         case NotAllowed():
             return wire.FORBIDDEN, BadInput("Not allowed."), None
+        case NotNow():
+            return wire.TOO_SLOW, error.cause, "the server is busy, come again"
 
 
 async def tried_for(
@@ -115,15 +128,21 @@ async def tried_for(
     """The outline of an update that may be applied to a document of this state, and after it the
     updates that waited for it.
 
-    Raises Malformed, Panicked, TooSlow.
+    Raises Malformed, Panicked, TooSlow; NotNow for what does not lie in the update.
     """
-    try:
-        with acting_for(person):
-            return await aside(tried, state, update, released)
-    except Crashed as error:
-        raise Malformed("an update that ends the process") from error
-    except Refused as error:
-        raise TooSlow(f"This change cannot be taken: {error.detail}") from error
+    died = 0
+    while True:
+        try:
+            with acting_for(person):
+                return await aside(tried, state, update, released)
+        except Crashed as error:
+            died += 1
+            if died == _DEATHS:  # one may have been for want of memory
+                raise Malformed("an update that ends the process, or takes too long") from error
+        except TooLarge as error:
+            raise TooSlow(f"This change cannot be taken: {error.detail}") from error
+        except Refused as error:
+            raise NotNow(error) from error
 
 
 def batch_of(items: list[Item], *, one: bool = False) -> tuple[list[Item], list[Item]]:

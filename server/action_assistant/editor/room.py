@@ -18,6 +18,7 @@ from action_assistant.editor.batch import (
     Item,
     Look,
     NotAllowed,
+    NotNow,
     Offer,
     Taken,
     batch_of,
@@ -292,7 +293,7 @@ class Room:
             read = None
             if member is None or (member.edits and not member.refused):
                 read = await self._tried_first(offer)
-        except (Malformed, TooSlow, Panicked) as error:
+        except (Malformed, TooSlow, Panicked, NotNow) as error:
             log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
             refuse(offer, error)
             return taken
@@ -301,7 +302,7 @@ class Room:
 
     async def _tried_first(self, offer: Offer) -> Outline | None:
         """Its outline; None where it has to be read again, since in a document with depth also what
-        lies beside something deep counts. Raises Malformed, Panicked, TooSlow."""
+        lies beside something deep counts. Raises Malformed, Panicked, TooSlow, NotNow."""
         large = len(offer.update) > LARGE
         read = None if large else outline(offer.update)
         released = [] if read is None else self._replica.freed_by(read)

@@ -1,0 +1,96 @@
+"""Large edits are tried in another process first: what becomes of them when that has its own troubles."""
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any, TypeVar
+
+import pytest
+from anyio import CapacityLimiter
+
+from action_assistant.editor import trial, wire
+from action_assistant.editor.member import Member
+from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.trial import tried
+from action_assistant.errors import TooMany
+from action_assistant.journal.journal import Journal
+from action_assistant.web.workers import Crashed, GaveUp, Lane
+from editor.client import Client, settle
+from editor.test_nobody_waits import at_once
+
+T = TypeVar("T")
+
+
+class Troubled:
+    """A way aside that fails with these first."""
+
+    def __init__(self, *errors: Exception) -> None:
+        self.errors = list(errors)
+        self.asked = 0
+
+    async def __call__(self, work: Callable[..., T], /, *args: Any) -> T:
+        self.asked += 1
+        if self.errors:
+            raise self.errors.pop(0)
+        return work(*args)
+
+
+@asynccontextmanager
+async def edited(journal: Journal, aside: Troubled | Lane, update: bytes) -> AsyncIterator[Member]:
+    """Somebody's socket after such an update, and somebody else who goes on."""
+    rooms = Rooms(journal, linger=60, window=0, tried=aside)
+    ada, eve = Client("ada"), Client("eve")
+    async with rooms.enter("graph/g") as room:
+        ada.join(room)
+        eve.join(room)
+        await settle(ada, eve)
+        eve.deliver(wire.change(update))
+        await room.quiet()
+        assert eve.member is not None
+        yield eve.member
+        ada.map["k"] = "v"
+        await settle(ada)
+        assert ada.durable == ada.sent
+    await rooms.close()
+
+
+@pytest.fixture
+def large() -> bytes:
+    return at_once(2_000)
+
+
+@pytest.mark.parametrize("trouble", [TooMany("enough"), GaveUp("took too long")])
+async def test_whose_edit_finds_the_machine_busy_may_send_it_again(
+    journal: Journal, large: bytes, trouble: Exception
+) -> None:
+    aside = Troubled(trouble)
+    async with edited(journal, aside, large) as member:
+        assert await member.ended() == wire.TOO_SLOW
+        assert "busy" in (member.said or "")
+    assert aside.asked == 1
+
+
+async def test_one_process_that_dies_is_not_taken_for_the_edits_fault(
+    journal: Journal, large: bytes
+) -> None:
+    aside = Troubled(Crashed("killed"))
+    async with edited(journal, aside, large) as member:
+        assert not member.refused
+    assert aside.asked == 2
+
+
+async def test_an_edit_that_ends_two_processes_is_refused(journal: Journal, large: bytes) -> None:
+    aside = Troubled(Crashed("killed"), Crashed("killed"))
+    async with edited(journal, aside, large) as member:
+        assert await member.ended() == wire.MALFORMED
+    assert aside.asked == 2
+
+
+async def test_an_edit_that_would_take_minutes_costs_seconds(journal: Journal) -> None:
+    lane = Lane("edits", 1, 120.0, 0, CapacityLimiter(2), [trial.__name__])
+    async with edited(journal, lane, at_once(120_000)) as member:
+        assert await member.ended() == wire.MALFORMED
+    lane.close()
+
+
+def test_the_process_that_serves_is_not_ended_by_what_it_tries(large: bytes) -> None:
+    assert tried(b"\x00\x00", large, []).brings
