@@ -30,6 +30,7 @@ from action_assistant.runner.links import ros2_reach
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run
+from action_assistant.runner.steering import RestRequest
 from action_assistant.runner.visits import Visit
 from action_assistant.umrf.model import Action, Graph, Parameter
 from runner.bounds import GRAPHS, Real, fits
@@ -39,6 +40,7 @@ RUNS = int(os.environ.get("TEST_BOUNDS_RUNS", "6"))
 DOMAIN = int(os.environ.get("TEST_BOUNDS_DOMAIN", "150"))
 AT_ONCE = int(os.environ.get("TEST_BOUNDS_AT_ONCE", "1"))
 SEED = int(os.environ.get("TEST_BOUNDS_SEED", "0"))
+LONGEST_S = 10.0  # what the code of an action may take
 PROGRAM = Path(os.environ.get("UMRF_SHARED", "/nonexistent")) / "engine-lab" / "engine"
 
 pytestmark = [
@@ -136,8 +138,12 @@ class Driven:
             if stop is not None:
                 await anyio.sleep(stop)
                 await control.stop(started.run.id, BEN)
-            while started.run.id in control.open:  # noqa: ASYNC110
+            while (opened := control.open.get(started.run.id)) and not opened.run.unconfirmed:  # noqa: ASYNC110
                 await anyio.sleep(0.05)
+        if started.run.id in control.open:  # until somebody confirms rest, nothing starts beside it
+            await anyio.sleep(LONGEST_S)
+            seen = RestRequest(how="no code of these actions takes that long")
+            await control.confirm_rest(started.run.id, seen, BEN)
         await anyio.sleep(self.chance.uniform(0, 0.5))
 
     def real(self) -> dict[str, list[Real]]:
