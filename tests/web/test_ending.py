@@ -146,6 +146,27 @@ def test_signing_out_ends_the_session_everywhere_at_once(product: Product, arriv
     assert guest.http.get("/api/graphs").status_code == 200
 
 
+@pytest.mark.parametrize("at_runner", [False, True])
+def test_signing_out_ends_every_session_that_the_browser_holds(
+    product: Product, arrive: Arrive, at_runner: bool
+) -> None:
+    """One may be of another path that the server had before."""
+    guest, other = arrive(product), arrive(product)
+    cookies = []
+    for each in (guest, other):
+        each.come(invite(product, "operator"))
+        cookies.append(each.http.headers["cookie"])
+    guest.http.headers["cookie"] = "; ".join(cookies)
+    if at_runner:
+        assert guest.runner("DELETE", "/api/session").status_code == 204
+    else:
+        assert guest.http.delete("/api/session").status_code == 204
+    for cookie in cookies:
+        guest.http.headers["cookie"] = cookie
+        eventually(lambda: guest.http.get("/api/graphs").status_code == 401)
+        eventually(lambda: guest.runner("POST", "/api/stop").status_code == 401)
+
+
 def test_one_signs_out_at_the_runner_while_there_is_no_editor(
     product: Product, arrive: Arrive
 ) -> None:

@@ -282,7 +282,9 @@ class Access:
         if scheme.lower() == "bearer" and self._keys.opens(token.strip()):
             state["person"] = self._local
             return
-        session = self._session(headers)
+        genuine = self._sessions(headers)
+        state["sessions"] = genuine
+        session = self._lasting(genuine)
         ended = session is not None and self._revoked.ends(session)
         if session is not None and not ended and (not session.expired or _is_stop(method, path)):
             if origin is None and method not in _SAFE:
@@ -299,10 +301,13 @@ class Access:
         if not self._is_open(path, "text/html" in headers.get("accept", "")):
             raise state["ended"]
 
-    def _session(self, headers: dict[str, str]) -> Session | None:
-        """The first one that lasts of those whose seal is ours, else the first of these."""
+    def _sessions(self, headers: dict[str, str]) -> list[Session]:
+        """All whose seal is ours: there may be one for each path that this server has had."""
         tried = map(self._keys.session, cookies.values(headers.get("cookie", ""), self._cookie))
-        genuine = [each for each in tried if each is not None]
+        return [each for each in tried if each is not None]
+
+    def _lasting(self, genuine: list[Session]) -> Session | None:
+        """The first one that lasts, else the first."""
         lasting = (each for each in genuine if not (each.expired or self._revoked.ends(each)))
         return next(lasting, genuine[0] if genuine else None)
 

@@ -237,11 +237,11 @@ def revocation(revoked: Revoked) -> list[ControllerRouterHandler]:
 
 
 async def _end(revoked: Revoked, request: _Asking) -> None:
-    """The session of whoever asks, also one that has expired. Raises Unavailable."""
-    state = request.scope["state"]
-    session: Session | None = state.get("session") or state.get("expired")
-    if session is not None:
-        await to_thread.run_sync(revoked.end, session.id)
+    """Every session that the browser of whoever asks holds, also those that have expired. Raises
+    Unavailable."""
+    sessions: list[Session] = request.scope["state"].get("sessions", [])
+    for each in dict.fromkeys(session.id for session in sessions):
+        await to_thread.run_sync(revoked.end, each)
 
 
 async def _invited(
