@@ -60,6 +60,8 @@ def test_a_line_of_a_log_cannot_pretend_to_be_two() -> None:
         "{link}",
         "aa_8000={cookie}",
         "postgresql://me:{password}@db/x",
+        "postgresql://me:a/{password}@db/x",
+        "postgresql+psycopg://me:a:/{password}@db/x",
         "postgresql://me@db/x?password={password}",
     ],
 )
@@ -89,7 +91,7 @@ def test_neither_log_nor_processes_show_secrets_and_nothing_in_them_steers(tmp_p
     with_postgres = servers.binaries() is not None
     if with_postgres:
         with servers.server() as postgres:
-            url = postgres.new_database().replace("aa@", "aa:hunter2@")
+            url = postgres.new_database().replace("aa@", "aa:a/hunter2@")
             _try_secrets(Product(tmp_path / "data", *flags, "--database", url, hosts="lab.test"))
     else:
         _try_secrets(Product(tmp_path / "data", *flags, hosts="lab.test"))

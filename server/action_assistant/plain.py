@@ -21,7 +21,8 @@ _SECRETS: Final[tuple[tuple[re.Pattern[str], str], ...]] = (
     (re.compile(r"(?i)\b(bearer\s+)[^\s,;'\"]+"), r"\1…"),
     (re.compile(r"\b(aa_\d+=)[^\s;,'\"]+"), r"\1…"),  # a session
     (re.compile(r"([#?&/](?:t|i|token|password)=)[^\s&'\"]+"), r"\1…"),
-    (re.compile(r"(\w://[^\s/:@]*:)[^\s/]*@"), r"\1…@"),  # a password of a database
+    (re.compile(r"(\w://[^\s/:@]*:)[^\s/]*@"), r"\1…@"),
+    (re.compile(r"(\bpostgres[\w+]*:/+[^\s/:@]*:)[^\s@]*@"), r"\1…@"),  # may have slashes in it
     (re.compile(r"(?<![\w-])[\w-]{43}(?![\w-])"), "…"),  # 256 bits, as tokens of ours are written
 )
 

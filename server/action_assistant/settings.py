@@ -5,7 +5,6 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
-from urllib.parse import urlsplit
 
 import msgspec
 
@@ -110,19 +109,21 @@ def hide_password() -> None:
         taken = 1 if sign else 2
         if not sign:
             url = next(iter(sys.orig_argv[at + 1 : at + 2]), "")
-        if name == "--database" and _has_password(url):
+        if _is_database(name) and _has_password(url):
             rest = [*sys.orig_argv[1:at], *sys.orig_argv[at + taken :]]
             os.environ["ACTION_ASSISTANT_DATABASE"] = url
             sys.stderr.flush()
             os.execv(sys.executable, [sys.orig_argv[0], *rest])
 
 
+def _is_database(name: str) -> bool:
+    """Also as far as argparse takes it for that; `--data` is an option of its own."""
+    return len(name) > len("--data") and "--database".startswith(name)
+
+
 def _has_password(url: str) -> bool:
-    try:
-        parsed = urlsplit(url)
-    except ValueError:
-        return False
-    return parsed.password is not None or "password=" in parsed.query
+    """Or may have: SQLAlchemy allows characters in it that others take for its end."""
+    return "@" in url or "password=" in url
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:
