@@ -1,4 +1,5 @@
-"""The words of the glossary, in the texts that people read: OpenAPI of both processes, and the page.
+"""The words of the glossary, in the texts that people read: OpenAPI of both processes, and the page;
+and the routes that the contracts name.
 
 `docs/glossary.md` has for each term, in the last column, words that are not used for it.
 """
@@ -17,6 +18,7 @@ from action_assistant.settings import EditorSettings, RunnerSettings
 
 ROOT = Path(__file__).parents[1]
 GLOSSARY = ROOT / "docs" / "glossary.md"
+CONTRACTS = ROOT / "docs" / "contracts.md"
 PAGE = ROOT / "frontend" / "src"
 
 # Elsewhere the applications are made in processes of their own, where this is no error.
@@ -30,6 +32,8 @@ _SHOWN = re.compile(
 )
 _SENTENCE = re.compile(r"([\"'`])([A-Z][^\"'`\n]* [^\"'`\n]*)\1")
 _INSERTED = re.compile(r"\$\{[^}]*\}")
+_ROUTE = re.compile(r"((?:GET|POST|PATCH|DELETE)(?:, (?:GET|POST|PATCH|DELETE))*) (/api/[\w/{}]+)")
+_SOCKETS = frozenset({"/api/graphs/{}/room", "/api/live"})
 
 
 class Term:
@@ -125,6 +129,22 @@ def test_the_glossary_says_what_each_state_of_a_run_means(schemas: list[dict[str
     text = GLOSSARY.read_text()
     assert len(shape["enum"]) > 8
     assert [state for state in shape["enum"] if f"*{state}*" not in text] == []
+
+
+def test_the_routes_that_the_contracts_name_are_there(schemas: list[dict[str, Any]]) -> None:
+    there = {
+        (method.upper(), re.sub(r"\{\w+\}", "{}", path))
+        for schema in schemas
+        for path, item in schema["paths"].items()
+        for method in item
+    }
+    named = {
+        (method, re.sub(r"\{\w+\}", "{}", path))
+        for methods, path in _ROUTE.findall(CONTRACTS.read_text())
+        for method in methods.split(", ")
+    }
+    assert len(named) > 25
+    assert {(method, path) for method, path in named - there if path not in _SOCKETS} == set()
 
 
 @pytest.mark.parametrize(
