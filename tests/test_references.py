@@ -25,6 +25,7 @@ _MODULE: Final = re.compile(
     r"`(?:action_assistant\.)?((?:editor|runner|web|journal|umrf)\.\w+)[\w.]*`"
 )
 _FILES: Final = frozenset({"editor.db", "runner.db", "editor.mark", "editor.database", "umrf.json"})
+_NAMED: Final = re.compile(r"`([A-Za-z_][\w.]*)`(?:,| \() ?`((?:server|frontend)/[^`]+\.\w+)`")
 _LINK: Final = re.compile(r"\]\(([^)\s#:]*)(?:#([^)\s]+))?\)")
 _HEADING: Final = re.compile(r"^#{1,6} (.+?)\s*$", re.MULTILINE)
 _NUMBERED: Final = re.compile(r"^#{2,4} (\d+(?:\.\d+)?)\.? ", re.MULTILINE)
@@ -141,6 +142,17 @@ def dead_links(path: Path) -> list[str]:
 def test_files_and_modules_that_are_named_are_there() -> None:
     found = {path: dead_paths(text_of(path), path) for path in files()}
     assert {str(path.relative_to(ROOT)): dead for path, dead in found.items() if dead} == {}
+
+
+def test_classes_and_functions_that_documents_name_are_in_their_modules() -> None:
+    named = [(path, *each) for path in DOCS.glob("*.md") for each in _NAMED.findall(text_of(path))]
+    assert len(named) > 30
+    missing = [
+        (path.name, name, module)
+        for path, name, module in named
+        if not all(re.search(rf"\b{part}\b", text_of(ROOT / module)) for part in name.split("."))
+    ]
+    assert missing == []
 
 
 def test_sections_rules_and_decisions_that_are_named_are_there() -> None:
