@@ -148,7 +148,10 @@ async def test_a_runner_that_takes_the_run_up_again_can_say_it_too() -> None:
 async def test_a_sub_graph_in_which_nothing_moves_is_named_and_stays_the_cause_after_a_stop() -> (
     None
 ):
-    """A halted sub-graph is never told to its parent, which then runs for ever (SPEC 2.6)."""
+    """A halted sub-graph is never told to its parent, which then runs for ever.
+
+    See docs/umrf-and-the-engine.md 2.6.
+    """
     scene = WithSub(7, script=QUICK, sub=HALTS)
     graph = named("Sub")
     async with scene.played() as control:

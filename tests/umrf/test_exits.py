@@ -1,4 +1,6 @@
-"""What ends a graph: the exit waits for parents and for outputs, as the real engine does (SPEC 2.3).
+"""What ends a graph: the exit waits for parents and for outputs, as the real engine does.
+
+See docs/umrf-and-the-engine.md 2.3.
 
 `MEASURED` is what the real node did with these graphs on 2026-11-22, each started once by itself:
 whether it was FINISHED or stayed RUNNING with nothing running.

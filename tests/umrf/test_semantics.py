@@ -1,4 +1,7 @@
-"""The simulated engine, rule by rule (SPEC 2); the recordings are compared elsewhere."""
+"""The simulated engine, rule by rule; the recordings are compared elsewhere.
+
+See docs/umrf-and-the-engine.md 2.
+"""
 
 import json
 import time

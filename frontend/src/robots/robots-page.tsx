@@ -25,7 +25,7 @@ export interface Editing {
 function Practise() {
   return (
     <p>
-      Without one, practise with a stand-in: it behaves like a real engine.
+      Without one, practise with an emulated robot: it behaves like a real engine.
       <Code block className={style.code ?? ""}>
         action-assistant simulate-robot David
       </Code>

@@ -1,4 +1,8 @@
-/** A room server in memory for tests: what DESIGN 3 says, over sockets that are plain objects. */
+/**
+ * A room server in memory for tests, over sockets that are plain objects.
+ *
+ * See docs/room-protocol.md.
+ */
 
 import * as decoding from "lib0/decoding";
 import * as encoding from "lib0/encoding";

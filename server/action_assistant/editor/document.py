@@ -1,4 +1,4 @@
-"""The shared document: a graph as root maps with flat string keys (DESIGN 4).
+"""The shared document: a graph as root maps with flat string keys (docs/contracts.md 1).
 
 This module and `frontend/src/graph/layout.ts` are the only places that know the keys. Flat keys let
 two people fill in different things of one action without replacing each other's container, and let

@@ -1,7 +1,7 @@
 """A room: one document, the people in it, and the one door through which edits enter.
 
-Rules R1 … R10 of DESIGN 3. Everything that concerns the document happens in one task, batch by
-batch: apply, append, commit, and only then tell anyone.
+Rules R1 … R16 of docs/room-protocol.md. Everything that concerns the document happens in one task,
+batch by batch: apply, append, commit, and only then tell anyone.
 """
 
 import asyncio

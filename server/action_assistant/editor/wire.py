@@ -1,4 +1,7 @@
-"""The messages of a room's socket: y-protocols, and our acknowledgements (DESIGN 3)."""
+"""The messages of a room's socket: y-protocols, and our acknowledgements.
+
+See docs/room-protocol.md.
+"""
 
 from collections.abc import Iterable
 from typing import Final, TypeAlias

@@ -1,4 +1,7 @@
-"""Whether the graph that an engine shows is the one that was sent (SPEC 1.4). Pure."""
+"""Whether the graph that an engine shows is the one that was sent. Pure.
+
+See docs/umrf-and-the-engine.md 1.4.
+"""
 
 from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest

@@ -68,7 +68,7 @@ class GraphResult(msgspec.Struct, frozen=True, tag="graph_result", tag_field="ki
 
 
 class Hazard(msgspec.Struct, frozen=True, omit_defaults=True, tag="hazard", tag_field="kind"):
-    """The engine did something it should not (codes `H1` …, umrf SPEC 3).
+    """The engine did something it should not (codes `H1` …, docs/umrf-and-the-engine.md 3).
 
     `effect`: `crash` and `hang` end all its answers, `goes on` is a warning.
     """

@@ -1,4 +1,4 @@
-"""Runs as the page and programs see them (DESIGN 7)."""
+"""Runs as the page and programs see them (docs/contracts.md 4)."""
 
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta

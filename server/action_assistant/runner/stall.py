@@ -1,8 +1,8 @@
 """A graph that runs while none of its actions does: whether it stalls, and what it waits for.
 
-The engine says nothing of it (SPEC 2.3, H7, H8). What it waits for follows from the graph that was
-sent and from what was seen: results are not told, so that an arrow counts by all that its parent may
-have ended with. Pure.
+The engine says nothing of it (docs/umrf-and-the-engine.md 2.3; H7, H8). What it waits for follows
+from the graph that was sent and from what was seen: results are not told, so that an arrow counts by
+all that its parent may have ended with. Pure.
 """
 
 from collections.abc import Iterator, Sequence
@@ -277,7 +277,10 @@ class _Stalled:
         }
 
     def _last_exit(self) -> Action | None:
-        """The end of a graph needs the outputs of the action that is listed last (SPEC 2.6)."""
+        """The end of a graph needs the outputs of the action that is listed last.
+
+        See docs/umrf-and-the-engine.md 2.6.
+        """
         ends = sorted(
             (each for each in self._graph.relations if each.child == EXIT),
             key=lambda each: each.child_order,

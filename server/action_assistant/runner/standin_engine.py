@@ -3,7 +3,7 @@
 No ROS, no clock, no I/O: the same seed and the same messages give the same answers. What graphs do is
 `umrf.semantics`; here is what the node around it makes of that: one thread that a slow command holds
 up, topics on which the newest message wins, a ring of snapshots that is emptied twice a second, and
-refusals that only its log knows (SPEC 4, and recordings of real nodes).
+refusals that only its log knows (docs/umrf-and-the-engine.md 4, and recordings of real nodes).
 """
 
 import random

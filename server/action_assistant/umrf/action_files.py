@@ -1,4 +1,4 @@
-"""Files that describe one action (SPEC 5), read and written."""
+"""Files that describe one action (docs/umrf-and-the-engine.md 5), read and written."""
 
 from collections.abc import Iterable
 from typing import Final

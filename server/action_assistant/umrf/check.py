@@ -1,4 +1,7 @@
-"""What is wrong with a graph, in words that say what would happen (SPEC 3)."""
+"""What is wrong with a graph, in words that say what would happen.
+
+See docs/umrf-and-the-engine.md 3.
+"""
 
 from collections.abc import Collection, Mapping
 

@@ -1,4 +1,4 @@
-"""UMRF files: every dialect read into one graph, canonical D3 written (DESIGN 5)."""
+"""UMRF files: every dialect read into one graph, canonical D3 written (docs/contracts.md 2)."""
 
 from collections.abc import Iterable
 

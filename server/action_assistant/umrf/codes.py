@@ -10,7 +10,8 @@ import msgspec
 from action_assistant.umrf.model import Problem, Severity
 
 #: `unreadable`: no graph at all; `refused`: the engine's parser refuses the text; `structural`: its
-#: parser takes it, its start does not; `hazard`: of SPEC 3; `other`: the rest.
+#: parser takes it, its start does not; `hazard`: of docs/umrf-and-the-engine.md 3; `other`: the
+#: rest.
 Kind: TypeAlias = Literal["unreadable", "refused", "structural", "hazard", "other"]
 
 

@@ -1,4 +1,7 @@
-"""Which dialect a file is written in, and older ones translated into D3 (SPEC 1.5)."""
+"""Which dialect a file is written in, and older ones translated into D3.
+
+See docs/umrf-and-the-engine.md 1.5.
+"""
 
 from typing import Final, NamedTuple
 

@@ -1,4 +1,7 @@
-"""Files of earlier engines (D0, D1, D1', D2) as D3 values, with a note on each translation (SPEC 1.5)."""
+"""Files of earlier engines (D0, D1, D1', D2) as D3 values, with a note on each translation.
+
+See docs/umrf-and-the-engine.md 1.5.
+"""
 
 from collections.abc import Iterator
 from typing import Final

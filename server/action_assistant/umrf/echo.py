@@ -1,4 +1,7 @@
-"""A graph as an engine gives it back, for comparing what was sent with what is seen (SPEC 1.4)."""
+"""A graph as an engine gives it back, for comparing what was sent with what is seen.
+
+See docs/umrf-and-the-engine.md 1.4.
+"""
 
 from collections.abc import Mapping
 

@@ -13,9 +13,9 @@ ALL_HAZARDS: Final = frozenset(
 class EngineFacts(msgspec.Struct, frozen=True, kw_only=True):
     """Hazards, names and abilities of an engine built from one commit.
 
-    `hazards`: those of SPEC 3 that this build has. `bypass_fixed`: it captures the result of a
-    bypass by value, so that H3 is no crash. `synchronises`: graphs with several actors run.
-    `pauses_safely`: a stop of a paused graph works. `restart_matches`: starting a graph's JSON again
+    `hazards`: those of docs/umrf-and-the-engine.md 3 that this build has. `bypass_fixed`: it captures
+    the result of a bypass by value, so that H3 is no crash. `synchronises`: graphs with several actors
+    run. `pauses_safely`: a stop of a paused graph works. `restart_matches`: starting a graph's JSON again
     finds its sub-graphs again. Times in milliseconds.
     """
 

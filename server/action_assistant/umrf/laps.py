@@ -1,4 +1,6 @@
-"""Which actions of a graph can run more than once, as far as its arrows tell (SPEC 2.3, 2.9, 2.10).
+"""Which actions of a graph can run more than once, as far as its arrows tell.
+
+See docs/umrf-and-the-engine.md 2.3, 2.9, 2.10.
 
 Two sights of a running action are sights of the same run of it only where it cannot have begun anew in
 between; an engine counts nothing.

@@ -1,8 +1,8 @@
 """What a UMRF graph is: frozen values for graphs, actions, relations and problems.
 
-Shapes follow the file format (umrf SPEC 1), with two differences that make values easy to edit and
-to merge: relations stand beside the actions instead of being written twice, and both refer to
-actions by `key`, never by name. `ENTRY` and `EXIT` are the keys of the graph's two ends.
+Shapes follow the file format (docs/umrf-and-the-engine.md 1), with two differences that make values
+easy to edit and to merge: relations stand beside the actions instead of being written twice, and both
+refer to actions by `key`, never by name. `ENTRY` and `EXIT` are the keys of the graph's two ends.
 
 Raw JSON text is kept wherever spelling matters (`5` against `5.0`, order of members, unknown fields).
 """
@@ -39,7 +39,7 @@ class Conditions(msgspec.Struct, frozen=True):
         return answer
 
 
-#: What the engine assumes for a condition that a file leaves out (SPEC 1.4).
+#: What the engine assumes for a condition that a file leaves out (docs/umrf-and-the-engine.md 1.4).
 ENGINE_DEFAULTS: Final = Conditions("run", "run", "bypass", "ignore")
 #: The only thing an entry relation can say.
 ENTRY_CONDITIONS: Final = Conditions("run")

@@ -1,4 +1,4 @@
-"""Where what is said of a file stands in the text that was given (SPEC 1.5).
+"""Where what is said of a file stands in the text that was given (docs/umrf-and-the-engine.md 1.5).
 
 Problems and notes name places of the graph's canonical text, or of a file that was translated.
 `Origins` lead from there to the given text, where the place is looked up; it is the one way for all.

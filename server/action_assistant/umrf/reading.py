@@ -1,4 +1,4 @@
-"""Graphs from the nested values of a D3 file, losing nothing (DESIGN 4, 5)."""
+"""Graphs from the nested values of a D3 file, losing nothing (docs/contracts.md 1, 2)."""
 
 from collections import Counter
 from collections.abc import Callable

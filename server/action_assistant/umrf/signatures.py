@@ -1,4 +1,7 @@
-"""What action files and graphs say about their parameters, for libraries (SPEC 2.1)."""
+"""What action files and graphs say about their parameters, for libraries.
+
+See docs/umrf-and-the-engine.md 2.1.
+"""
 
 import msgspec
 

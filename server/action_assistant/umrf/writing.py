@@ -1,4 +1,4 @@
-"""Graphs as canonical D3 files (DESIGN 5)."""
+"""Graphs as canonical D3 files (docs/contracts.md 2)."""
 
 from collections.abc import Iterable
 from operator import attrgetter

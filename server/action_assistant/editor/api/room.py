@@ -1,4 +1,4 @@
-"""The socket of a room (DESIGN 3)."""
+"""The socket of a room (docs/room-protocol.md)."""
 
 import asyncio
 import logging

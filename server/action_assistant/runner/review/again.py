@@ -48,7 +48,7 @@ class Doubt(msgspec.Struct, frozen=True):
 
 
 class Recorded(msgspec.Struct, frozen=True):
-    """A run as a script (`behaviours`, DESIGN 8), and what in it is a guess."""
+    """A run as a script (`behaviours`, docs/contracts.md 5.2), and what in it is a guess."""
 
     behaviours: dict[str, list[dict[str, Any]]]
     doubts: list[Doubt]

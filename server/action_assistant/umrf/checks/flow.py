@@ -1,4 +1,7 @@
-"""Whether and how a graph gets from its entry to its exit (SPEC 2.3; H2, H3, H8)."""
+"""Whether and how a graph gets from its entry to its exit.
+
+See docs/umrf-and-the-engine.md 2.3; H2, H3, H8.
+"""
 
 from collections import deque
 

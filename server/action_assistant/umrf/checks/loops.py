@@ -1,4 +1,7 @@
-"""Loops of a graph, and what they do to the engine (SPEC 2.9, 2.10; H5, H9)."""
+"""Loops of a graph, and what they do to the engine.
+
+See docs/umrf-and-the-engine.md 2.9, 2.10; H5, H9.
+"""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Final

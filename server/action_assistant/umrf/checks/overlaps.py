@@ -1,5 +1,8 @@
 """What goes wrong where two things go on at once: responses that come at the wrong moment, and ends that
-leave something running (SPEC 2.3, 2.5; H4, H5, H12). Only what can happen is told."""
+leave something running. Only what can happen is told.
+
+See docs/umrf-and-the-engine.md 2.3, 2.5; H4, H5, H12.
+"""
 
 from collections.abc import Collection, Mapping
 from typing import Final

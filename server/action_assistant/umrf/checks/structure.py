@@ -1,4 +1,7 @@
-"""What the engine's parser refuses, and names that lead nowhere (SPEC 1, H6)."""
+"""What the engine's parser refuses, and names that lead nowhere.
+
+See docs/umrf-and-the-engine.md 1, H6.
+"""
 
 import re
 from typing import Final

@@ -1,4 +1,7 @@
-"""Actions that are graphs themselves: what the graph inside does to the one around it (SPEC 2.6)."""
+"""Actions that are graphs themselves: what the graph inside does to the one around it.
+
+See docs/umrf-and-the-engine.md 2.6.
+"""
 
 from collections.abc import Container, Mapping
 

@@ -1,4 +1,6 @@
-"""What may go on at the same time, as far as arrows and possible outcomes tell (SPEC 2.3).
+"""What may go on at the same time, as far as arrows and possible outcomes tell.
+
+See docs/umrf-and-the-engine.md 2.3.
 
 Too much rather than too little: how long actions take is not known, and which outcomes come together is
 not looked at. But an action that a join waits for is over when the join begins.

@@ -1,4 +1,7 @@
-"""Parameters: who provides them, what renamings break, what a library says (SPEC 2.7, H2, H7, H8)."""
+"""Parameters: who provides them, what renamings break, what a library says.
+
+See docs/umrf-and-the-engine.md 2.7; H2, H7, H8.
+"""
 
 from collections.abc import Container, Mapping
 

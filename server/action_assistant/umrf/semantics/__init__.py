@@ -1,4 +1,4 @@
-"""The engine's behaviour as a deterministic step function (SPEC 2)."""
+"""The engine's behaviour as a deterministic step function (docs/umrf-and-the-engine.md 2)."""
 
 from action_assistant.umrf.semantics.engine import Engine, GraphNow
 from action_assistant.umrf.semantics.graphs import EngineRefused

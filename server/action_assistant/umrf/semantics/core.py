@@ -1,4 +1,7 @@
-"""The engine's clockwork: what one action's end sets in motion (SPEC 2.3, 2.4, 2.9)."""
+"""The engine's clockwork: what one action's end sets in motion.
+
+See docs/umrf-and-the-engine.md 2.3, 2.4, 2.9.
+"""
 
 from collections.abc import Callable, Mapping
 from functools import partial

@@ -4,7 +4,7 @@ An action's end reaches other actions by arrows only, and when an action ends de
 only. So a course with one other end is the usual one apart from the states that differ from it, and
 those are few: they are kept by place, and only the instants that touch one of them are gone through
 again. When none is left, the rest is the usual course; when only one action runs and everything behind
-it is as at the start, the rest is as of anybody else who came there (DESIGN: decision 45).
+it is as at the start, the rest is as of anybody else who came there (decision 45).
 """
 
 from bisect import bisect_left

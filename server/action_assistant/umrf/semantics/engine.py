@@ -1,4 +1,7 @@
-"""A TeMoto Action Engine without I/O or clock: its commands and what it knows (SPEC 2)."""
+"""A TeMoto Action Engine without I/O or clock: its commands and what it knows.
+
+See docs/umrf-and-the-engine.md 2.
+"""
 
 from collections.abc import Callable, Mapping
 from functools import partial

@@ -1,4 +1,7 @@
-"""How graphs live in an engine: built, begun, stopped, paused, resumed, modified (SPEC 2)."""
+"""How graphs live in an engine: built, begun, stopped, paused, resumed, modified.
+
+See docs/umrf-and-the-engine.md 2.
+"""
 
 from collections import deque
 from collections.abc import Mapping

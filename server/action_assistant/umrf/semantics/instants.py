@@ -1,8 +1,8 @@
 """What one end of an action sets in motion at its instant, over states that are plain values.
 
-The rules are those of `core` (SPEC 2.3 to 2.7); a property test holds the two together. Only what
-matters later is kept: whether an action goes on, and until when; which required parents have reported;
-which inputs hold a value; whether outputs do.
+The rules are those of `core` (docs/umrf-and-the-engine.md 2.3 to 2.7); a property test holds the two
+together. Only what matters later is kept: whether an action goes on, and until when; which required
+parents have reported; which inputs hold a value; whether outputs do.
 """
 
 from collections import deque

@@ -1,4 +1,4 @@
-"""Which indexed action or graph a node stands for (SPEC 2.1)."""
+"""Which indexed action or graph a node stands for (docs/umrf-and-the-engine.md 2.1)."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Final, Literal

@@ -1,4 +1,7 @@
-"""A graph in motion as the engine prints it in feedback and in answers of get (SPEC 1, 4)."""
+"""A graph in motion as the engine prints it in feedback and in answers of get.
+
+See docs/umrf-and-the-engine.md 1, 4.
+"""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -18,7 +21,10 @@ class Sheet:
     """One running graph, ready to be printed after every change; what has not changed is not
     printed anew. `attributes`: the `gui_attributes` of actions by full name, which the engine gives
     back verbatim. The engine drops the description of running graphs (unless `described`), and the
-    conditions of exits and the renamings of entries (unless `conditioned`, SPEC 1.4)."""
+    conditions of exits and the renamings of entries (unless `conditioned`).
+
+    See docs/umrf-and-the-engine.md 1.4.
+    """
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Scripts: what actions do in a simulation (DESIGN 8)."""
+"""Scripts: what actions do in a simulation (docs/contracts.md 5.2)."""
 
 from collections.abc import Iterable
 from typing import Any, Final

@@ -1,4 +1,7 @@
-"""What a running engine does, event by event, as `simulate --trace` prints it (DESIGN 8)."""
+"""What a running engine does, event by event, as `simulate --trace` prints it.
+
+See docs/contracts.md 5.1.
+"""
 
 from typing import TypeAlias
 
@@ -58,7 +61,9 @@ class GraphResult(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_resu
 
 
 class Hazard(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="kind", tag="hazard"):
-    """Here the real engine crashes, hangs or does something that nobody wants (SPEC 3).
+    """Here the real engine crashes, hangs or does something that nobody wants.
+
+    See docs/umrf-and-the-engine.md 3.
 
     `effect`: `crash` ends the trace; after `hang` no command is answered; `goes on` warns; `cut off`
     says that it was not simulated any further.

@@ -1,4 +1,7 @@
-"""Parameters at run time: who holds which value, and what reaches a child (SPEC 2.7)."""
+"""Parameters at run time: who holds which value, and what reaches a child.
+
+See docs/umrf-and-the-engine.md 2.7.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
