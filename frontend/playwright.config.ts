@@ -29,8 +29,8 @@ export default defineConfig({
   testDir: "e2e",
   outputDir: "test-results",
   fullyParallel: false,
-  // Each file starts its own product; three at a time use what two leave idle while they wait.
-  workers: 3,
+  // Each file starts its own product; two at a time use what one leaves idle while it waits.
+  workers: 2,
   // Two browsers and all that they drive share two cores there, which starves one of them now and then.
   // What passed only when it was tried again is told at the end: it is a fault to be found.
   retries: process.env.CI ? 1 : 0,
