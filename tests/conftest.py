@@ -11,6 +11,7 @@ from hypothesis import settings
 
 from journal import servers
 from journal.servers import Server
+from support.recordings import CORPUS, NO_CORPUS, family
 
 # No test speaks to another machine, whatever robots it registers.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -77,10 +78,11 @@ def small_disk() -> Iterator[Callable[[str], Path]]:
         place.rmdir()
 
 
-@pytest.fixture(scope="session")
-def shared() -> Path:
-    """Recordings and real files that are too large for the repository."""
-    folder = Path(os.environ.get("UMRF_SHARED", Path(__file__).parents[2] / "shared"))
-    if not (folder / "umrf").is_dir():
-        pytest.skip(f"no recordings in {folder}; name their folder in UMRF_SHARED")
-    return folder
+@pytest.fixture(params=["recorded", "real"])
+def graph_files(request: pytest.FixtureRequest) -> list[Path]:
+    """Graphs that the engine was given; files that people keep, some of which are unreadable."""
+    if request.param == "recorded":
+        return sorted(family("engine").rglob("*.graph.json"))
+    if not CORPUS.is_dir():
+        pytest.skip(NO_CORPUS)
+    return sorted(CORPUS.rglob("*.json"))
