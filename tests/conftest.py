@@ -3,7 +3,8 @@
 import os
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import settings
 
 from journal import servers
 from journal.servers import Server
+from support import skips
 from support.recordings import CORPUS, NO_CORPUS, family
 
 # No test speaks to another machine, whatever robots it registers.
@@ -28,6 +30,36 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("long"):
             item.add_marker(pytest.mark.skip(reason="takes long: `make soak ARGS=long`"))
+
+
+def skipped(config: pytest.Config) -> Counter[str]:
+    """Reasons of the tests that were skipped; nothing in a process of several, which only sees some."""
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    if reporter is None or hasattr(config, "workerinput"):
+        return Counter()
+    return skips.reasons(reporter.stats.get("skipped", []))
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """CI skips only what is on the list."""
+    if "CI" in os.environ and exitstatus == 0 and skips.unaccepted(skipped(session.config)):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> Generator[None]:
+    """What was skipped, at the very end: logs are read from there."""
+    yield
+    found = skipped(config)
+    if found:
+        terminalreporter.write_line(skips.closing_line(found))
+    if "CI" in os.environ:
+        for reason in skips.unaccepted(found):
+            terminalreporter.write_line(
+                f"CI may not skip this (tests/skips.toml): {reason}", red=True
+            )
 
 
 @pytest.fixture(scope="session")
