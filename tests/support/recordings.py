@@ -30,7 +30,7 @@ NO_CORPUS = "real files of other repositories are not here (UMRF_SHARED)"
 NAMED = os.environ.get("UMRF_RECORDINGS")
 #: For so many calls an action is told what to do at least; after them, what it did in the last.
 CALLS = 5
-KINDS: dict[type, Any] = {float: (int, float), str: str}
+KINDS: dict[type, Any] = {int: (int, float), float: (int, float), str: str}
 
 
 @cache
@@ -68,7 +68,7 @@ def calls_of(name: str, action: str, inputs: Mapping[str, Any]) -> list[dict[str
     if times := does.pop("times", 0):
         results = ["on_true"] * (int(times) - 1) + ["on_false"]
     else:
-        results = does.pop("results", [does.get("result", "on_true")])
+        results = list(does.pop("results", [does.get("result", "on_true")]))
     message = does.pop("message", None)
     results += results[-1:] * (CALLS - len(results))
     return [
