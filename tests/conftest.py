@@ -3,7 +3,8 @@
 import os
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from hypothesis import settings
 
 from journal import servers
 from journal.servers import Server
+from support import skips
+from support.recordings import CORPUS, NO_CORPUS, family
 
 # No test speaks to another machine, whatever robots it registers.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -27,6 +30,36 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("long"):
             item.add_marker(pytest.mark.skip(reason="takes long: `make soak ARGS=long`"))
+
+
+def skipped(config: pytest.Config) -> Counter[str]:
+    """Reasons of the tests that were skipped; nothing in a process of several, which only sees some."""
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    if reporter is None or hasattr(config, "workerinput"):
+        return Counter()
+    return skips.reasons(reporter.stats.get("skipped", []))
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """CI skips only what is on the list."""
+    if "CI" in os.environ and exitstatus == 0 and skips.unaccepted(skipped(session.config)):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> Generator[None]:
+    """What was skipped, at the very end: logs are read from there."""
+    yield
+    found = skipped(config)
+    if found:
+        terminalreporter.write_line(skips.closing_line(found))
+    if "CI" in os.environ:
+        for reason in skips.unaccepted(found):
+            terminalreporter.write_line(
+                f"CI may not skip this (tests/skips.toml): {reason}", red=True
+            )
 
 
 @pytest.fixture(scope="session")
@@ -77,10 +110,11 @@ def small_disk() -> Iterator[Callable[[str], Path]]:
         place.rmdir()
 
 
-@pytest.fixture(scope="session")
-def shared() -> Path:
-    """Recordings and real files that are too large for the repository."""
-    folder = Path(os.environ.get("UMRF_SHARED", Path(__file__).parents[2] / "shared"))
-    if not (folder / "umrf").is_dir():
-        pytest.skip(f"no recordings in {folder}; name their folder in UMRF_SHARED")
-    return folder
+@pytest.fixture(params=["recorded", "real"])
+def graph_files(request: pytest.FixtureRequest) -> list[Path]:
+    """Graphs that the engine was given; files that people keep, some of which are unreadable."""
+    if request.param == "recorded":
+        return sorted(family("engine").rglob("*.graph.json"))
+    if not CORPUS.is_dir():
+        pytest.skip(NO_CORPUS)
+    return sorted(CORPUS.rglob("*.json"))

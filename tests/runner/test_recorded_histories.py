@@ -1,7 +1,7 @@
 """What real engine nodes sent folds into histories that agree with what the recordings' index says.
 
-The recordings are large and lie elsewhere (`UMRF_SHARED`); a few small ones of the same form, made up
-after them, are always folded.
+`$UMRF_RECORDINGS` names the recordings, see `support/recordings.py`; a few small ones of the same
+form, made up after them, are always folded.
 """
 
 from pathlib import Path
@@ -10,27 +10,21 @@ import pytest
 
 from action_assistant.runner.runs import ENDED, Run, key_of
 from runner.recorded import Index, Told, history, index_of
+from support.recordings import facts, family
 
 OWN = Path(__file__).parents[1] / "data" / "recordings"
-#: Recordings in which one engine is given one graph by its text.
-NAMES = (
-    "seq3", "seq3_nopoll", "fork_join", "false_branch", "error_bypass_exit", "error_handler",
-    "loop3", "single_error", "halt", "param_missing", "sub_graph", "long_stop", "stop_twice",
-    "stop_finished", "stop_unknown", "pause_resume", "pause_stop", "pause_unhandled",
-    "unknown_action", "seq200", "seq200_nopoll", "par30_nopoll", "seq40_50ms", "get_busy",
-    "engine_sigkill", "engine_restart", "engine_sigint", "engine_sigterm", "engine_frozen",
-    "late_client", "modify_running", "start_again_running", "start_again_finished",
-    "burst_start_stop",
-)  # fmt: skip
+NODE = family("node")
+#: `told`: one engine is given one graph by its text. `started_again`: somebody starts the same graph
+#: again, or the engine is not the same any more, so that the last get says nothing of the run.
+#: `short`: it was frozen, and the recording ends before it was seen at rest for long enough.
+#: `refused`: the engine said no, or held the graph without beginning it, and was seen to for long
+#: enough.
+FACTS = facts("node").get("histories", {"told": []})
 _ENDS = {"FINISHED": "finished", "HALTED": "halted", "STOPPED": "stopped", "ERROR": "error"}
 _MOVES = set("RSPQ")
-#: Somebody starts the same graph again, or the engine is not the same any more: the last get says
-#: nothing of the run.
-_TAKEN = ("engine_restart", "start_again", "pause_stop")
-#: It was frozen, and the recording ends before it was seen at rest for long enough.
-_SHORT = ("engine_frozen",)
-#: The engine said no, or held the graph without beginning it, and was seen to for long enough.
-_REFUSED = ("param_missing", "unknown_action")
+_TAKEN, _SHORT, _REFUSED = (
+    tuple(FACTS.get(kind, ())) for kind in ("started_again", "short", "refused")
+)
 
 
 def check(run: Run, told: Index, name: str) -> None:
@@ -103,14 +97,11 @@ def _laps(letters: str) -> int:
     return began
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_recording_of_a_real_node_is_told_as_its_index_says(shared: Path, name: str) -> None:
-    folder = shared / "ros2-recordings"
-    if not folder.is_dir():
-        pytest.skip(f"no recordings of a real engine node in {folder}")
+@pytest.mark.parametrize("name", FACTS["told"])
+def test_a_recording_of_a_real_node_is_told_as_its_index_says(name: str) -> None:
     files = [
         path
-        for path in folder.glob(f"{name}*.jsonl")
+        for path in NODE.glob(f"{name}*.jsonl")
         if path.name.split(".")[0].split("__")[0] == name
     ]
     assert files

@@ -1,7 +1,7 @@
 """What a stand-in robot sends, held against what a real engine node sent for the same messages.
 
-The recordings (`$UMRF_SHARED/ros2-recordings`) hold commands, gets and signals with their times; the
-same are given to the stand-in in virtual time. Held against each other is what does not depend on
+The recordings (`node/`, see `support/recordings.py`) hold commands, gets and signals with their times;
+the same are given to the stand-in in virtual time. Held against each other is what does not depend on
 how threads happened to run: every line of the log in order, what each get showed, which snapshots
 came, in which order and with what in them, and on what clock. A real node loses snapshots at random,
 so the recorded ones have to be a selection of those that the stand-in sends when it loses none.
@@ -31,77 +31,51 @@ from action_assistant.runner.standin_wire import (
     index_of,
 )
 from action_assistant.umrf.semantics import Script, script_from
+from support.recordings import calls_of, facts, family, lines
 
+FACTS = facts("node")
 #: Recordings of one engine whose graphs are stored whole.
-NAMES = [
-    "seq3", "seq3_nopoll", "fork_join", "false_branch", "error_bypass_exit", "error_handler",
-    "loop3", "single_error", "halt", "param_missing", "sub_graph", "long_stop", "stop_twice",
-    "stop_idle", "stop_finished", "stop_unknown", "pause_resume", "pause_stop", "pause_unhandled",
-    "start_again_running", "start_again_finished", "start_by_name", "unknown_action",
-    "unknown_name", "invalid_json", "wrong_target", "empty_targets", "burst_five_starts",
-    "burst_start_stop", "two_graphs", "modify_running", "engine_sigkill", "engine_restart",
-    "engine_sigint", "engine_sigterm", "engine_frozen",
-]  # fmt: skip
+NAMES = FACTS.get("replayed", ())
 #: How far apart the two may be in time: a machine with two cores was recorded.
 SLACK_MS = 120.0
 #: What is closer than this may have come in any order.
 RACE_MS = 15.0
 #: The stop that wakes this engine came after the next action was loaded in one run, and before in
 #: the other, where the action then ran to its end in a graph that was STOPPED.
-LOADING_MS = {"engine_frozen": 0.0, "burst_start_stop": 0.1, "burst_start_stop.2": 0.1}
-#: What the recorded actions say at the end of their n-th run.
-WORDS = {"OxWork": "ran", "OxCountdown": "iteration"}
+LOADING_MS = FACTS.get("loading_ms", {})
 KINDS: dict[str, type[Stop | Pause | Resume]] = {"stop": Stop, "pause": Pause, "resume": Resume}
 
 
 @pytest.fixture(scope="module")
-def recordings(shared: Path) -> Path:
-    folder = shared / "ros2-recordings"
-    if not folder.is_dir():
-        pytest.skip(f"no recordings of a real engine node in {folder}")
-    return folder
+def recordings() -> Path:
+    return family("node")
 
 
 @pytest.fixture(scope="module")
 def index(recordings: Path) -> Index:
-    """What the recorded engine had indexed: the only recording with the texts is the first."""
-    for line in (recordings / "seq3.jsonl").read_text().splitlines():
-        told = json.loads(line)
+    """What the recorded engine had indexed; only some recordings have the texts."""
+    for told in lines(recordings / FACTS["index"]):
         if told["kind"] == "ready":
             texts = [json.dumps(each) for each in told["graph_jsons_indexed"]]
             return index_of([json.dumps(each) for each in told["umrf_jsons"]], texts)
-    raise AssertionError("the first recording has no index")
+    raise AssertionError(f"{FACTS['index']} has no index")
 
 
 def behaviours(graph: dict[str, Any]) -> Iterator[tuple[str, list[dict[str, Any]]]]:
     """What the recorded actions do follows from their parameters."""
     for action in graph["actions"]:
-        given = {
+        inputs = {
             name: leaf.get("pvf_value") for name, leaf in action.get("input_parameters", {}).items()
         }
-        times = int(given.get("times") or 0)
-        yield (
-            f"{graph['graph_name']}/{action['name']}_{action.get('instance_id', 0)}",
-            [
-                {
-                    "after_s": given.get("delay") or 0.0,
-                    "result": ("on_false" if n == times else "on_true")
-                    if times
-                    else given.get("result") or "on_true",
-                    "stop_s": 0.01,
-                    "pauses": action["name"] != "OxNoPause",
-                    "message": f"{WORDS[action['name']]} {n}" if action["name"] in WORDS else None,
-                }
-                for n in range(1, 6)
-            ],
-        )
+        full_name = f"{action['name']}_{action.get('instance_id', 0)}"
+        yield f"{graph['graph_name']}/{full_name}", calls_of("node", action["name"], inputs)
 
 
 class Replay:
     """One recording, and the stand-in that was given the same."""
 
     def __init__(self, file: Path, index: Index) -> None:
-        self.lines = [json.loads(line) for line in file.read_text().splitlines()]
+        self.lines = lines(file)
         self.folder, self.name = file.parent, file.name.removesuffix(".jsonl")
         self.index = index
         self.said: list[Said] = []

@@ -63,7 +63,8 @@ def _snake_name(name: str) -> str:
 @contextmanager
 def open_page() -> Iterator[Page]:
     """Starts Node with the page's code; skips where neither is installed."""
-    node = shutil.which("node")
+    fetched = FRONTEND.parent / ".node" / "bin" / "node"  # by scripts/with-node
+    node = str(fetched) if fetched.exists() else shutil.which("node")
     if node is None or not (FRONTEND / "node_modules" / "yjs").is_dir():
         pytest.skip("needs Node and the page's packages: make setup")
     process = subprocess.Popen(

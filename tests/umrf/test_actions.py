@@ -1,9 +1,8 @@
 """Files of single actions."""
 
 import json
-import os
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import pytest
 from hypothesis import given, settings
@@ -14,11 +13,12 @@ from action_assistant.umrf.codec import Unreadable, read_action, write_action
 from action_assistant.umrf.model import Action, Signature
 from action_assistant.umrf.signatures import signature_of
 from strategies import actions
+from support.recordings import CORPUS, NO_CORPUS, family, lines
 
-ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf"
 OWN = Path(__file__).parent / "examples" / "single.umrf.json"
 NUMBER = {"pvf_type": "number"}
+#: Name, verdict, text.
+Verdicts: TypeAlias = list[tuple[str, bool, str]]
 
 
 def found(file: Any) -> dict[str, str]:
@@ -26,28 +26,36 @@ def found(file: Any) -> dict[str, str]:
     return {p.code: p.where.path for p in check_action(read_action(json.dumps(file)))}
 
 
-def verdicts() -> list[tuple[str, bool, str]]:
-    """Name, text and verdict of the engine's parser on files of actions."""
-    cases: list[tuple[str, bool, str]] = []
-    corpus = SHARED / "corpus" / "verdicts.jsonl"
-    for line in corpus.read_text().splitlines() if corpus.exists() else []:
-        verdict = json.loads(line)
-        path = SHARED / "corpus" / verdict["file"]
-        if verdict["file"].startswith("actions/") and path.exists():
-            text = path.read_text(errors="replace")
-            cases.append((verdict["file"], verdict["accepted"], text))
-    validation = SHARED / "traces" / "validation.jsonl"
-    for line in validation.read_text().splitlines() if validation.exists() else []:
-        case = json.loads(line)
-        if case["case"].startswith("action:"):
-            cases.append((case["case"], case["accepted"], case["input"]))
-    return cases
+def recorded() -> Verdicts:
+    """What the engine's parser said of files of actions that were made for it."""
+    cases = lines(family("engine") / "validation.jsonl")
+    return [
+        (c["case"], c["accepted"], c["input"]) for c in cases if c["case"].startswith("action:")
+    ]
 
 
-@pytest.mark.skipif(not verdicts(), reason=f"there are no verdicts in {SHARED}")
-def test_we_refuse_exactly_the_actions_that_the_engines_parser_refuses() -> None:
+def real() -> Verdicts:
+    """What it said of those in repositories."""
+    verdicts = lines(CORPUS / "verdicts.jsonl")
+    return [
+        (v["file"], v["accepted"], path.read_text(errors="replace"))
+        for v in verdicts
+        if v["file"].startswith("actions/") and (path := CORPUS / v["file"]).exists()
+    ]
+
+
+both = pytest.mark.parametrize(
+    "verdicts",
+    [recorded(), pytest.param(real(), marks=pytest.mark.skipif(not real(), reason=NO_CORPUS))],
+    ids=["recorded", "real"],
+)
+
+
+@both
+def test_we_refuse_exactly_the_actions_that_the_engines_parser_refuses(verdicts: Verdicts) -> None:
+    assert verdicts
     differing = []
-    for name, accepted, text in verdicts():
+    for name, accepted, text in verdicts:
         try:
             refused = any(p.code in STRUCTURAL for p in check_action(read_action(text)))
         except Unreadable:
@@ -57,9 +65,10 @@ def test_we_refuse_exactly_the_actions_that_the_engines_parser_refuses() -> None
     assert differing == []
 
 
-@pytest.mark.skipif(not verdicts(), reason=f"there are no verdicts in {SHARED}")
-def test_every_readable_action_of_the_corpus_survives_writing() -> None:
-    for _, _, text in verdicts():
+@both
+def test_every_readable_action_of_the_corpus_survives_writing(verdicts: Verdicts) -> None:
+    assert verdicts
+    for _, _, text in verdicts:
         try:
             action = read_action(text).action
         except Unreadable:

@@ -4,7 +4,6 @@
 """
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,8 @@ from action_assistant.umrf.codec import read
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.model import Signature
 from action_assistant.umrf.semantics import GraphState, Hazard, simulate
+from support.recordings import CORPUS, NO_CORPUS, engine_runs, lines, runs_of
 
-ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf"
-CORPUS = SHARED / "corpus"
-TRACES = SHARED / "traces"
 KNOWN: dict[str, Any] = json.loads((Path(__file__).parent / "blocked.json").read_text())
 #: What is in a recording that did not go well.
 BAD_ENDS = {"crash", "std::terminate", "timeout", "throw", "final_hang", "final_throw"}
@@ -28,10 +24,8 @@ BAD_ENDS = {"crash", "std::terminate", "timeout", "throw", "final_hang", "final_
 
 def accepted() -> list[str]:
     """Files of current graphs in the corpus that the engine's parser accepts."""
-    verdicts = CORPUS / "verdicts.jsonl"
-    lines = verdicts.read_text().splitlines() if verdicts.exists() else []
-    found = [json.loads(line) for line in lines]
-    return [v["file"] for v in found if v["accepted"] and v["file"].startswith("graphs/")]
+    verdicts = lines(CORPUS / "verdicts.jsonl")
+    return [v["file"] for v in verdicts if v["accepted"] and v["file"].startswith("graphs/")]
 
 
 def blocked(path: Path, facts: Any = PINNED) -> list[str]:
@@ -58,7 +52,7 @@ def behaviour(path: Path) -> str:
     return "runs" if "RUNNING" in states else "never starts"
 
 
-needs_corpus = pytest.mark.skipif(not accepted(), reason=f"there is no corpus in {CORPUS}")
+needs_corpus = pytest.mark.skipif(not accepted(), reason=NO_CORPUS)
 
 
 @needs_corpus
@@ -97,40 +91,30 @@ def test_graphs_of_several_actors_are_blocked_only_where_engines_do_not_synchron
     assert [blocked(CORPUS / file, facts) for file in only_actors] == [[], []]
 
 
-def went_well(name: str) -> bool:
+def went_well(folder: Path, name: str) -> bool:
     """Whether all runs of a recording ended without a crash, a hang or a refusal."""
-    runs = sorted((TRACES / "bypass_fixed").glob(f"{name}.trace*.jsonl"))
-    for path in runs or sorted(TRACES.glob(f"{name}.trace*.jsonl")):
-        lines = [json.loads(line) for line in path.read_text().splitlines() if line]
-        if any(line["kind"] in BAD_ENDS or line.get("rc") in (-6, -11) for line in lines):
-            return False
-    return True
-
-
-def recordings() -> list[str]:
-    return sorted(
-        name
-        for path in TRACES.glob("*.graph.json")
-        if (TRACES / f"{(name := path.name.removesuffix('.graph.json'))}.trace.jsonl").exists()
+    return not any(
+        line["kind"] in BAD_ENDS or line.get("rc") in (-6, -11)
+        for run in runs_of(folder, name)
+        for line in run
     )
 
 
-@pytest.mark.skipif(not recordings(), reason=f"there are no recordings in {TRACES}")
 def test_recorded_graphs_that_went_well_are_not_blocked() -> None:
     found = {}
-    for name in recordings():
-        reading = read((TRACES / f"{name}.graph.json").read_bytes())
-        if not refused_by_parser(reading) and went_well(name):
-            codes = blocked(TRACES / f"{name}.graph.json")
+    for name, folder in engine_runs().items():
+        path = folder / f"{name}.graph.json"
+        if not refused_by_parser(read(path.read_bytes())) and went_well(folder, name):
+            codes = blocked(path)
             found |= {name: codes} if codes else {}
     assert found == {name: known["codes"] for name, known in KNOWN["recordings"].items()}
 
 
-@pytest.mark.skipif(not recordings(), reason=f"there are no recordings in {TRACES}")
 def test_with_the_files_of_the_actions_an_optional_input_blocks_nothing() -> None:
     library = {
         "OxWork": Signature(inputs={"delay": "number", "result": "string"}),
         "OxOptional": Signature(inputs={"text": "string"}, optional=frozenset({"text"})),
     }
-    reading = read((TRACES / "param_optional.graph.json").read_bytes())
+    folder = engine_runs()["param_optional"]
+    reading = read((folder / "param_optional.graph.json").read_bytes())
     assert blocking(check_reading(reading, library)) == []

@@ -1,7 +1,6 @@
 """What `check` says about graphs."""
 
 import json
-import os
 import time
 from pathlib import Path
 from typing import Any
@@ -23,14 +22,9 @@ from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.model import Graph, Problem, Signature
 from action_assistant.umrf.semantics import Hazard, NodeState, simulate
 from strategies import graphs
+from support.recordings import CORPUS, NO_CORPUS, engine_runs, facts, family, lines
 
-ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf"
 SAFE = ["on_error -> ignore"]
-
-
-def lines(path: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
 def action(name: str, *, parents: Any = (), children: Any = (), **fields: Any) -> dict[str, Any]:
@@ -331,13 +325,11 @@ def test_ten_thousand_actions_are_checked_in_seconds() -> None:
 # The engine's own verdicts
 
 
-VALIDATION = [case for case in lines(SHARED / "traces" / "validation.jsonl")]  # noqa: C416
-
-
-@pytest.mark.skipif(not VALIDATION, reason=f"there are no verdicts in {SHARED}")
 def test_we_refuse_exactly_what_the_engines_parser_refuses() -> None:
     differing = []
-    for case in VALIDATION:
+    cases = lines(family("engine") / "validation.jsonl")
+    assert cases
+    for case in cases:
         if case["case"].startswith("action:"):
             continue
         try:
@@ -350,15 +342,13 @@ def test_we_refuse_exactly_what_the_engines_parser_refuses() -> None:
 
 
 def accepted() -> list[Path]:
-    verdicts = lines(SHARED / "corpus" / "verdicts.jsonl")
+    verdicts = lines(CORPUS / "verdicts.jsonl")
     return [
-        SHARED / "corpus" / v["file"]
-        for v in verdicts
-        if v["accepted"] and v["file"].startswith("graphs/")
+        CORPUS / v["file"] for v in verdicts if v["accepted"] and v["file"].startswith("graphs/")
     ]
 
 
-@pytest.mark.skipif(not accepted(), reason=f"there is no corpus in {SHARED}")
+@pytest.mark.skipif(not accepted(), reason=NO_CORPUS)
 def test_real_graphs_that_the_engine_reads_are_blocked_for_what_it_does_then() -> None:
     """Only for hazards that its source or a recording shows, never for what it would refuse."""
     certain = {"H1", "H2", "H2b", "H7", "H8", "actors"}
@@ -368,15 +358,10 @@ def test_real_graphs_that_the_engine_reads_are_blocked_for_what_it_does_then() -
         assert {p.code for p in check_reading(reading) if p.severity == "error"} <= certain
 
 
-@pytest.mark.skipif(not VALIDATION, reason=f"there is no corpus in {SHARED}")
-def test_graphs_that_the_engine_ran_are_not_blocked() -> None:
-    ran = [
-        "semantics_test_1", "semantics_test_2", "semantics_test_3", "semantics_test_4",
-        "semantics_test_5", "semantics_test_6", "semantics_test_7", "semantics_test_8",
-        "semantics_test_9", "external_changes_test_0", "external_changes_test_1",
-        "join_and", "join_or_retrigger", "fork_join_diamond", "cycle_countdown", "sub_seq",
-        "error_handler", "spont_slow_child", "param_override", "param_allowed_ok",
-    ]  # fmt: skip
-    for name in ran:
-        reading = read((SHARED / "traces" / f"{name}.graph.json").read_bytes())
-        assert blocking(check_reading(reading)) == [], name
+@pytest.mark.parametrize("name", facts("engine").get("ran", ()))
+def test_graphs_that_the_engine_ran_are_not_blocked(name: str) -> None:
+    folder = engine_runs().get(name)
+    if folder is None:
+        pytest.skip("runs of graphs of other repositories are not here (UMRF_SHARED)")
+    reading = read((folder / f"{name}.graph.json").read_bytes())
+    assert blocking(check_reading(reading)) == []

@@ -1,10 +1,10 @@
 """What reading and writing UMRF files promises."""
 
 import json
-import os
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -15,14 +15,9 @@ from action_assistant.umrf.codec import Stamp, Unreadable, read, write
 from action_assistant.umrf.jsontext import MAX_BYTES, dump, parse
 from action_assistant.umrf.model import ENTRY, EXIT, Graph
 from strategies import graphs, normal
+from support.recordings import CORPUS, NO_CORPUS, family
 
-ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf"
 OWN = Path(__file__).parent / "examples"
-
-
-def corpus() -> list[Path]:
-    return sorted((SHARED / "corpus" / "graphs").glob("*/*.json"))
 
 
 def file_of(**fields: object) -> str:
@@ -60,8 +55,15 @@ def test_writing_twice_changes_nothing(graph: Graph) -> None:
     assert write(read(text).graph) == text
 
 
-@pytest.mark.skipif(not corpus(), reason=f"there is no corpus in {SHARED}")
-@pytest.mark.parametrize("path", corpus(), ids=lambda path: path.name)
+def graph_files() -> list[Any]:
+    """Graphs that the engine was given, and those that people keep in repositories."""
+    recorded = sorted(family("engine").rglob("*.graph.json"))
+    real = sorted((CORPUS / "graphs").glob("*/*.json"))
+    none = pytest.param(CORPUS, marks=pytest.mark.skip(reason=NO_CORPUS))
+    return [*recorded, *(real or [none])]
+
+
+@pytest.mark.parametrize("path", graph_files(), ids=lambda path: path.name)
 def test_every_file_of_the_corpus_is_read_and_survives(path: Path) -> None:
     first = read(path.read_bytes())
     again = read(write(first.graph))

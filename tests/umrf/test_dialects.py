@@ -1,7 +1,6 @@
 """Older files, and what becomes of them."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,8 @@ from action_assistant.umrf.check import STRUCTURAL, check, check_reading
 from action_assistant.umrf.codec import Reading, read, write
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import ENTRY, EXIT
+from support.recordings import CORPUS, NO_CORPUS, lines
 
-ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf" / "corpus"
 OWN = Path(__file__).parent / "examples"
 
 
@@ -28,9 +26,7 @@ def reading_of(name: str) -> Reading:
 
 
 def verdicts() -> list[dict[str, Any]]:
-    path = SHARED / "verdicts.jsonl"
-    lines = path.read_text().splitlines() if path.exists() else []
-    return [json.loads(line) for line in lines if FOREIGN not in line]
+    return [each for each in lines(CORPUS / "verdicts.jsonl") if FOREIGN not in each["file"]]
 
 
 @pytest.mark.parametrize(
@@ -227,18 +223,18 @@ def test_fields_that_the_engine_does_not_know_do_not_make_a_file_older() -> None
     assert dict(reading.graph.actions[0].extra) == {"id": "3", "effect": '"synchronous"'}
 
 
-@pytest.mark.skipif(not verdicts(), reason=f"there is no corpus in {SHARED}")
+@pytest.mark.skipif(not verdicts(), reason=NO_CORPUS)
 def test_we_are_never_laxer_than_the_engines_parser() -> None:
     for verdict in verdicts():
-        reading = read((SHARED / verdict["file"]).read_bytes())
+        reading = read((CORPUS / verdict["file"]).read_bytes())
         refused = {p.code for p in check_reading(reading) if p.severity == "error"} & STRUCTURAL
         assert bool(refused) != verdict["accepted"], (verdict["file"], refused)
 
 
-@pytest.mark.skipif(not verdicts(), reason=f"there is no corpus in {SHARED}")
+@pytest.mark.skipif(not verdicts(), reason=NO_CORPUS)
 def test_what_was_translated_is_a_current_file() -> None:
     for verdict in verdicts():
-        again = read(write(read((SHARED / verdict["file"]).read_bytes()).graph))
+        again = read(write(read((CORPUS / verdict["file"]).read_bytes()).graph))
         assert (again.dialect, again.notes, again.problems) == ("D3", (), ()), verdict["file"]
 
 

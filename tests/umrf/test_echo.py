@@ -1,10 +1,7 @@
 """What an engine gives back of a graph."""
 
 import json
-import os
-from pathlib import Path
 
-import pytest
 from hypothesis import given, settings
 
 from action_assistant.umrf.codec import read, write
@@ -13,21 +10,18 @@ from action_assistant.umrf.echo import echo
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.model import Graph
 from strategies import graphs
-
-ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf" / "traces"
-CASES = SHARED / "validation.jsonl"
+from support.recordings import family, lines
 
 
 def echoed(text: str) -> str:
     return digest(echo(read(text).graph, PINNED))
 
 
-@pytest.mark.skipif(not CASES.exists(), reason=f"there are no round trips in {SHARED}")
 def test_what_the_engine_printed_is_the_echo_of_what_it_read() -> None:
     differing = []
-    for line in CASES.read_text().splitlines():
-        case = json.loads(line)
+    cases = lines(family("engine") / "validation.jsonl")
+    assert cases
+    for case in cases:
         printed = case.get("roundtrip") or {}
         if "graph_name" in printed and echoed(case["input"]) != echoed(json.dumps(printed)):
             differing.append(case["case"])

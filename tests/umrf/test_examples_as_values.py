@@ -1,7 +1,6 @@
 """Examples of old files, offered as values."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +12,11 @@ from action_assistant.umrf.fixes import fix, with_examples
 from action_assistant.umrf.jsontext import parse_small
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.parameters import example_of
+from support.recordings import CORPUS, NO_CORPUS
 
-ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf" / "corpus"
 #: Parameters with what their examples are as values, for the page too.
 VECTORS = Path(__file__).parents[1] / "vectors" / "examples.json"
-CORPUS = sorted(SHARED.rglob("*.json"))
+FILES = sorted(CORPUS.rglob("*.json"))
 
 
 def graph_of(**parameters: Any) -> Graph:
@@ -99,10 +97,10 @@ def test_examples_are_read_as_the_vectors_say(parameter: str, value: str | None)
     assert example_of(parameter) == (None if value is None else parse_small(value))
 
 
-@pytest.mark.skipif(not CORPUS, reason=f"there is no corpus in {SHARED}")
+@pytest.mark.skipif(not FILES, reason=NO_CORPUS)
 def test_examples_leave_no_error_about_a_missing_input_that_has_one() -> None:
     without = sound = 0
-    for path in CORPUS:
+    for path in FILES:
         if "pvf_example" not in path.read_text():
             continue
         try:

@@ -1,7 +1,6 @@
 """Where findings stand: each names a place of the text that was given, which has what it quotes."""
 
 import json
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,11 +15,10 @@ from action_assistant.umrf.codec import Reading, Unreadable, read, read_action, 
 from action_assistant.umrf.jsonplaces import places_of, pointer
 from action_assistant.umrf.model import Graph, Where
 from strategies import graphs
+from support.recordings import CORPUS, NO_CORPUS
 
-ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf" / "corpus"
 OWN = sorted((Path(__file__).parent / "examples").glob("*.json"))
-CORPUS = sorted(SHARED.rglob("*.json"))
+FILES = sorted(CORPUS.rglob("*.json"))
 #: What the engine takes for an action, since it has a name and a type: a reply of CMake.
 FOREIGN = ".cmake__api__v1__reply__target-"
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]
@@ -110,9 +108,9 @@ def test_every_finding_of_our_examples_has_its_place(path: Path) -> None:
     hold(path.read_bytes())
 
 
-@pytest.mark.skipif(not CORPUS, reason=f"there is no corpus in {SHARED}")
+@pytest.mark.skipif(not FILES, reason=NO_CORPUS)
 def test_every_finding_of_the_corpus_has_its_place() -> None:
-    found = [hold(path.read_bytes()) for path in CORPUS if FOREIGN not in path.name]
+    found = [hold(path.read_bytes()) for path in FILES if FOREIGN not in path.name]
     assert sum(found) > 2_000
 
 

@@ -1,9 +1,7 @@
 """Graphs inside graphs, as `check` sees them."""
 
 import json
-import os
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -13,9 +11,8 @@ from action_assistant.umrf.check import blocking, check, check_reading
 from action_assistant.umrf.codec import read
 from action_assistant.umrf.model import Graph, Signature
 from action_assistant.umrf.semantics import Engine, EngineRefused
+from support.recordings import family
 
-ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf" / "traces"
 SAFE = ["on_error -> ignore"]
 RUN = ["on_error -> run"]
 TEXT = {"pvf_type": "string"}
@@ -167,20 +164,15 @@ def test_pausing_a_sub_graph_is_told() -> None:
     assert any("Inner_0 is a sub-graph: a pause of it never completes" in m for m in messages)
 
 
-RECORDED = {
-    path.name.removesuffix(".graph.json"): path for path in sorted(SHARED.glob("sub_*.graph.json"))
-}
-
-
-@pytest.mark.skipif(not RECORDED, reason=f"there are no recordings in {SHARED}")
 def test_of_the_recorded_sub_graphs_the_one_that_halted_is_found() -> None:
     library = {
         inner.name: inner
-        for path in (SHARED / "subgraphs").glob("*.json")
+        for path in (family("engine") / "subgraphs").glob("*.json")
         for inner in [read(path.read_bytes()).graph]
     }
     halting = {}
-    for name, path in RECORDED.items():
+    for path in sorted(family("engine").glob("sub_*.graph.json")):
+        name = path.name.removesuffix(".graph.json")
         problems = check_reading(read(path.read_bytes()), None, graphs=library)
         halting[name] = [p for p in problems if "ends HALTED" in p.message]
         if name != "sub_halt":
