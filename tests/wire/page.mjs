@@ -26,8 +26,8 @@ async function bundled() {
   try {
     const entry = join(frontend, "wire-test-entry.js");
     const source = `
-      export * as edit from "./src/graph/edit.ts";
-      export * as layout from "./src/graph/layout.ts";
+      export * as edit from "./src/graph/edit/index.ts";
+      export * as layout from "./src/graph/document-keys.ts";
       export * as read from "./src/graph/read.ts";
       export * as room from "./src/room/connect.ts";
       export * as Y from "yjs";

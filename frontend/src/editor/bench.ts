@@ -1,8 +1,9 @@
 /** What a deed works on: the open graph, what is selected, and the view of it. */
 import { createContext, use } from "react";
 import type * as Y from "yjs";
+import { relationId } from "../graph/document-keys";
 import { addAction, moveActions, type NewAction, together } from "../graph/edit";
-import { relationId } from "../graph/layout";
+import { notesOf, placeNotes, withContents } from "../graph/edit/notes";
 import {
   type Action,
   ENTRY,
@@ -13,7 +14,6 @@ import {
   type Precondition,
   type Relation,
 } from "../graph/model";
-import { notesOf, placeNotes, withContents } from "../graph/notes";
 import { CARD, unplaced } from "../ui/canvas/arrange";
 
 import type { DryRun } from "./dry-run/use-dry-run";

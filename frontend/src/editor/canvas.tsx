@@ -14,8 +14,8 @@ import {
 } from "@xyflow/react";
 import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
 import { insertInto, removeNotes, together } from "../graph/edit";
+import { changeNote } from "../graph/edit/notes";
 import type { Position } from "../graph/model";
-import { changeNote } from "../graph/notes";
 import { useRoom } from "../room/use-room";
 import { CARD } from "../ui/canvas/arrange";
 import type { Arrow, CanvasNode } from "../ui/canvas/elements";

@@ -1,7 +1,7 @@
 /** Changes as a file that people and programs can read, saved by the browser. */
 
 import { type Change, changesOf } from "../graph/changes";
-import { type Maps, mapsFrom } from "../graph/layout";
+import { type Maps, mapsFrom } from "../graph/document-keys";
 import type { Stranded } from "../room/history";
 
 interface Saved {

@@ -7,8 +7,8 @@
 import { notifications } from "@mantine/notifications";
 import { place, sentence } from "../api/http";
 import { readPieces } from "../api/pieces";
-import { type Clip, clipOf, isEmpty, paste } from "../graph/clip";
-import { mapsFrom } from "../graph/layout";
+import { mapsFrom } from "../graph/document-keys";
+import { type Clip, clipOf, isEmpty, paste } from "../graph/edit/clip";
 import { readGraph } from "../graph/read";
 import { umrfText } from "../graph/umrf-text";
 import { arrange } from "../ui/canvas/arrange";

@@ -1,7 +1,7 @@
 /** Addresses of a graph and of what is in it: an action, an arrow, a problem. */
 
 import { pageUrl } from "../api/place";
-import { relationId } from "../graph/layout";
+import { relationId } from "../graph/document-keys";
 import type { Graph } from "../graph/model";
 
 /** The address of a graph, with what is to be shown of it. */

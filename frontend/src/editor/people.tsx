@@ -2,7 +2,7 @@
 import { Tooltip } from "@mantine/core";
 import { ViewportPortal } from "@xyflow/react";
 import type { CSSProperties } from "react";
-import { splitKey } from "../graph/layout";
+import { splitKey } from "../graph/document-keys";
 import type { Person } from "../room/presence";
 import { useFollowing, usePeople } from "../room/use-room";
 import { CARD, type Places, type Sizes } from "../ui/canvas/arrange";

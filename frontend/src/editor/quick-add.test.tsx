@@ -4,8 +4,8 @@ import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
+import { graphOf } from "../graph/edit/document-writes";
 import { EMPTY_GRAPH } from "../graph/model";
-import { graphOf } from "../graph/pen";
 import type { Bench } from "./bench";
 import { QuickAdd } from "./quick-add";
 

@@ -4,7 +4,7 @@ import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import { addAction } from "../graph/edit";
-import { graphOf } from "../graph/pen";
+import { graphOf } from "../graph/edit/document-writes";
 import type { Bench } from "./bench";
 import { useConnecting } from "./use-connecting";
 

@@ -2,7 +2,7 @@
 import { useEffect, useRef } from "react";
 import type * as Y from "yjs";
 import type { Progress } from "../api/progress";
-import { endsOf, rootOf, splitKey } from "../graph/layout";
+import { endsOf, rootOf, splitKey } from "../graph/document-keys";
 import type { Graph, Key } from "../graph/model";
 import { useRoom } from "../room/use-room";
 import { announcer } from "../ui/announcer";

@@ -5,7 +5,8 @@
  * replica shows the same without anybody having to write.
  */
 
-import { relationId } from "./layout";
+import { relationId } from "./document-keys";
+import { same } from "./equal";
 import {
   type Action,
   EMPTY_GRAPH,
@@ -16,7 +17,6 @@ import {
   type Key,
   type Relation,
 } from "./model";
-import { same } from "./same";
 import { byText } from "./values";
 
 /** An action as its own keys tell it, with its place; numbering is not its own affair. */

@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
 import { changesOf, chosen, type Values } from "./changes";
+import { type Maps, mapsFrom, mapsOf, ROOTS, rootOf } from "./document-keys";
 import {
   addAction,
   addParameter,
@@ -10,9 +11,8 @@ import {
   setField,
   setGraphName,
 } from "./edit";
-import { type Maps, mapsFrom, mapsOf, ROOTS, rootOf } from "./layout";
+import { same } from "./equal";
 import { ENTRY } from "./model";
-import { same } from "./same";
 
 /** What changed from one document to the next, both ways. */
 function between(then: Maps, here: Maps): { difference: Values; before: Values } {

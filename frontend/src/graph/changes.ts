@@ -4,9 +4,9 @@
  * Pure. Each change keeps the keys it is made of, so that some of them can be taken and others not.
  */
 
-import { endsOf, type Maps, ROOTS, type Root, segmentsOf, splitKey } from "./layout";
+import { endsOf, type Maps, ROOTS, type Root, segmentsOf, splitKey } from "./document-keys";
+import { same } from "./equal";
 import { ENTRY, EXIT, type Key, PRECONDITIONS } from "./model";
-import { same } from "./same";
 
 /** Values by key; `undefined` where there is none. */
 export type Values = { readonly [R in Root]: ReadonlyMap<string, unknown> };

@@ -7,7 +7,6 @@
 
 import type * as Y from "yjs";
 import { type Assembly, assemble, emptyAssembly, type RawAction } from "./assemble";
-import { isAid } from "./ids";
 import {
   endsOf,
   type Maps,
@@ -17,7 +16,9 @@ import {
   relationId,
   rootOf,
   splitKey,
-} from "./layout";
+} from "./document-keys";
+import { same } from "./equal";
+import { isAid } from "./ids";
 import {
   type Action,
   ENTRY,
@@ -34,7 +35,6 @@ import {
   type Remap,
   type Response,
 } from "./model";
-import { same } from "./same";
 import {
   asInstanceId,
   asJsonText,

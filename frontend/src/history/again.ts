@@ -3,7 +3,7 @@ import { graphMoment, publish, type Version } from "../api/graphs";
 import { askText } from "../api/http";
 import { type Fault, fittedScriptOf, scriptOf, umrfUrl } from "../api/review";
 import { type Run, startRun } from "../api/runs";
-import { memberText } from "../graph/member";
+import { memberText } from "../graph/json-members";
 
 export type Which = "same" | "newest";
 

@@ -4,7 +4,7 @@ import * as decoding from "lib0/decoding";
 import * as encoding from "lib0/encoding";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
-import { mapsOf } from "../graph/layout";
+import { mapsOf } from "../graph/document-keys";
 import type { Socket } from "./connect";
 import { fingerprint } from "./sameness";
 

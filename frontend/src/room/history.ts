@@ -16,10 +16,10 @@ import {
   type Root,
   rootOf,
   splitKey,
-} from "../graph/layout";
+} from "../graph/document-keys";
+import { together } from "../graph/edit/document-writes";
+import { same } from "../graph/equal";
 import { ENTRY, EXIT } from "../graph/model";
-import { together } from "../graph/pen";
-import { same } from "../graph/same";
 import type { Kept, Waiting } from "./device";
 
 /** Plain values by key; `undefined` where the key is erased. */

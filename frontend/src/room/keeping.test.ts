@@ -1,8 +1,8 @@
 import fc from "fast-check";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
+import { mapsOf } from "../graph/document-keys";
 import { addAction, rename, setGraphName } from "../graph/edit";
-import { mapsOf } from "../graph/layout";
 import { connect, type Room } from "./connect";
 import { FakeDevice } from "./fake-device";
 import { FakeServer } from "./fake-server";

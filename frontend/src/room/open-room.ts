@@ -2,8 +2,8 @@
 
 import type * as Y from "yjs";
 import { undoOf } from "../graph/edit";
+import { same } from "../graph/equal";
 import { followGraph, type GraphSource } from "../graph/read";
-import { same } from "../graph/same";
 import { type ConnectOptions, connect, type Room } from "./connect";
 import { Following } from "./following";
 import { frames } from "./pace";

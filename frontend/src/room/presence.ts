@@ -7,8 +7,8 @@
  */
 
 import type { Awareness } from "y-protocols/awareness";
+import { same } from "../graph/equal";
 import type { Key, Position } from "../graph/model";
-import { same } from "../graph/same";
 import { atOnce, type Soon } from "./pace";
 
 /** What this page tells the others. */

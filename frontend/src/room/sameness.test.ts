@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { mapsFrom } from "../graph/layout";
+import { mapsFrom } from "../graph/document-keys";
 import { fingerprint } from "./sameness";
 
 test("the fingerprint is what the server makes", () => {

@@ -8,7 +8,7 @@
 
 import * as decoding from "lib0/decoding";
 import type * as Y from "yjs";
-import { type Maps, mapsOf, ROOTS } from "../graph/layout";
+import { type Maps, mapsOf, ROOTS } from "../graph/document-keys";
 import * as frames from "./frames";
 
 /** How long nothing must have happened. */

@@ -11,8 +11,8 @@ import {
   useState,
   useSyncExternalStore,
 } from "react";
+import { same } from "../graph/equal";
 import { EMPTY_GRAPH, type Graph } from "../graph/model";
-import { same } from "../graph/same";
 import type { Keep, Link } from "./connect";
 import { browser, type OtherPerson } from "./device";
 import { type Stranded, strandedOf } from "./history";

@@ -1,7 +1,7 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import { addAction, rename } from "../graph/edit";
-import { graphOf } from "../graph/pen";
+import { graphOf } from "../graph/edit/document-writes";
 import { FakeDevice } from "./fake-device";
 import { FakeServer } from "./fake-server";
 import { Visit } from "./visit";

@@ -7,7 +7,7 @@ import type { Script } from "../api/rehearsal";
 import { type Started, type StartOrder, startRun } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { newAid } from "../graph/ids";
-import { memberText } from "../graph/member";
+import { memberText } from "../graph/json-members";
 import { unsureStarts } from "./unsure-starts";
 
 export interface Order {

@@ -16,7 +16,7 @@ import {
   IconSelectAll,
   IconTrash,
 } from "@tabler/icons-react";
-import { clipOf, paste } from "../../graph/clip";
+import { relationId } from "../../graph/document-keys";
 import {
   removeActions,
   removeNotes,
@@ -27,7 +27,7 @@ import {
   unsetEntry,
   unsetExit,
 } from "../../graph/edit";
-import { relationId } from "../../graph/layout";
+import { clipOf, paste } from "../../graph/edit/clip";
 import { type Action, ENTRY, EXIT } from "../../graph/model";
 import { copyText } from "../../ui/copy-text";
 import { type Bench, selectedActions, selectedNotes, selectedRelations } from "../bench";

@@ -6,8 +6,8 @@ import {
   IconPencil,
   IconRowInsertBottom,
 } from "@tabler/icons-react";
-import { relationId } from "../../graph/layout";
-import { writeNote } from "../../graph/notes";
+import { relationId } from "../../graph/document-keys";
+import { writeNote } from "../../graph/edit/notes";
 import { CARD } from "../../ui/canvas/arrange";
 import { type Bench, selectedNotes, selectedRelations } from "../bench";
 import type { Deed } from "./deed";

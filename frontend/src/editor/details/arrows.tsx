@@ -2,8 +2,8 @@
 import { ActionIcon, Button, Select, Tooltip } from "@mantine/core";
 import { IconPlus, IconX } from "@tabler/icons-react";
 import { useState } from "react";
+import { relationId } from "../../graph/document-keys";
 import { connect, removeRelation, setEntry, unsetEntry } from "../../graph/edit";
-import { relationId } from "../../graph/layout";
 import { type Action, ENTRY, EXIT, type Precondition, type Relation } from "../../graph/model";
 import { answersOf } from "../../ui/canvas/elements";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";

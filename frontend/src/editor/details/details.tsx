@@ -2,10 +2,10 @@
 import { Tabs } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";
 import type { Problem, Problems } from "../../api/graphs";
-import type { Thread } from "../../graph/comments";
-import { relationId } from "../../graph/layout";
+import { relationId } from "../../graph/document-keys";
+import type { Thread } from "../../graph/edit/comments";
+import { notesOf } from "../../graph/edit/notes";
 import { EXIT } from "../../graph/model";
-import { notesOf } from "../../graph/notes";
 import { type Bench, type Panel, selectedActions, selectedRelations, useBench } from "../bench";
 import { FieldOf } from "../field-of";
 import { Comments } from "../talk/comments";

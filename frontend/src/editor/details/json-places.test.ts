@@ -1,8 +1,8 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
+import { mapsOf } from "../../graph/document-keys";
 import { addAction, connect, setEntry, setExit } from "../../graph/edit";
-import { mapsOf } from "../../graph/layout";
 import { EXIT } from "../../graph/model";
 import { readGraph } from "../../graph/read";
 import { actionAt, lineOf, rangeOf, rangeOfArrow } from "./json-places";

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { mapsOf } from "../../graph/layout";
+import { mapsOf } from "../../graph/document-keys";
 import { readGraph } from "../../graph/read";
 import { labelsOf, setLabels } from "./labels";
 

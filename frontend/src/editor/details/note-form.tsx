@@ -2,7 +2,7 @@
 import { Button } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { removeNotes } from "../../graph/edit";
-import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../../graph/notes";
+import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../../graph/edit/notes";
 import { noteColor } from "../../ui/canvas/note-colors";
 import { useBench } from "../bench";
 import { DraftInput } from "../draft-input";

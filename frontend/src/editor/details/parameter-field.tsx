@@ -2,8 +2,8 @@
 import { ActionIcon, SegmentedControl, Select, Tooltip } from "@mantine/core";
 import { IconAdjustments, IconBackspace, IconLock } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";
+import type { Side } from "../../graph/document-keys";
 import { setParameter } from "../../graph/edit";
-import type { Side } from "../../graph/layout";
 import type { Key, Parameter } from "../../graph/model";
 import { pathWords } from "../../ui/canvas/value-text";
 import { useBench } from "../bench";

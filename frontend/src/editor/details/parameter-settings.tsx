@@ -1,8 +1,8 @@
 /** What a parameter is, apart from its value: name, type, allowed values, required, locked. */
 import { Autocomplete, Button, Group, Switch } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
+import type { Side } from "../../graph/document-keys";
 import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
-import type { Side } from "../../graph/layout";
 import type { Key, Parameter } from "../../graph/model";
 import { pathWords } from "../../ui/canvas/value-text";
 import { useBench } from "../bench";

@@ -4,7 +4,7 @@ import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { addAction } from "../../graph/edit";
-import { graphOf } from "../../graph/pen";
+import { graphOf } from "../../graph/edit/document-writes";
 import { FakeServer } from "../../room/fake-server";
 import { RoomProvider, useGraph, useRoom } from "../../room/use-room";
 import { type Bench, BenchContext } from "../bench";

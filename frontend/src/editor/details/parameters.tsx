@@ -2,8 +2,8 @@
 import { Button, Group, Select, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
+import type { Side } from "../../graph/document-keys";
 import { addParameter, together } from "../../graph/edit";
-import type { Side } from "../../graph/layout";
 import type { Action } from "../../graph/model";
 import { pathWords } from "../../ui/canvas/value-text";
 import { useBench } from "../bench";

@@ -3,6 +3,7 @@ import { ActionIcon, Button, Tooltip } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
 import type { Problem, Problems } from "../../api/graphs";
+import { relationId } from "../../graph/document-keys";
 import {
   ABOUT,
   applyExamples,
@@ -11,8 +12,7 @@ import {
   exampleOnes,
   fixOf,
   safeOnes,
-} from "../../graph/fixes";
-import { relationId } from "../../graph/layout";
+} from "../../graph/edit/fixes";
 import type { Graph } from "../../graph/model";
 import { bySeverity, placeOf } from "../../ui/canvas/marks";
 import { type Bench, endName, useBench } from "../bench";

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
+import { mapsOf } from "../../graph/document-keys";
 import { addAction } from "../../graph/edit";
-import { mapsOf } from "../../graph/layout";
 import type { Action } from "../../graph/model";
 import { readGraph } from "../../graph/read";
 import { families, pathFrom, taken } from "./parameter-path";

@@ -1,5 +1,5 @@
 /** Which output of an action can reach which input of the next, and why not. Pure. */
-import { flatName } from "../../graph/layout";
+import { flatName } from "../../graph/document-keys";
 import type { Action, Parameter, Remap } from "../../graph/model";
 import { fieldOf } from "./pvf";
 

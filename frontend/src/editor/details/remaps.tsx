@@ -2,8 +2,8 @@
 import { ActionIcon, Button, Select } from "@mantine/core";
 import { IconArrowDown, IconX } from "@tabler/icons-react";
 import { useState } from "react";
+import { relationId } from "../../graph/document-keys";
 import { setRemap } from "../../graph/edit";
-import { relationId } from "../../graph/layout";
 import type { Relation } from "../../graph/model";
 import { endName, useBench } from "../bench";
 import style from "./details.module.css";

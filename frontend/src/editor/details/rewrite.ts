@@ -1,10 +1,10 @@
 /** Edited JSON as an edit of the document, and what others changed meanwhile. Pure but for the edit. */
 import type * as Y from "yjs";
 import type { KeyChange } from "../../api/graphs";
-import { endsOf, ROOTS, type Root, rootOf, splitKey } from "../../graph/layout";
+import { endsOf, ROOTS, type Root, rootOf, splitKey } from "../../graph/document-keys";
+import { together } from "../../graph/edit/document-writes";
+import { same } from "../../graph/equal";
 import { ENTRY, EXIT, type Graph, type Key } from "../../graph/model";
-import { together } from "../../graph/pen";
-import { same } from "../../graph/same";
 
 const isRoot = (root: string): root is Root => ROOTS.some((known) => known === root);
 

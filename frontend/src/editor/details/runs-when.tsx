@@ -1,6 +1,6 @@
 /** When something runs, as sentences: what the engine would really do. */
 import type { Key } from "../../graph/model";
-import { startWords } from "../../graph/words";
+import { startWords } from "../../graph/relation-words";
 import { useBench } from "../bench";
 import style from "./details.module.css";
 

@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
 import type { TraceEvent } from "../../api/rehearsal";
+import { mapsOf } from "../../graph/document-keys";
 import { addAction, connect, setEntry, setExit } from "../../graph/edit";
-import { mapsOf } from "../../graph/layout";
 import { readGraph } from "../../graph/read";
 import { momentsOf, sightingAt, wordsOf } from "./play";
 import { commandsOf, decide, NOTHING_DECIDED, scriptOf } from "./script";

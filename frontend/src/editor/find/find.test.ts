@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
+import { mapsOf } from "../../graph/document-keys";
 import { addAction, connect, setRemap, setRequired } from "../../graph/edit";
-import { mapsOf } from "../../graph/layout";
 import { readGraph } from "../../graph/read";
 import { find } from "./find";
 

@@ -10,7 +10,7 @@ import {
 } from "@tabler/icons-react";
 import { memo, useId, useState } from "react";
 import type { Progress } from "../../api/progress";
-import type { Note } from "../../graph/notes";
+import type { Note } from "../../graph/edit/notes";
 import { noteColor } from "../../ui/canvas/note-colors";
 import { useTalk } from "../../ui/canvas/spotlight";
 import { cardLines, lineText } from "../../ui/canvas/value-text";

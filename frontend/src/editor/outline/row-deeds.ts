@@ -1,4 +1,6 @@
 /** What can be done to a row of the outline, with its key. */
+
+import { relationId } from "../../graph/document-keys";
 import {
   removeActions,
   removeNotes,
@@ -6,7 +8,6 @@ import {
   setResponse,
   swapOrder,
 } from "../../graph/edit";
-import { relationId } from "../../graph/layout";
 import { ENTRY, type Key, spoken } from "../../graph/model";
 import { type Bench, endName } from "../bench";
 import type { Change } from "./row-edit";

@@ -1,10 +1,10 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
+import { mapsOf } from "../../graph/document-keys";
 import { addAction, connect, setEntry, setExit, setResponse } from "../../graph/edit";
-import { mapsOf } from "../../graph/layout";
+import { writeNote } from "../../graph/edit/notes";
 import { type Graph, PRECONDITIONS } from "../../graph/model";
-import { writeNote } from "../../graph/notes";
 import { readGraph } from "../../graph/read";
 import { inOrder, type Row, rowsOf } from "./rows";
 

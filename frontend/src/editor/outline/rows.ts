@@ -1,5 +1,6 @@
 /** The graph as rows of an outline: actions, their outcomes, and what follows each. Pure. */
-import { relationId } from "../../graph/layout";
+import { relationId } from "../../graph/document-keys";
+import { type Note, notesOf } from "../../graph/edit/notes";
 import {
   type Action,
   ENTRY,
@@ -11,7 +12,6 @@ import {
   type Relation,
   type Response,
 } from "../../graph/model";
-import { type Note, notesOf } from "../../graph/notes";
 
 interface Place {
   readonly id: string;

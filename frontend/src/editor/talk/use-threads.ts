@@ -1,7 +1,7 @@
 /** The threads of the open graph, kept in step with the document. */
 import { useEffect, useMemo, useRef, useSyncExternalStore } from "react";
-import { openTalk, readThreads, type Thread } from "../../graph/comments";
-import { rootOf } from "../../graph/layout";
+import { rootOf } from "../../graph/document-keys";
+import { openTalk, readThreads, type Thread } from "../../graph/edit/comments";
 import { useRoom } from "../../room/use-room";
 import { spotlight } from "../../ui/canvas/spotlight";
 

@@ -1,8 +1,8 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
+import { mapsOf } from "../../graph/document-keys";
 import { addAction, connect } from "../../graph/edit";
-import { mapsOf } from "../../graph/layout";
 import { readGraph } from "../../graph/read";
 import { align, type Block, distribute, tidied } from "./align";
 

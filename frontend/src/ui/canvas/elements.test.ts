@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
+import { mapsOf } from "../../graph/document-keys";
 import { addAction, connect, moveActions, setEntry, setExit, setResponse } from "../../graph/edit";
-import { mapsOf } from "../../graph/layout";
 import { ENTRY, EXIT, type Graph } from "../../graph/model";
 import { readGraph } from "../../graph/read";
 import { arrange, placesOf, unplaced } from "./arrange";

@@ -1,7 +1,8 @@
 /** A graph as nodes and edges of the canvas; what did not change keeps its identity. */
 import type { Edge, Node } from "@xyflow/react";
 import type { Progress } from "../../api/progress";
-import { relationId } from "../../graph/layout";
+import { relationId } from "../../graph/document-keys";
+import type { Note } from "../../graph/edit/notes";
 import {
   type Action,
   ENTRY,
@@ -13,7 +14,6 @@ import {
   type Response,
   spoken,
 } from "../../graph/model";
-import type { Note } from "../../graph/notes";
 import { OUTCOMES, outcomeWord } from "../outcome";
 import { CARD, PILL, type Places } from "./arrange";
 import { alongCurve, alongLane, anchorOf, placeLabels, sizeOf, type Wish } from "./labels";

@@ -1,7 +1,7 @@
 /** Notes and frames as nodes of the canvas. */
 import type { Node } from "@xyflow/react";
+import { type Note, notesOf } from "../../graph/edit/notes";
 import type { Graph, Key } from "../../graph/model";
-import { type Note, notesOf } from "../../graph/notes";
 import type { Places } from "./arrange";
 
 export type NoteNode = Node<{ note: Note }, "note">;

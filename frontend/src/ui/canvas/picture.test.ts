@@ -2,9 +2,9 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
+import { mapsOf } from "../../graph/document-keys";
 import { addAction, connect, setEntry, setExit } from "../../graph/edit";
-import { mapsOf } from "../../graph/layout";
-import { writeNote } from "../../graph/notes";
+import { writeNote } from "../../graph/edit/notes";
 import { readGraph } from "../../graph/read";
 import { placesOf } from "./arrange";
 import { pictureOf } from "./picture";

@@ -1,6 +1,7 @@
 /** A graph as one SVG picture, drawn from the same elements as the canvas. Pure. */
+
+import { type Note, notesOf } from "../../graph/edit/notes";
 import type { Graph, Key, Position, Precondition } from "../../graph/model";
-import { type Note, notesOf } from "../../graph/notes";
 import { OUTCOMES, outcomeColor, outcomeWord } from "../outcome";
 import { robotColor } from "../robot";
 import { CARD, PILL, type Sizes } from "./arrange";

@@ -1,5 +1,5 @@
 /** Parameter values as people read them. */
-import { memberText } from "../../graph/member";
+import { memberText } from "../../graph/json-members";
 import type { Parameter } from "../../graph/model";
 
 /** `pose/position/x` as `pose.position.x`. */

@@ -7,10 +7,10 @@
  * the text as the page wrote it; who stored it is known by the log.
  */
 import type * as Y from "yjs";
-import { newAid } from "./ids";
-import { rootOf } from "./layout";
-import type { Key } from "./model";
-import { erase, put, together } from "./pen";
+import { rootOf } from "../document-keys";
+import { newAid } from "../ids";
+import type { Key } from "../model";
+import { erase, put, together } from "./document-writes";
 
 export interface Author {
   readonly id: string;

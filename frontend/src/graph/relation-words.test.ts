@@ -1,10 +1,10 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
+import { mapsOf } from "./document-keys";
 import { addAction, connect, setEntry, setExit, setRequired, setResponse } from "./edit";
-import { mapsOf } from "./layout";
 import { EXIT } from "./model";
 import { readGraph } from "./read";
-import { ignoredWords, nameOf, relationWords, startWords } from "./words";
+import { ignoredWords, nameOf, relationWords, startWords } from "./relation-words";
 
 function graphOf(doc: Y.Doc) {
   return readGraph(mapsOf(doc));

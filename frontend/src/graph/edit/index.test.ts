@@ -2,6 +2,19 @@ import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
 import {
+  actionOf,
+  arrows,
+  copyOf,
+  docWith,
+  exchange,
+  graphOf,
+  relationOf,
+  says,
+  updatesOf,
+} from "../../testing/edited-graph";
+import { mapsOf, relationId } from "../document-keys";
+import { ENTRY, EXIT, fullName, type Key } from "../model";
+import {
   addAction,
   addNote,
   addParameter,
@@ -28,20 +41,7 @@ import {
   setResponse,
   together,
   undoOf,
-} from "./edit";
-import {
-  actionOf,
-  arrows,
-  copyOf,
-  docWith,
-  exchange,
-  graphOf,
-  relationOf,
-  says,
-  updatesOf,
-} from "./edited-in-tests";
-import { mapsOf, relationId } from "./layout";
-import { ENTRY, EXIT, fullName, type Key } from "./model";
+} from ".";
 
 // -- actions ----------------------------------------------------------------------------------
 

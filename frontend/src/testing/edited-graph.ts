@@ -1,10 +1,10 @@
 /** Documents for tests of edits: made, copied for a colleague, and read as a graph. */
 
 import * as Y from "yjs";
-import { addAction } from "./edit";
-import { mapsOf, relationId } from "./layout";
-import { type Graph, type Key, type Relation, spoken } from "./model";
-import { readGraph } from "./read";
+import { mapsOf, relationId } from "../graph/document-keys";
+import { addAction } from "../graph/edit";
+import { type Graph, type Key, type Relation, spoken } from "../graph/model";
+import { readGraph } from "../graph/read";
 
 export const graphOf = (doc: Y.Doc): Graph => readGraph(mapsOf(doc));
 export const actionOf = (doc: Y.Doc, key: Key) => graphOf(doc).actions.find((a) => a.key === key);

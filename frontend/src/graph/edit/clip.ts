@@ -6,8 +6,6 @@
  */
 
 import type * as Y from "yjs";
-import { freeNumber } from "./edit-actions";
-import { isAid, newAid } from "./ids";
 import {
   actionKey,
   endsOf,
@@ -17,10 +15,12 @@ import {
   relationId,
   rootOf,
   splitKey,
-} from "./layout";
-import { ENTRY, EXIT, type Key, type Position } from "./model";
-import { after, numbersOf, put, settleGhosts, together } from "./pen";
-import { asNumber, asPosition } from "./values";
+} from "../document-keys";
+import { isAid, newAid } from "../ids";
+import { ENTRY, EXIT, type Key, type Position } from "../model";
+import { asNumber, asPosition } from "../values";
+import { freeNumber } from "./actions";
+import { after, numbersOf, put, settleGhosts, together } from "./document-writes";
 
 type Values = Readonly<Record<string, unknown>>;
 

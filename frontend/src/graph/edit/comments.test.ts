@@ -1,9 +1,9 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
+import { rootOf } from "../document-keys";
 import { beginThread, openTalk, readThreads, reply, resolve, unsay } from "./comments";
-import { rootOf } from "./layout";
-import { undoOf } from "./pen";
+import { undoOf } from "./document-writes";
 
 const ada = { id: "a", name: "Ada" };
 const mari = { id: "m", name: "Mari" };

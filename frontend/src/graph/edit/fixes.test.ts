@@ -1,6 +1,9 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { addAction, addParameter, connect, setField, undoOf } from "./edit";
+import { mapsOf, rootOf } from "../document-keys";
+import { fullName, type Graph } from "../model";
+import { readGraph } from "../read";
+import { addAction, addParameter, connect, setField, undoOf } from ".";
 import {
   ABOUT,
   applyExamples,
@@ -11,9 +14,6 @@ import {
   fixOf,
   safeOnes,
 } from "./fixes";
-import { mapsOf, rootOf } from "./layout";
-import { fullName, type Graph } from "./model";
-import { readGraph } from "./read";
 
 const graphOf = (doc: Y.Doc): Graph => readGraph(mapsOf(doc));
 

@@ -1,10 +1,10 @@
 /** Edits of parameters. Values are JSON text, so that what a person types stays as typed. */
 
 import type * as Y from "yjs";
-import { actionKey, extraKey, parameterKey, pathOf, rootOf, type Side } from "./layout";
-import type { JsonText, Key, Parameter } from "./model";
-import { erase, graphOf, hasAction, put, together } from "./pen";
-import { asJsonText } from "./values";
+import { actionKey, extraKey, parameterKey, pathOf, rootOf, type Side } from "../document-keys";
+import type { JsonText, Key, Parameter } from "../model";
+import { asJsonText } from "../values";
+import { erase, graphOf, hasAction, put, together } from "./document-writes";
 
 const FIELDS = { in: "input_parameters", out: "output_parameters" } as const;
 

@@ -1,11 +1,11 @@
 /** How edits write: one transaction each, only what differs, under one origin that undo knows. */
 
 import * as Y from "yjs";
-import { isAid } from "./ids";
-import { endsOf, mapsFrom, mapsOf, type Root, rootOf, splitKey } from "./layout";
-import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS, type Relation } from "./model";
-import { readGraph, readTakenUp } from "./read";
-import { asNumber, asResponse } from "./values";
+import { endsOf, mapsFrom, mapsOf, type Root, rootOf, splitKey } from "../document-keys";
+import { isAid } from "../ids";
+import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS, type Relation } from "../model";
+import { readGraph, readTakenUp } from "../read";
+import { asNumber, asResponse } from "../values";
 
 /** The origin of everything that the person at this page does. */
 export const MINE: unique symbol = Symbol("the person at this page");

@@ -1,9 +1,9 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { addAction, connect, retarget, setEntry, setRemap, setRequired, undoOf } from "./edit";
-import { mapsOf, relationId } from "./layout";
-import { ENTRY, EXIT } from "./model";
-import { readGraph } from "./read";
+import { mapsOf, relationId } from "../document-keys";
+import { ENTRY, EXIT } from "../model";
+import { readGraph } from "../read";
+import { addAction, connect, retarget, setEntry, setRemap, setRequired, undoOf } from ".";
 
 function drawn() {
   const doc = new Y.Doc();

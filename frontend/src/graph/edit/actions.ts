@@ -1,11 +1,8 @@
 /** Edits of actions: add, remove, rename, fields. */
 
 import type * as Y from "yjs";
-import { writeParameters } from "./edit-parameters";
-import { draw } from "./edit-relations";
-import { keepingEnds } from "./ends";
-import { newAid } from "./ids";
-import { actionKey, endsOf, extraKey, rootOf, splitKey } from "./layout";
+import { actionKey, endsOf, extraKey, rootOf, splitKey } from "../document-keys";
+import { newAid } from "../ids";
 import {
   type Action,
   ENTRY,
@@ -17,8 +14,20 @@ import {
   type Position,
   PRECONDITIONS,
   type Relation,
-} from "./model";
-import { after, erase, graphOf, hasAction, numbersOf, put, settleGhosts, together } from "./pen";
+} from "../model";
+import {
+  after,
+  erase,
+  graphOf,
+  hasAction,
+  numbersOf,
+  put,
+  settleGhosts,
+  together,
+} from "./document-writes";
+import { keepingEnds } from "./ends";
+import { writeParameters } from "./parameters";
+import { draw } from "./relations";
 
 /** An action to be added, usually one of the library. */
 export interface NewAction {

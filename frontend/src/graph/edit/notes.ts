@@ -1,11 +1,11 @@
 /** Notes and frames: what people write and draw round actions. JSON text under `g/<id>`. */
 
 import type * as Y from "yjs";
-import { addNote, setNote } from "./edit";
-import { noteKey, rootOf } from "./layout";
-import type { Graph, JsonText, Position } from "./model";
-import { together } from "./pen";
-import { asJsonText } from "./values";
+import { noteKey, rootOf } from "../document-keys";
+import type { Graph, JsonText, Position } from "../model";
+import { asJsonText } from "../values";
+import { addNote, setNote } from ".";
+import { together } from "./document-writes";
 
 export const NOTE_COLORS = ["grey", "amber", "green", "blue", "violet", "red"] as const;
 export type NoteColor = (typeof NOTE_COLORS)[number];

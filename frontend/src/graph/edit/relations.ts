@@ -1,9 +1,8 @@
 /** Edits of relations: connect, responses, order of waiting, remaps, the graph's two ends. */
 
 import type * as Y from "yjs";
-import { keepingEnds } from "./ends";
-import { endsOf, relationId, rootOf } from "./layout";
-import { ENTRY, EXIT, type Key, type Precondition, type Response, spoken } from "./model";
+import { endsOf, relationId, rootOf } from "../document-keys";
+import { ENTRY, EXIT, type Key, type Precondition, type Response, spoken } from "../model";
 import {
   after,
   erase,
@@ -15,7 +14,8 @@ import {
   relationOf,
   settleGhosts,
   together,
-} from "./pen";
+} from "./document-writes";
+import { keepingEnds } from "./ends";
 
 /**
  * Draws an arrow that says what was drawn: after `outcome` the child runs. Between two that are

@@ -1,10 +1,10 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { addAction, addNote } from "./edit";
-import { mapsOf, noteKey } from "./layout";
+import { mapsOf, noteKey } from "../document-keys";
+import { readGraph } from "../read";
+import { addAction, addNote } from ".";
 import { changeNote, notesOf, placeNotes, readNote, withContents, writeNote } from "./notes";
-import { readGraph } from "./read";
 
 const graphOf = (doc: Y.Doc) => readGraph(mapsOf(doc));
 

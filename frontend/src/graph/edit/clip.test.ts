@@ -1,7 +1,10 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { clipOf, paste } from "./clip";
+import { mapsOf, noteKey } from "../document-keys";
+import { ENTRY, EXIT, fullName, type Graph } from "../model";
+import { readGraph } from "../read";
+import { umrfText } from "../umrf-text";
 import {
   addAction,
   addNote,
@@ -13,11 +16,8 @@ import {
   setRequired,
   setResponse,
   undoOf,
-} from "./edit";
-import { mapsOf, noteKey } from "./layout";
-import { ENTRY, EXIT, fullName, type Graph } from "./model";
-import { readGraph } from "./read";
-import { umrfText } from "./umrf-text";
+} from ".";
+import { clipOf, paste } from "./clip";
 
 const graphOf = (doc: Y.Doc) => readGraph(mapsOf(doc));
 

@@ -4,9 +4,9 @@
  * Old files spell examples as texts; one that is no value of the type is not made into one.
  */
 
-import { memberText } from "./member";
-import type { JsonText } from "./model";
-import { asJsonText } from "./values";
+import { memberText } from "../json-members";
+import type { JsonText } from "../model";
+import { asJsonText } from "../values";
 
 /** What the `pvf_example` of a parameter without a value would be as its value; null for none. */
 export function exampleOf(parameter: JsonText): JsonText | null {

@@ -1,6 +1,19 @@
 import { expect, test } from "vitest";
 import type * as Y from "yjs";
 import {
+  actionOf,
+  arrows,
+  copyOf,
+  docWith,
+  exchange,
+  graphOf,
+  relationOf,
+  says,
+  updatesOf,
+} from "../../testing/edited-graph";
+import { relationId } from "../document-keys";
+import { ENTRY, EXIT, type Key, type Relation } from "../model";
+import {
   addAction,
   addParameter,
   adoptGhost,
@@ -23,20 +36,7 @@ import {
   setResponse,
   unsetEntry,
   unsetExit,
-} from "./edit";
-import {
-  actionOf,
-  arrows,
-  copyOf,
-  docWith,
-  exchange,
-  graphOf,
-  relationOf,
-  says,
-  updatesOf,
-} from "./edited-in-tests";
-import { relationId } from "./layout";
-import { ENTRY, EXIT, type Key, type Relation } from "./model";
+} from ".";
 
 // -- relations --------------------------------------------------------------------------------
 

@@ -8,10 +8,10 @@
  */
 
 import type * as Y from "yjs";
-import { endsOf, parameterKey, relationId, rootOf, splitKey } from "./layout";
-import { memberText, withMember } from "./member";
-import { ENTRY, EXIT, type Graph, type Key, type Parameter, PRECONDITIONS } from "./model";
-import { erase, graphOf, put } from "./pen";
+import { endsOf, parameterKey, relationId, rootOf, splitKey } from "../document-keys";
+import { memberText, withMember } from "../json-members";
+import { ENTRY, EXIT, type Graph, type Key, type Parameter, PRECONDITIONS } from "../model";
+import { erase, graphOf, put } from "./document-writes";
 
 /** Does an edit of arrows, and makes the end wait for what it now has to wait for. */
 export function keepingEnds<T>(doc: Y.Doc, work: () => T): T {

@@ -1,6 +1,6 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { memberText, withMember } from "./member";
+import { memberText, withMember } from "./json-members";
 
 test("a number keeps its spelling", () => {
   expect(memberText('{"a": 1, "umrf": {"x": 5.0, "y": [1e2, "}"]}, "z": 2}', "umrf")).toBe(

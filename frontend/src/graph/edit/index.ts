@@ -8,15 +8,15 @@
  */
 
 import type * as Y from "yjs";
-import { newAid } from "./ids";
-import { noteKey, rootOf } from "./layout";
-import type { JsonText, Key, Position } from "./model";
-import { erase, hasEnd, put, together } from "./pen";
+import { noteKey, rootOf } from "../document-keys";
+import { newAid } from "../ids";
+import type { JsonText, Key, Position } from "../model";
+import { erase, hasEnd, put, together } from "./document-writes";
 
-export * from "./edit-actions";
-export * from "./edit-parameters";
-export * from "./edit-relations";
-export { MINE, together, undoOf } from "./pen";
+export * from "./actions";
+export { MINE, together, undoOf } from "./document-writes";
+export * from "./parameters";
+export * from "./relations";
 
 export function setGraphName(doc: Y.Doc, name: string): void {
   together(doc, () => {

@@ -6,15 +6,15 @@
  */
 
 import type * as Y from "yjs";
-import { removeActions, setField } from "./edit-actions";
-import { setParameter } from "./edit-parameters";
-import { mirrorRelation, removeRelation, setRequired } from "./edit-relations";
+import { endsOf } from "../document-keys";
+import { withMember } from "../json-members";
+import type { Key } from "../model";
+import { removeActions, setField } from "./actions";
+import { graphOf, numbersOf, together } from "./document-writes";
 import { setOutputsOptional } from "./ends";
 import { exampleOf } from "./examples";
-import { endsOf } from "./layout";
-import { withMember } from "./member";
-import type { Key } from "./model";
-import { graphOf, numbersOf, together } from "./pen";
+import { setParameter } from "./parameters";
+import { mirrorRelation, removeRelation, setRequired } from "./relations";
 
 export const FIXES = [
   "mirror-relation",

@@ -1,6 +1,8 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import type * as Y from "yjs";
+import { actionOf, docWith, graphOf } from "../../testing/edited-graph";
+import { EXIT, type Key, type Precondition } from "../model";
 import {
   addAction,
   addParameter,
@@ -13,9 +15,7 @@ import {
   setRequired,
   setResponse,
   undoOf,
-} from "./edit";
-import { actionOf, docWith, graphOf } from "./edited-in-tests";
-import { EXIT, type Key, type Precondition } from "./model";
+} from ".";
 
 /** Which actions the end waits for. */
 const waitedFor = (doc: Y.Doc): string[] =>
