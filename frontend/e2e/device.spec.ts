@@ -3,7 +3,7 @@
 import { resolve } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
 import { rolldown } from "rolldown";
-import type * as module from "../src/room/device";
+import type * as module from "../src/sync/indexed-db";
 
 type Module = typeof module;
 type Batch = Parameters<module.Device["write"]>[2];
@@ -15,7 +15,7 @@ const MARI = { graph: "g", person: { id: "m", name: "Mari" } };
 let code: string;
 
 test.beforeAll(async () => {
-  const input = resolve(import.meta.dirname, "../src/room/device.ts");
+  const input = resolve(import.meta.dirname, "../src/sync/indexed-db.ts");
   const build = await rolldown({ input, logLevel: "silent" });
   const { output } = await build.generate({ format: "iife", name: "device" });
   code = output[0].code;

@@ -29,7 +29,7 @@ async function bundled() {
       export * as edit from "./src/graph/edit/index.ts";
       export * as layout from "./src/graph/document-keys.ts";
       export * as read from "./src/graph/read.ts";
-      export * as room from "./src/room/connect.ts";
+      export * as room from "./src/sync/room-connection.ts";
       export * as Y from "yjs";
       export { WebsocketProvider } from "y-websocket";
     `;

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { Person } from "../room/presence";
+import type { Person } from "../sync/presence/presence";
 import { onePerId } from "./people";
 import { candidates } from "./quick-add";
 import { dragged, selectionAfter } from "./use-canvas";

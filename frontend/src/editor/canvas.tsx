@@ -16,7 +16,7 @@ import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "rea
 import { insertInto, removeNotes, together } from "../graph/edit";
 import { changeNote } from "../graph/edit/notes";
 import type { Position } from "../graph/model";
-import { useRoom } from "../room/use-room";
+import { useRoom } from "../sync/use-room";
 import { CARD } from "../ui/canvas/arrange";
 import type { Arrow, CanvasNode } from "../ui/canvas/elements";
 import { type NoteDesk, NoteDeskContext } from "../ui/canvas/note-card";

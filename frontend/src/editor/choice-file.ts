@@ -2,7 +2,7 @@
 
 import { type Change, changesOf } from "../graph/changes";
 import { type Maps, mapsFrom } from "../graph/document-keys";
-import type { Stranded } from "../room/history";
+import type { Stranded } from "../sync/replaced-history";
 
 interface Saved {
   readonly graph: string;

@@ -3,7 +3,7 @@ import { Button, Checkbox, Group, Modal, Text } from "@mantine/core";
 import { useCallback, useEffect, useMemo, useState } from "react";
 import { type Change, changesOf, chosen, type Line } from "../graph/changes";
 import { mapsOf } from "../graph/document-keys";
-import { type Choice, useChoice, useGraph, useLink, useRoom } from "../room/use-room";
+import { type Choice, useChoice, useGraph, useLink, useRoom } from "../sync/use-room";
 import style from "./choice.module.css";
 import { saveChanges, sentenceOf } from "./choice-file";
 

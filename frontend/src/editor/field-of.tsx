@@ -1,7 +1,7 @@
 /** A field that several people may write in: who has the caret there, and what is wrong there. */
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { type FocusEvent, type ReactNode, use, useEffect, useRef } from "react";
-import { useEditors, usePeople, useRoom } from "../room/use-room";
+import { useEditors, usePeople, useRoom } from "../sync/use-room";
 import { colorsOf } from "../ui/robot";
 import { ProblemsContext, problemsAt } from "./details/problem-places";
 import style from "./field-of.module.css";

@@ -2,16 +2,16 @@
 import { Button, CloseButton, Modal, Text } from "@mantine/core";
 import { IconArchive, IconHistory, IconInfoCircle, IconLock, IconUsers } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";
-import type { OtherPerson } from "../room/device";
+import type { Notice } from "../sync/graph-connection";
+import type { OtherPerson } from "../sync/indexed-db";
+import { othersWait } from "../sync/unsaved-reasons";
 import {
   useGraphPart,
   useLinkPart,
   useMyName,
   useNotice,
   useOthersWaiting,
-} from "../room/use-room";
-import type { Notice } from "../room/visit";
-import { othersWait } from "../room/words";
+} from "../sync/use-room";
 import { ChoiceDialog, useChoosing } from "./choice";
 import { saveChanges } from "./choice-file";
 import style from "./notices.module.css";

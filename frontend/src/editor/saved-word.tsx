@@ -7,9 +7,9 @@ import {
   IconEye,
   IconRefresh,
 } from "@tabler/icons-react";
-import type { Link, Why } from "../room/connect";
-import { useLink, useRoom } from "../room/use-room";
-import { whyNot } from "../room/words";
+import type { Link, Why } from "../sync/room-connection";
+import { whyNot } from "../sync/unsaved-reasons";
+import { useLink, useRoom } from "../sync/use-room";
 import { useBench } from "./bench";
 import style from "./saved-word.module.css";
 

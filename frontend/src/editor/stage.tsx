@@ -5,7 +5,7 @@ import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import type { Progress } from "../api/progress";
 import type { Key, Position } from "../graph/model";
-import { useGraph, useLinkPart } from "../room/use-room";
+import { useGraph, useLinkPart } from "../sync/use-room";
 import type { Marks } from "../ui/canvas/marks";
 import { Empty } from "../ui/empty";
 import { type Bench, useBench } from "./bench";

@@ -4,8 +4,8 @@ import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { PersonContext } from "../api/person";
-import { FakeServer } from "../room/fake-server";
-import { RoomProvider } from "../room/use-room";
+import { RoomProvider } from "../sync/use-room";
+import { FakeServer } from "../testing/fake-server";
 import { useEditor } from "./use-bench";
 
 let server: FakeServer;

@@ -3,7 +3,7 @@
 import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/person";
-import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../room/use-room";
+import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../sync/use-room";
 import { CARD } from "../ui/canvas/arrange";
 import {
   type AddRequest,

@@ -18,8 +18,8 @@ import type { Progress } from "../api/progress";
 import { insertInto, moveActions, together } from "../graph/edit";
 import { type Note, notesOf, placeNotes, withContents } from "../graph/edit/notes";
 import type { Graph, Key, Position } from "../graph/model";
-import type { Person } from "../room/presence";
-import { usePeople, useRoom } from "../room/use-room";
+import type { Person } from "../sync/presence/presence";
+import { usePeople, useRoom } from "../sync/use-room";
 import { type Places, placesOf, unplaced } from "../ui/canvas/arrange";
 import {
   type Around,

@@ -1,8 +1,8 @@
 /** The view of the canvas and other people: what is seen here is told, and somebody's can be followed. */
 import { type ReactFlowInstance, useOnViewportChange, type Viewport } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useSyncExternalStore } from "react";
-import type { View } from "../room/presence";
-import { useFollowing, useRoom } from "../room/use-room";
+import type { View } from "../sync/presence/presence";
+import { useFollowing, useRoom } from "../sync/use-room";
 import type { Arrow, CanvasNode } from "../ui/canvas/elements";
 import type { View as BenchView } from "./bench";
 

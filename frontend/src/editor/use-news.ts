@@ -4,7 +4,7 @@ import type * as Y from "yjs";
 import type { Progress } from "../api/progress";
 import { endsOf, rootOf, splitKey } from "../graph/document-keys";
 import type { Graph, Key } from "../graph/model";
-import { useRoom } from "../room/use-room";
+import { useRoom } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
 import { endName } from "./bench";
 

@@ -5,8 +5,8 @@ import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { addAction } from "../../graph/edit";
 import { graphOf } from "../../graph/edit/document-writes";
-import { FakeServer } from "../../room/fake-server";
-import { RoomProvider, useGraph, useRoom } from "../../room/use-room";
+import { RoomProvider, useGraph, useRoom } from "../../sync/use-room";
+import { FakeServer } from "../../testing/fake-server";
 import { type Bench, BenchContext } from "../bench";
 import { Parameters } from "./parameters";
 

@@ -2,7 +2,7 @@
 import { useEffect, useMemo, useRef, useSyncExternalStore } from "react";
 import { rootOf } from "../../graph/document-keys";
 import { openTalk, readThreads, type Thread } from "../../graph/edit/comments";
-import { useRoom } from "../../room/use-room";
+import { useRoom } from "../../sync/use-room";
 import { spotlight } from "../../ui/canvas/spotlight";
 
 const NONE: readonly Thread[] = [];

@@ -1,6 +1,6 @@
 // @vitest-environment jsdom
 import { expect, test, vi } from "vitest";
-import { frames } from "./pace";
+import { frames } from "./frame-scheduler";
 
 const nextFrame = () => new Promise((done) => requestAnimationFrame(done));
 

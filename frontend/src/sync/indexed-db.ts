@@ -7,7 +7,7 @@
  * refuses it, each call here rejects, and the room says that nothing is kept.
  */
 
-import type { Before } from "./history";
+import type { Before } from "./replaced-history";
 
 /** Whose copy of which graph. */
 export interface Shelf {

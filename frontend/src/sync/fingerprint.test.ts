@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { mapsFrom } from "../graph/document-keys";
-import { fingerprint } from "./sameness";
+import { fingerprint } from "./fingerprint";
 
 test("the fingerprint is what the server makes", () => {
   const maps = mapsFrom({

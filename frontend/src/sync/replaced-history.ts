@@ -20,7 +20,7 @@ import {
 import { together } from "../graph/edit/document-writes";
 import { same } from "../graph/equal";
 import { ENTRY, EXIT } from "../graph/model";
-import type { Kept, Waiting } from "./device";
+import type { Kept, Waiting } from "./indexed-db";
 
 /** Plain values by key; `undefined` where the key is erased. */
 export type Difference = { readonly [R in Root]: ReadonlyMap<string, unknown> };

@@ -4,8 +4,8 @@ import * as encoding from "lib0/encoding";
 import { type Awareness, encodeAwarenessUpdate } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import type * as Y from "yjs";
+import type { Fingerprint } from "./fingerprint";
 import type { Why } from "./room";
-import type { Fingerprint } from "./sameness";
 
 export const SYNC = 0;
 export const AWARENESS = 1;

@@ -2,8 +2,8 @@ import fc from "fast-check";
 import * as encoding from "lib0/encoding";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import type * as Y from "yjs";
-import { connect, type Room, roomUrl, type Why } from "./connect";
-import { FakeServer, statesSent } from "./fake-server";
+import { FakeServer, statesSent } from "../testing/fake-server";
+import { connect, type Room, roomUrl, type Why } from "./room-connection";
 
 let server: FakeServer;
 let room: Room;

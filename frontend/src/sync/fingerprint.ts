@@ -9,7 +9,7 @@
 import * as decoding from "lib0/decoding";
 import type * as Y from "yjs";
 import { type Maps, mapsOf, ROOTS } from "../graph/document-keys";
-import * as frames from "./frames";
+import * as frames from "./messages";
 
 /** How long nothing must have happened. */
 const IDLE_MS = 5_000;

@@ -1,7 +1,7 @@
 /** Why edits are not saved, in sentences for people. */
 
-import type { Link, Why } from "./connect";
-import type { OtherPerson } from "./device";
+import type { OtherPerson } from "./indexed-db";
+import type { Link, Why } from "./room-connection";
 
 /** What is with the edits that wait, or with the room; null when everything is saved. */
 export function whyNot(link: Link): string | null {

@@ -1,6 +1,6 @@
 /** A device in memory for tests, which can refuse, hang, and lose what was not written yet. */
 
-import type { Batch, Device, Kept, Shelf, Waiting } from "./device";
+import type { Batch, Device, Kept, Shelf, Waiting } from "../sync/indexed-db";
 
 interface Entry {
   graph: string;

@@ -7,9 +7,9 @@
  */
 
 import type { Awareness } from "y-protocols/awareness";
-import { same } from "../graph/equal";
-import type { Key, Position } from "../graph/model";
-import { atOnce, type Soon } from "./pace";
+import { same } from "../../graph/equal";
+import type { Key, Position } from "../../graph/model";
+import { atOnce, type Soon } from "./frame-scheduler";
 
 /** What this page tells the others. */
 export interface Presence {

@@ -16,14 +16,14 @@ import * as awarenessProtocol from "y-protocols/awareness";
 import { Awareness, removeAwarenessStates } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
-import { browser, epochName, freshId, type Kept, type Waiting } from "./device";
-import * as frames from "./frames";
-import { type Before, Replaced, type Stranded, strandedIn, wentBack } from "./history";
-import { Keeping } from "./keeping";
-import { Line, type Speaker } from "./line";
+import { Watchman } from "./fingerprint";
+import { browser, epochName, freshId, type Kept, type Waiting } from "./indexed-db";
+import * as frames from "./messages";
 import { Outbox } from "./outbox";
+import { Keeping } from "./persistence";
+import { Line, type Speaker } from "./reconnecting-socket";
+import { type Before, Replaced, type Stranded, strandedIn, wentBack } from "./replaced-history";
 import type { ConnectOptions, Keep, Link, Room, Socket, Why } from "./room";
-import { Watchman } from "./sameness";
 
 export * from "./room";
 

@@ -6,7 +6,7 @@
  * was not acknowledged on the old one goes again, with the first step 2.
  */
 
-import type { Waiting } from "./device";
+import type { Waiting } from "./indexed-db";
 
 const NOT_SENT = Number.POSITIVE_INFINITY;
 

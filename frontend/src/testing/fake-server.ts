@@ -5,8 +5,8 @@ import * as encoding from "lib0/encoding";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
 import { mapsOf } from "../graph/document-keys";
-import type { Socket } from "./connect";
-import { fingerprint } from "./sameness";
+import { fingerprint } from "../sync/fingerprint";
+import type { Socket } from "../sync/room-connection";
 
 export class FakeSocket implements Socket {
   binaryType: BinaryType = "blob";

@@ -7,12 +7,12 @@
  * Works without React.
  */
 
-import type { ConnectOptions, Keep } from "./connect";
-import { browser, type Device, epochAnew, epochName, type Kept } from "./device";
-import { doorOf } from "./door";
-import { applyDifference, type Difference, type Stranded, strandedOf } from "./history";
+import { doorOf } from "./admission";
+import { browser, type Device, epochAnew, epochName, type Kept } from "./indexed-db";
 import { type Opened, type OpenRoom, openRoom } from "./open-room";
+import { applyDifference, type Difference, type Stranded, strandedOf } from "./replaced-history";
 import type { Link, Room, Why } from "./room";
+import type { ConnectOptions, Keep } from "./room-connection";
 
 /** What the page may say softly about a room that follows another. */
 export type Notice = "went-back" | "differed";

@@ -3,8 +3,8 @@
 import type { Awareness } from "y-protocols/awareness";
 import type * as Y from "yjs";
 import { here } from "../api/place";
-import type { Device, Shelf } from "./device";
-import type { Stranded } from "./history";
+import type { Device, Shelf } from "./indexed-db";
+import type { Stranded } from "./replaced-history";
 
 /** Why a room does not let this page in, or let it go. */
 export type Why =

@@ -5,7 +5,7 @@
  * said by close codes.
  */
 
-import * as frames from "./frames";
+import * as frames from "./messages";
 import type { Admit, Socket, Why } from "./room";
 
 /** The server says something at least every 15 s; a socket this silent is dead. */

@@ -13,12 +13,12 @@ import {
 } from "react";
 import { same } from "../graph/equal";
 import { EMPTY_GRAPH, type Graph } from "../graph/model";
-import type { Keep, Link } from "./connect";
-import { browser, type OtherPerson } from "./device";
-import { type Stranded, strandedOf } from "./history";
+import { type Notice, type Stay, Visit } from "./graph-connection";
+import { browser, type OtherPerson } from "./indexed-db";
 import type { OpenRoom } from "./open-room";
-import type { Person } from "./presence";
-import { type Notice, type Stay, Visit } from "./visit";
+import type { Person } from "./presence/presence";
+import { type Stranded, strandedOf } from "./replaced-history";
+import type { Keep, Link } from "./room-connection";
 
 export type { OpenRoom } from "./open-room";
 

@@ -3,10 +3,10 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import { mapsOf } from "../graph/document-keys";
 import { addAction, rename, setGraphName } from "../graph/edit";
-import { connect, type Room } from "./connect";
-import { FakeDevice } from "./fake-device";
-import { FakeServer } from "./fake-server";
-import { applyDifference, differenceOf } from "./history";
+import { FakeDevice } from "../testing/fake-device";
+import { FakeServer } from "../testing/fake-server";
+import { applyDifference, differenceOf } from "./replaced-history";
+import { connect, type Room } from "./room-connection";
 
 const ADA = { id: "a", name: "Ada" };
 const MARI = { id: "m", name: "Mari" };

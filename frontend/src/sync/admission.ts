@@ -8,7 +8,7 @@
 
 import { ask, Refusal } from "../api/http";
 import { currentPerson } from "../api/session";
-import type { Why } from "./connect";
+import type { Why } from "./room-connection";
 
 /** For `ConnectOptions.admit`. Throws `Unreachable` when nobody answers. */
 export function doorOf(graph: string, person: string): (again: boolean) => Promise<Why | null> {

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { othersWait, whyNot } from "./words";
+import { othersWait, whyNot } from "./unsaved-reasons";
 
 test("nothing is said when everything is saved", () => {
   expect(whyNot({ state: "live", unsaved: 0, seq: 3 })).toBeNull();

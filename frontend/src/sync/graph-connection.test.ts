@@ -2,9 +2,9 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import { addAction, rename } from "../graph/edit";
 import { graphOf } from "../graph/edit/document-writes";
-import { FakeDevice } from "./fake-device";
-import { FakeServer } from "./fake-server";
-import { Visit } from "./visit";
+import { FakeDevice } from "../testing/fake-device";
+import { FakeServer } from "../testing/fake-server";
+import { Visit } from "./graph-connection";
 
 const ADA = { id: "a", name: "Ada" };
 

@@ -4,10 +4,10 @@ import type * as Y from "yjs";
 import { undoOf } from "../graph/edit";
 import { same } from "../graph/equal";
 import { followGraph, type GraphSource } from "../graph/read";
-import { type ConnectOptions, connect, type Room } from "./connect";
-import { Following } from "./following";
-import { frames } from "./pace";
-import { type PresenceSource, presenceOf } from "./presence";
+import { Following } from "./presence/following";
+import { frames } from "./presence/frame-scheduler";
+import { type PresenceSource, presenceOf } from "./presence/presence";
+import { type ConnectOptions, connect, type Room } from "./room-connection";
 
 export interface OpenRoom {
   readonly room: Room;

@@ -3,9 +3,9 @@ import { act, StrictMode } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { addAction, rename } from "../graph/edit";
-import type { Keep } from "./connect";
-import { FakeDevice } from "./fake-device";
-import { FakeServer } from "./fake-server";
+import { FakeDevice } from "../testing/fake-device";
+import { FakeServer } from "../testing/fake-server";
+import type { Keep } from "./room-connection";
 import {
   type Choice,
   type OpenRoom,

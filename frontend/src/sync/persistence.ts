@@ -5,7 +5,14 @@
  * others change is written with the next edit that may build on it, or a little later.
  */
 
-import { type Batch, type Device, type Kept, type Shelf, UNNAMED, type Waiting } from "./device";
+import {
+  type Batch,
+  type Device,
+  type Kept,
+  type Shelf,
+  UNNAMED,
+  type Waiting,
+} from "./indexed-db";
 
 /** A device that has not answered by then is not waited for. */
 const PATIENCE_MS = 3_000;
