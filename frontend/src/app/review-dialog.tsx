@@ -2,7 +2,7 @@
 import { Button, Group, Modal, Text } from "@mantine/core";
 import { useSyncExternalStore } from "react";
 import type { Where } from "../api/graphs";
-import { bySeverity, countWords } from "../ui/canvas/marks";
+import { bySeverity, countWords } from "../canvas/problem-marks";
 import { dialectWords, reviews, type Waiting } from "./review";
 import style from "./review-dialog.module.css";
 

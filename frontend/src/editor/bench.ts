@@ -1,6 +1,7 @@
 /** What a deed works on: the open graph, what is selected, and the view of it. */
 import { createContext, use } from "react";
 import type * as Y from "yjs";
+import { CARD, unplaced } from "../canvas/geometry/arrange";
 import { relationId } from "../graph/document-keys";
 import { addAction, moveActions, type NewAction, together } from "../graph/edit";
 import { notesOf, placeNotes, withContents } from "../graph/edit/notes";
@@ -14,7 +15,6 @@ import {
   type Precondition,
   type Relation,
 } from "../graph/model";
-import { CARD, unplaced } from "../ui/canvas/arrange";
 
 import type { DryRun } from "./dry-run/use-dry-run";
 

@@ -13,18 +13,18 @@ import {
   useStoreApi,
 } from "@xyflow/react";
 import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
+import { actionCarrier } from "../canvas/action-drag";
+import type { Arrow, CanvasNode } from "../canvas/elements";
+import { CARD } from "../canvas/geometry/arrange";
+import { edgeTypes, nodeTypes } from "../canvas/graph-view";
+import { type NoteDesk, NoteDeskContext } from "../canvas/note-card";
+import { noteColor } from "../canvas/note-colors";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
+import { ArrowTips } from "../canvas/outcome-arrow";
 import { insertInto, removeNotes, together } from "../graph/edit";
 import { changeNote } from "../graph/edit/notes";
 import type { Position } from "../graph/model";
 import { useRoom } from "../sync/use-room";
-import { CARD } from "../ui/canvas/arrange";
-import type { Arrow, CanvasNode } from "../ui/canvas/elements";
-import { type NoteDesk, NoteDeskContext } from "../ui/canvas/note-card";
-import { noteColor } from "../ui/canvas/note-colors";
-import { ArrowTips } from "../ui/canvas/outcome-arrow";
-import { edgeTypes, nodeTypes } from "../ui/canvas/view";
-import { actionCarrier } from "../ui/carry";
-import { OutcomeSign, outcomeColor, outcomeWord } from "../ui/outcome";
 import { robotColor } from "../ui/robot";
 import { useSteady } from "../ui/steady";
 import { type Bench, endName, GRID, placeAction } from "./bench";

@@ -7,11 +7,11 @@
 import { notifications } from "@mantine/notifications";
 import { place, sentence } from "../api/http";
 import { readPieces } from "../api/pieces";
+import { arrange } from "../canvas/geometry/arrange";
 import { mapsFrom } from "../graph/document-keys";
 import { type Clip, clipOf, isEmpty, paste } from "../graph/edit/clip";
 import { readGraph } from "../graph/read";
 import { umrfText } from "../graph/umrf-text";
-import { arrange } from "../ui/canvas/arrange";
 import { copyText } from "../ui/copy-text";
 import { type Bench, selectedActions } from "./bench";
 

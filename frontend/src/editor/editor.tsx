@@ -6,12 +6,12 @@ import { type ReactNode, useCallback, useMemo, useState, useSyncExternalStore } 
 import { type Problems, useProblems } from "../api/graphs";
 import type { Progress } from "../api/progress";
 import type { Script } from "../api/rehearsal";
+import { actionCarrier } from "../canvas/action-drag";
+import { marksOf } from "../canvas/problem-marks";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import type { Link } from "../sync/room-connection";
 import { useCalmLink } from "../sync/use-room";
-import { marksOf } from "../ui/canvas/marks";
-import { actionCarrier } from "../ui/carry";
 import { useIsPhone, useIsWide } from "../ui/screen";
 import type { Crumb } from "../ui/top-bar";
 import { type Bench, BenchContext, freePlace, type Panel, placeAction } from "./bench";

@@ -2,10 +2,10 @@
 import { Tooltip } from "@mantine/core";
 import { ViewportPortal } from "@xyflow/react";
 import type { CSSProperties } from "react";
+import { CARD, type Places, type Sizes } from "../canvas/geometry/arrange";
 import { splitKey } from "../graph/document-keys";
 import type { Person } from "../sync/presence/presence";
 import { useFollowing, usePeople } from "../sync/use-room";
-import { CARD, type Places, type Sizes } from "../ui/canvas/arrange";
 import { colorsOf, initials } from "../ui/robot";
 import style from "./people.module.css";
 

@@ -2,10 +2,10 @@
 import { Kbd, TextInput } from "@mantine/core";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useEffect, useId, useMemo, useRef, useState } from "react";
+import { CARD } from "../canvas/geometry/arrange";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import { connect, insertInto, type NewAction, together } from "../graph/edit";
 import type { Position } from "../graph/model";
-import { CARD } from "../ui/canvas/arrange";
-import { OutcomeSign, outcomeColor, outcomeWord } from "../ui/outcome";
 import { type AddRequest, type Bench, endName, placeAction } from "./bench";
 import style from "./quick-add.module.css";
 

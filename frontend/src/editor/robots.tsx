@@ -1,6 +1,6 @@
 /** The robots of a graph: what each is called, its colour, and putting one in the light. */
 import { memo, useMemo } from "react";
-import { spotlight, useRobotInLight } from "../ui/canvas/spotlight";
+import { spotlight, useRobotInLight } from "../canvas/card-highlights";
 import { robotColor } from "../ui/robot";
 import { useBench } from "./bench";
 import style from "./robots.module.css";

@@ -1,7 +1,7 @@
 /** Taking a graph away as a file: UMRF as the server writes it, or a picture of the canvas. */
 import { notifications } from "@mantine/notifications";
 import { here } from "../api/place";
-import { pictureOf } from "../ui/canvas/picture";
+import { pictureOf } from "../canvas/svg-picture";
 import type { Bench, Format } from "./bench";
 
 const LARGEST = 8_000; // px of a PNG's longer side; browsers refuse much more

@@ -3,8 +3,8 @@
 import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/person";
+import { CARD } from "../canvas/geometry/arrange";
 import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../sync/use-room";
-import { CARD } from "../ui/canvas/arrange";
 import {
   type AddRequest,
   type Bench,

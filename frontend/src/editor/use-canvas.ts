@@ -15,12 +15,6 @@ import {
   useState,
 } from "react";
 import type { Progress } from "../api/progress";
-import { insertInto, moveActions, together } from "../graph/edit";
-import { type Note, notesOf, placeNotes, withContents } from "../graph/edit/notes";
-import type { Graph, Key, Position } from "../graph/model";
-import type { Person } from "../sync/presence/presence";
-import { usePeople, useRoom } from "../sync/use-room";
-import { type Places, placesOf, unplaced } from "../ui/canvas/arrange";
 import {
   type Around,
   type Arrow,
@@ -29,9 +23,15 @@ import {
   edgesOf,
   keep,
   nodesOf,
-} from "../ui/canvas/elements";
-import type { Marks } from "../ui/canvas/marks";
-import { notePlaces } from "../ui/canvas/note-nodes";
+} from "../canvas/elements";
+import { type Places, placesOf, unplaced } from "../canvas/geometry/arrange";
+import { notePlaces } from "../canvas/note-nodes";
+import type { Marks } from "../canvas/problem-marks";
+import { insertInto, moveActions, together } from "../graph/edit";
+import { type Note, notesOf, placeNotes, withContents } from "../graph/edit/notes";
+import type { Graph, Key, Position } from "../graph/model";
+import type { Person } from "../sync/presence/presence";
+import { usePeople, useRoom } from "../sync/use-room";
 import { colorsOf } from "../ui/robot";
 import { arrowAt, pointOf } from "./hit";
 

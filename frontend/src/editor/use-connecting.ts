@@ -1,10 +1,10 @@
 /** Drawing arrows by hand: drag from an outcome, tap an outcome and then what follows, lead elsewhere. */
 import type { Connection, FinalConnectionState, OnConnectEnd } from "@xyflow/react";
 import { type MouseEvent, useCallback, useEffect, useRef, useState } from "react";
+import type { Arrow } from "../canvas/elements";
 import { connect, moveRelation, retarget } from "../graph/edit";
 import type { Key, Position, Precondition } from "../graph/model";
 import { ENTRY } from "../graph/model";
-import type { Arrow } from "../ui/canvas/elements";
 import type { Bench } from "./bench";
 import { nodeAt, pointOf } from "./hit";
 

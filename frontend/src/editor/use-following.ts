@@ -1,9 +1,9 @@
 /** The view of the canvas and other people: what is seen here is told, and somebody's can be followed. */
 import { type ReactFlowInstance, useOnViewportChange, type Viewport } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useSyncExternalStore } from "react";
+import type { Arrow, CanvasNode } from "../canvas/elements";
 import type { View } from "../sync/presence/presence";
 import { useFollowing, useRoom } from "../sync/use-room";
-import type { Arrow, CanvasNode } from "../ui/canvas/elements";
 import type { View as BenchView } from "./bench";
 
 const GLIDE = 120; // ms; views come at most every 50 ms

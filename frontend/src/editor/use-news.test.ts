@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import type { Progress } from "../api/progress";
 import { progressByAid } from "../api/progress";
 import type { Run } from "../api/runs";
-import { fromUmrf } from "../ui/canvas/from-umrf";
+import { fromUmrf } from "../canvas/from-umrf";
 import { runNews } from "./use-news";
 
 const graph = fromUmrf({

@@ -2,11 +2,20 @@
 import type { ReactFlowInstance } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
 import type { Progress } from "../api/progress";
+import type { Arrow, CanvasNode } from "../canvas/elements";
+import { CARD, type Places, type Sizes } from "../canvas/geometry/arrange";
+import {
+  alike,
+  boundsOf,
+  bring,
+  fits,
+  type Looking,
+  READABLE,
+  readable,
+  whole,
+} from "../canvas/geometry/viewport";
 import { ENTRY, type Key, type Position } from "../graph/model";
-import { CARD, type Places, type Sizes } from "../ui/canvas/arrange";
-import type { Arrow, CanvasNode } from "../ui/canvas/elements";
 import type { View } from "./bench";
-import { alike, boundsOf, bring, fits, type Looking, READABLE, readable, whole } from "./sights";
 
 interface Given {
   flow: ReactFlowInstance<CanvasNode, Arrow>;

@@ -10,8 +10,8 @@ import { endWords, type Progress, progressByAid, runWord } from "../api/progress
 import { type FilmMark, useFilm, useMates } from "../api/review";
 import { type Run, useRun } from "../api/runs";
 import { useLive } from "../api/use-live";
-import { fromUmrf } from "../ui/canvas/from-umrf";
-import { GraphView } from "../ui/canvas/view";
+import { fromUmrf } from "../canvas/from-umrf";
+import { GraphView } from "../canvas/graph-view";
 import { Empty } from "../ui/empty";
 import { lanesOf } from "../ui/lanes";
 import { StateWord } from "../ui/state-word";

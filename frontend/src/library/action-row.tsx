@@ -3,8 +3,8 @@ import { ActionIcon, Menu } from "@mantine/core";
 import { IconGripVertical, IconInfoCircle } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { useGraphs } from "../api/graphs";
+import { actionCarrier } from "../canvas/action-drag";
 import type { NewAction } from "../graph/edit";
-import { actionCarrier } from "../ui/carry";
 import { type KnownAction, signature } from "./known";
 import style from "./sidebar.module.css";
 

@@ -2,7 +2,7 @@
 import { useMemo } from "react";
 import { type KnownActionAnswer, useActions } from "../api/graphs";
 import type { NewAction } from "../graph/edit";
-import { pathWords } from "../ui/canvas/value-text";
+import { pathWords } from "../graph/value-text";
 
 export interface KnownAction {
   readonly template: NewAction;

@@ -2,10 +2,10 @@
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
 import { graphText } from "../api/graphs";
+import { fromUmrf } from "../canvas/from-umrf";
+import { arrange } from "../canvas/geometry/arrange";
+import { outcomeColor } from "../canvas/outcome";
 import { ENTRY, EXIT, type Graph, spoken } from "../graph/model";
-import { arrange } from "../ui/canvas/arrange";
-import { fromUmrf } from "../ui/canvas/from-umrf";
-import { outcomeColor } from "../ui/outcome";
 import { robotColor } from "../ui/robot";
 
 const MARGIN = 26;

@@ -1,8 +1,8 @@
 /** Whether what runs is what is on screen, in words; where it is not, the way to send it. */
 import { useMemo } from "react";
 import type { Run } from "../api/runs";
+import { differences } from "../graph/meaning";
 import type { Graph } from "../graph/model";
-import { differences } from "../ui/canvas/meaning";
 import style from "./draft-word.module.css";
 import { SendChange } from "./send-change";
 import { useRunning } from "./use-running";

@@ -9,7 +9,7 @@ import { useMay } from "../api/person";
 import type { Robot } from "../api/robots";
 import { modifyRun, playedBy, type Run } from "../api/runs";
 import { useLive } from "../api/use-live";
-import type { Difference } from "../ui/canvas/meaning";
+import type { Difference } from "../graph/meaning";
 import { HoldButton } from "../ui/hold-button";
 import style from "./send-change.module.css";
 import { complain, nextLabel, published } from "./use-start";

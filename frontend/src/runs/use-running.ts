@@ -4,8 +4,8 @@ import { useMemo } from "react";
 import { keys, type Version } from "../api/graphs";
 import { ask } from "../api/http";
 import type { Run } from "../api/runs";
+import { fromUmrf } from "../canvas/from-umrf";
 import type { Graph } from "../graph/model";
-import { fromUmrf } from "../ui/canvas/from-umrf";
 
 export function useRunning(run: Run | null): { seq: number; graph: Graph } | null {
   const goes = run !== null && run.ended_at === null;

@@ -15,9 +15,9 @@ import {
   IconLayoutDistributeVertical,
   IconSitemap,
 } from "@tabler/icons-react";
+import { type Align, align, type Block, distribute, tidied } from "../../canvas/geometry/align";
+import { arrange, CARD } from "../../canvas/geometry/arrange";
 import { moveActions } from "../../graph/edit";
-import { type Align, align, type Block, distribute, tidied } from "../../ui/canvas/align";
-import { arrange, CARD } from "../../ui/canvas/arrange";
 import { type Bench, GRID, putPlaces, selectedActions, selectedNotes } from "../bench";
 import type { Deed } from "./deed";
 

@@ -6,9 +6,9 @@ import {
   IconPencil,
   IconRowInsertBottom,
 } from "@tabler/icons-react";
+import { CARD } from "../../canvas/geometry/arrange";
 import { relationId } from "../../graph/document-keys";
 import { writeNote } from "../../graph/edit/notes";
-import { CARD } from "../../ui/canvas/arrange";
 import { type Bench, selectedNotes, selectedRelations } from "../bench";
 import type { Deed } from "./deed";
 

@@ -2,11 +2,11 @@
 import { ActionIcon, Button, Select, Tooltip } from "@mantine/core";
 import { IconPlus, IconX } from "@tabler/icons-react";
 import { useState } from "react";
+import { answersOf } from "../../canvas/elements";
+import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { relationId } from "../../graph/document-keys";
 import { connect, removeRelation, setEntry, unsetEntry } from "../../graph/edit";
 import { type Action, ENTRY, EXIT, type Precondition, type Relation } from "../../graph/model";
-import { answersOf } from "../../ui/canvas/elements";
-import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
 import { type Bench, endName, useBench } from "../bench";
 import style from "./details.module.css";
 

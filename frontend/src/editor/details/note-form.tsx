@@ -1,9 +1,9 @@
 /** A note or a frame as a form: what the canvas shows, without a pointer. */
 import { Button } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
+import { noteColor } from "../../canvas/note-colors";
 import { removeNotes } from "../../graph/edit";
 import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../../graph/edit/notes";
-import { noteColor } from "../../ui/canvas/note-colors";
 import { useBench } from "../bench";
 import { DraftInput } from "../draft-input";
 import { FieldOf } from "../field-of";

@@ -4,7 +4,7 @@ import { IconTrash } from "@tabler/icons-react";
 import type { Side } from "../../graph/document-keys";
 import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
 import type { Key, Parameter } from "../../graph/model";
-import { pathWords } from "../../ui/canvas/value-text";
+import { pathWords } from "../../graph/value-text";
 import { useBench } from "../bench";
 import { DraftInput } from "../draft-input";
 import style from "./details.module.css";

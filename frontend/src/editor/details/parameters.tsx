@@ -5,7 +5,7 @@ import { useState } from "react";
 import type { Side } from "../../graph/document-keys";
 import { addParameter, together } from "../../graph/edit";
 import type { Action } from "../../graph/model";
-import { pathWords } from "../../ui/canvas/value-text";
+import { pathWords } from "../../graph/value-text";
 import { useBench } from "../bench";
 import { FieldOf } from "../field-of";
 import style from "./details.module.css";

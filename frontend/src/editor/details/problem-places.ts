@@ -1,7 +1,7 @@
 /** Which field of a form a problem is about, so that it is marked there. */
 import { createContext } from "react";
 import type { Problem } from "../../api/graphs";
-import { bySeverity, placeOf } from "../../ui/canvas/marks";
+import { bySeverity, placeOf } from "../../canvas/problem-marks";
 
 /** The problems of the open graph, for the fields of its forms. */
 export const ProblemsContext = createContext<readonly Problem[]>([]);

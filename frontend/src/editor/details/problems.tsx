@@ -3,6 +3,7 @@ import { ActionIcon, Button, Tooltip } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
 import type { Problem, Problems } from "../../api/graphs";
+import { bySeverity, placeOf } from "../../canvas/problem-marks";
 import { relationId } from "../../graph/document-keys";
 import {
   ABOUT,
@@ -14,7 +15,6 @@ import {
   safeOnes,
 } from "../../graph/edit/fixes";
 import type { Graph } from "../../graph/model";
-import { bySeverity, placeOf } from "../../ui/canvas/marks";
 import { type Bench, endName, useBench } from "../bench";
 import { copyLinkTo } from "../clipboard";
 import { linkToProblem } from "../deep-link";

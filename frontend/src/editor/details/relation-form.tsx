@@ -1,11 +1,11 @@
 /** What an arrow says: a response to each of the four outcomes, and what it carries over. */
 import { Button, Select, Switch } from "@mantine/core";
 import { IconArrowDown, IconTrash } from "@tabler/icons-react";
+import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { relationId } from "../../graph/document-keys";
 import { removeRelation, setRequired, setResponse } from "../../graph/edit";
 import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../../graph/model";
 import { ignoredWords, relationWords } from "../../graph/relation-words";
-import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
 import { endName, useBench } from "../bench";
 import { FieldOf } from "../field-of";
 import style from "./details.module.css";

@@ -11,8 +11,8 @@ import {
 } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { sentence } from "../../api/http";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { fullName } from "../../graph/model";
-import { OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
 import { type Bench, endName, selectedActions } from "../bench";
 import type { Deed } from "../deeds/deed";
 import { labelOf } from "../deeds/deed";

@@ -10,11 +10,11 @@ import {
 } from "@tabler/icons-react";
 import { memo, useId, useState } from "react";
 import type { Progress } from "../../api/progress";
+import { useTalk } from "../../canvas/card-highlights";
+import { noteColor } from "../../canvas/note-colors";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import type { Note } from "../../graph/edit/notes";
-import { noteColor } from "../../ui/canvas/note-colors";
-import { useTalk } from "../../ui/canvas/spotlight";
-import { cardLines, lineText } from "../../ui/canvas/value-text";
-import { OutcomeSign, outcomeColor, outcomeWord } from "../../ui/outcome";
+import { cardLines, lineText } from "../../graph/value-text";
 import { robotColor } from "../../ui/robot";
 import { StateWord } from "../../ui/state-word";
 import { moreOf } from "../../ui/took";

@@ -1,6 +1,6 @@
 /** Parameter values as people read them. */
-import { memberText } from "../../graph/json-members";
-import type { Parameter } from "../../graph/model";
+import { memberText } from "./json-members";
+import type { Parameter } from "./model";
 
 /** `pose/position/x` as `pose.position.x`. */
 export function pathWords(path: string): string {

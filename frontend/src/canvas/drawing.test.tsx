@@ -4,11 +4,10 @@ import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
-import { addAction, connect, moveActions, rename } from "../../graph/edit";
-import type { Graph } from "../../graph/model";
-import { followGraph } from "../../graph/read";
+import { addAction, connect, moveActions, rename } from "../graph/edit";
+import type { Graph } from "../graph/model";
+import { followGraph } from "../graph/read";
 import { ActionCard } from "./action-card";
-import { placesOf } from "./arrange";
 import {
   type Around,
   type Arrow,
@@ -19,13 +18,14 @@ import {
   keep,
   nodesOf,
 } from "./elements";
+import { placesOf } from "./geometry/arrange";
 
 const ACTIONS = 1000;
 
 /** The actions whose cards React rendered: each card asks once for the comments about its action. */
 const { rendered } = vi.hoisted(() => ({ rendered: [] as string[] }));
-vi.mock("./spotlight", async (original) => {
-  const real = await original<typeof import("./spotlight")>();
+vi.mock("./card-highlights", async (original) => {
+  const real = await original<typeof import("./card-highlights")>();
   const useTalk = (key: string) => {
     rendered.push(key);
     return real.useTalk(key);

@@ -1,13 +1,13 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { mapsOf } from "../../graph/document-keys";
-import { addAction, connect, moveActions, setEntry, setExit, setResponse } from "../../graph/edit";
-import { ENTRY, EXIT, type Graph } from "../../graph/model";
-import { readGraph } from "../../graph/read";
-import { arrange, placesOf, unplaced } from "./arrange";
+import { mapsOf } from "../graph/document-keys";
+import { addAction, connect, moveActions, setEntry, setExit, setResponse } from "../graph/edit";
+import { meaning } from "../graph/meaning";
+import { ENTRY, EXIT, type Graph } from "../graph/model";
+import { readGraph } from "../graph/read";
 import { answersOf, aroundOf, edgesOf, keep, type NodeOptions, nodesOf } from "./elements";
 import { fromUmrf } from "./from-umrf";
-import { meaning } from "./meaning";
+import { arrange, placesOf, unplaced } from "./geometry/arrange";
 
 function drawn(): { graph: Graph; doc: Y.Doc; a: string; b: string } {
   const doc = new Y.Doc();

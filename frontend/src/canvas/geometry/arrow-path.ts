@@ -1,6 +1,6 @@
 /** The ways of arrows: down, down a lane beside cards, or back up on one. Pure. */
 import { getBezierPath, Position } from "@xyflow/react";
-import { anchorOf } from "./labels";
+import { anchorOf } from "./label-places";
 
 export interface Line {
   readonly path: string;

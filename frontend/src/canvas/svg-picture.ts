@@ -1,15 +1,15 @@
 /** A graph as one SVG picture, drawn from the same elements as the canvas. Pure. */
 
-import { type Note, notesOf } from "../../graph/edit/notes";
-import type { Graph, Key, Position, Precondition } from "../../graph/model";
-import { OUTCOMES, outcomeColor, outcomeWord } from "../outcome";
-import { robotColor } from "../robot";
-import { CARD, PILL, type Sizes } from "./arrange";
+import { type Note, notesOf } from "../graph/edit/notes";
+import type { Graph, Key, Position, Precondition } from "../graph/model";
+import { cardLines, lineText } from "../graph/value-text";
+import { robotColor } from "../ui/robot";
 import { type Arrow, aroundOf, type CanvasNode, edgesOf, nodesOf, shareOf } from "./elements";
-import { lineOf } from "./line";
-import { NO_MARKS } from "./marks";
+import { CARD, PILL, type Sizes } from "./geometry/arrange";
+import { lineOf } from "./geometry/arrow-path";
 import { noteColor } from "./note-colors";
-import { cardLines, lineText } from "./value-text";
+import { OUTCOMES, outcomeColor, outcomeWord } from "./outcome";
+import { NO_MARKS } from "./problem-marks";
 
 export interface Picture {
   readonly svg: string;

@@ -1,5 +1,5 @@
 /** Carries actions from the list to the canvas. */
 import type { NewAction } from "../graph/edit";
-import { Carrier } from "./placing";
+import { Carrier } from "../ui/placing";
 
 export const actionCarrier = new Carrier<NewAction>();

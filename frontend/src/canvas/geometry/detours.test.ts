@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { laneBack, laneFor } from "./lanes";
+import { laneBack, laneFor } from "./detours";
 
 const card = (x: number, y: number) => ({ x, y, width: 208, height: 80 });
 

@@ -1,5 +1,5 @@
 /** A published version (canonical UMRF) as a graph to draw. Total: what does not fit is left out. */
-import { parametersFrom } from "../../graph/edit";
+import { parametersFrom } from "../graph/edit";
 import {
   type Action,
   ENGINE_DEFAULTS,
@@ -15,7 +15,7 @@ import {
   type Relation,
   type Remap,
   type Response,
-} from "../../graph/model";
+} from "../graph/model";
 
 type Fields = Record<string, unknown>;
 

@@ -1,6 +1,6 @@
 /** What cards show besides themselves: whether their robot is in the light, and how much is said. */
 import { useSyncExternalStore } from "react";
-import type { Key } from "../../graph/model";
+import type { Key } from "../graph/model";
 
 export interface Light {
   /** The robot whose actions stand out; null: all. The empty name is that of any robot. */

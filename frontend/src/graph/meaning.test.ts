@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
-import type { Action, Graph, Relation } from "../../graph/model";
-import { fromUmrf } from "./from-umrf";
+import { fromUmrf } from "../canvas/from-umrf";
 import { differences } from "./meaning";
+import type { Action, Graph, Relation } from "./model";
 
 const named = (instance_id: number) => ({ name: "Drive", instance_id });
 const graph: Graph = fromUmrf({

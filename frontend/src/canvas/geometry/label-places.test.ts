@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { alongCurve, alongLane, boxAt, placeLabels, sizeOf, type Wish } from "./labels";
+import { alongCurve, alongLane, boxAt, placeLabels, sizeOf, type Wish } from "./label-places";
 
 const wish = (id: string, from: number, to: number): Wish => ({
   id,

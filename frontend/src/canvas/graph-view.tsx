@@ -7,16 +7,16 @@ import {
   ReactFlow,
 } from "@xyflow/react";
 import { useMemo, useState } from "react";
-import type { Progress } from "../../api/progress";
-import type { Graph, Key } from "../../graph/model";
+import type { Progress } from "../api/progress";
+import type { Graph, Key } from "../graph/model";
 import { ActionCard } from "./action-card";
-import { placesOf } from "./arrange";
 import { aroundOf, type CanvasNode, edgesOf, nodesOf } from "./elements";
 import { EndPill } from "./end-pill";
-import { NO_MARKS } from "./marks";
+import { placesOf } from "./geometry/arrange";
 import { NoteCard } from "./note-card";
 import { notePlaces } from "./note-nodes";
 import { ArrowTips, OutcomeArrow } from "./outcome-arrow";
+import { NO_MARKS } from "./problem-marks";
 import "./canvas.css";
 
 export const nodeTypes: NodeTypes = { action: ActionCard, end: EndPill, note: NoteCard };

@@ -1,5 +1,5 @@
 /** What is wrong, by where it is drawn: marks for cards and arrows. Pure. */
-import type { Problem } from "../../api/graphs";
+import type { Problem } from "../api/graphs";
 
 /** The problems of one card or arrow. */
 export interface Mark {

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import type { Problem } from "../../api/graphs";
-import { countWords, marksOf, markWords } from "./marks";
+import type { Problem } from "../api/graphs";
+import { countWords, marksOf, markWords } from "./problem-marks";
 
 const problem = (
   code: string,

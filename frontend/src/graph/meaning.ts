@@ -8,7 +8,7 @@ import {
   type Key,
   type Parameter,
   PRECONDITIONS,
-} from "../../graph/model";
+} from "./model";
 import { pathWords, valueText } from "./value-text";
 
 function value(text: string): unknown {

@@ -2,17 +2,17 @@
 import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo } from "react";
-import type { Progress } from "../../api/progress";
-import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../outcome";
-import { robotColor } from "../robot";
-import { StateWord } from "../state-word";
-import { tookWords } from "../took";
-import { stopwatch, useNow } from "../when";
+import type { Progress } from "../api/progress";
+import { cardLines, lineText } from "../graph/value-text";
+import { robotColor } from "../ui/robot";
+import { StateWord } from "../ui/state-word";
+import { tookWords } from "../ui/took";
+import { stopwatch, useNow } from "../ui/when";
 import style from "./action-card.module.css";
+import { useIsDim, useTalk } from "./card-highlights";
 import type { CardNode } from "./elements";
+import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import { ProblemBadge } from "./problem-badge";
-import { useIsDim, useTalk } from "./spotlight";
-import { cardLines, lineText } from "./value-text";
 
 function ProgressLine({ progress }: { progress: Progress | null }) {
   const going = progress?.since != null;

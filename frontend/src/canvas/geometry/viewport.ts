@@ -1,6 +1,6 @@
 /** Where to look: views of the canvas that keep text readable. Pure. */
-import type { Places, Sizes } from "../ui/canvas/arrange";
-import { CARD } from "../ui/canvas/arrange";
+import type { Places, Sizes } from "./arrange";
+import { CARD } from "./arrange";
 
 export interface Box {
   readonly x: number;

@@ -2,12 +2,12 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { mapsOf } from "../../graph/document-keys";
-import { addAction, connect, setEntry, setExit } from "../../graph/edit";
-import { writeNote } from "../../graph/edit/notes";
-import { readGraph } from "../../graph/read";
-import { placesOf } from "./arrange";
-import { pictureOf } from "./picture";
+import { mapsOf } from "../graph/document-keys";
+import { addAction, connect, setEntry, setExit } from "../graph/edit";
+import { writeNote } from "../graph/edit/notes";
+import { readGraph } from "../graph/read";
+import { placesOf } from "./geometry/arrange";
+import { pictureOf } from "./svg-picture";
 
 function drawn(name: string, robot: string, text: string) {
   const doc = new Y.Doc();

@@ -3,7 +3,7 @@ import { ActionIcon, Tooltip } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { type NodeProps, NodeResizer, NodeToolbar, Position } from "@xyflow/react";
 import { createContext, memo, use, useEffect, useRef } from "react";
-import { type NewNote, NOTE_COLORS, type Note } from "../../graph/edit/notes";
+import { type NewNote, NOTE_COLORS, type Note } from "../graph/edit/notes";
 import style from "./note-card.module.css";
 import { noteColor } from "./note-colors";
 import type { NoteNode } from "./note-nodes";

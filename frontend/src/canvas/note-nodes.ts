@@ -1,8 +1,8 @@
 /** Notes and frames as nodes of the canvas. */
 import type { Node } from "@xyflow/react";
-import { type Note, notesOf } from "../../graph/edit/notes";
-import type { Graph, Key } from "../../graph/model";
-import type { Places } from "./arrange";
+import { type Note, notesOf } from "../graph/edit/notes";
+import type { Graph, Key } from "../graph/model";
+import type { Places } from "./geometry/arrange";
 
 export type NoteNode = Node<{ note: Note }, "note">;
 

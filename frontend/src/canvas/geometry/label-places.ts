@@ -1,5 +1,5 @@
 /** Where labels of arrows stand, so that they cover neither each other nor cards. Pure. */
-import type { Box, Point } from "./lanes";
+import type { Box, Point } from "./detours";
 
 /** A label that wants a place: the points on its way that it may have, the best first. */
 export interface Wish {

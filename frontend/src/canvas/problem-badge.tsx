@@ -1,7 +1,7 @@
 /** A mark on a card or an arrow: how many problems, and why as a tooltip. */
 import { IconAlertTriangleFilled } from "@tabler/icons-react";
-import { countWords, type Mark } from "./marks";
 import style from "./problem-badge.module.css";
+import { countWords, type Mark } from "./problem-marks";
 
 export function ProblemBadge({ mark, on }: { mark: Mark; on: "card" | "arrow" }) {
   const count = mark.error + mark.warning;

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { alike, boundsOf, bring, MARGIN, readable, whole } from "./sights";
+import { alike, boundsOf, bring, MARGIN, readable, whole } from "./viewport";
 
 const room = { width: 800, height: 640 };
 const tall = { x: 100, y: -50, width: 600, height: 2000 };

@@ -1,8 +1,8 @@
 /** A graph as nodes and edges of the canvas; what did not change keeps its identity. */
 import type { Edge, Node } from "@xyflow/react";
-import type { Progress } from "../../api/progress";
-import { relationId } from "../../graph/document-keys";
-import type { Note } from "../../graph/edit/notes";
+import type { Progress } from "../api/progress";
+import { relationId } from "../graph/document-keys";
+import type { Note } from "../graph/edit/notes";
 import {
   type Action,
   ENTRY,
@@ -13,13 +13,20 @@ import {
   type Relation,
   type Response,
   spoken,
-} from "../../graph/model";
-import { OUTCOMES, outcomeWord } from "../outcome";
-import { CARD, PILL, type Places } from "./arrange";
-import { alongCurve, alongLane, anchorOf, placeLabels, sizeOf, type Wish } from "./labels";
-import { type Box, laneBack, laneFor, MOST_CARDS } from "./lanes";
-import { type Mark, type Marks, markWords } from "./marks";
+} from "../graph/model";
+import { CARD, PILL, type Places } from "./geometry/arrange";
+import { type Box, laneBack, laneFor, MOST_CARDS } from "./geometry/detours";
+import {
+  alongCurve,
+  alongLane,
+  anchorOf,
+  placeLabels,
+  sizeOf,
+  type Wish,
+} from "./geometry/label-places";
 import { type NoteNode, noteNodes } from "./note-nodes";
+import { OUTCOMES, outcomeWord } from "./outcome";
+import { type Mark, type Marks, markWords } from "./problem-marks";
 
 export type CardNode = Node<
   {

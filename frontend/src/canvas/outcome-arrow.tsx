@@ -1,9 +1,9 @@
 /** An arrow from one outcome to what answers it, with the relation's answers in words. */
 import { BaseEdge, EdgeLabelRenderer, type EdgeProps, useStoreApi } from "@xyflow/react";
 import { memo } from "react";
-import { OutcomeSign, outcomeColor, outcomeWord } from "../outcome";
 import type { Answer, Arrow } from "./elements";
-import { lineOf } from "./line";
+import { lineOf } from "./geometry/arrow-path";
+import { OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import style from "./outcome-arrow.module.css";
 import { ProblemBadge } from "./problem-badge";
 
