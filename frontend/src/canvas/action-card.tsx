@@ -2,11 +2,11 @@
 import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo } from "react";
-import type { Progress } from "../api/progress";
 import { cardLines, lineText } from "../graph/value-text";
+import { tookWords } from "../status/durations";
+import type { Progress } from "../status/progress";
+import { StateWord } from "../status/state-label";
 import { robotColor } from "../ui/robot";
-import { StateWord } from "../ui/state-word";
-import { tookWords } from "../ui/took";
 import { stopwatch, useNow } from "../ui/when";
 import style from "./action-card.module.css";
 import { useIsDim, useTalk } from "./card-highlights";

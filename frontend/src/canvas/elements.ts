@@ -1,6 +1,5 @@
 /** A graph as nodes and edges of the canvas; what did not change keeps its identity. */
 import type { Edge, Node } from "@xyflow/react";
-import type { Progress } from "../api/progress";
 import { relationId } from "../graph/document-keys";
 import type { Note } from "../graph/edit/notes";
 import {
@@ -14,6 +13,7 @@ import {
   type Response,
   spoken,
 } from "../graph/model";
+import type { Progress } from "../status/progress";
 import { CARD, PILL, type Places } from "./geometry/arrange";
 import { type Box, laneBack, laneFor, MOST_CARDS } from "./geometry/detours";
 import {

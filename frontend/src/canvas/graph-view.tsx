@@ -7,8 +7,8 @@ import {
   ReactFlow,
 } from "@xyflow/react";
 import { useMemo, useState } from "react";
-import type { Progress } from "../api/progress";
 import type { Graph, Key } from "../graph/model";
+import type { Progress } from "../status/progress";
 import { ActionCard } from "./action-card";
 import { aroundOf, type CanvasNode, edgesOf, nodesOf } from "./elements";
 import { EndPill } from "./end-pill";

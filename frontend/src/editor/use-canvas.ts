@@ -14,7 +14,6 @@ import {
   useRef,
   useState,
 } from "react";
-import type { Progress } from "../api/progress";
 import {
   type Around,
   type Arrow,
@@ -30,6 +29,7 @@ import type { Marks } from "../canvas/problem-marks";
 import { insertInto, moveActions, together } from "../graph/edit";
 import { type Note, notesOf, placeNotes, withContents } from "../graph/edit/notes";
 import type { Graph, Key, Position } from "../graph/model";
+import type { Progress } from "../status/progress";
 import type { Person } from "../sync/presence/presence";
 import { usePeople, useRoom } from "../sync/use-room";
 import { colorsOf } from "../ui/robot";

@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
-import type { Progress } from "../api/progress";
-import { progressByAid } from "../api/progress";
 import type { Run } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
+import type { Progress } from "../status/progress";
+import { progressByAid } from "../status/progress";
 import { runNews } from "./use-news";
 
 const graph = fromUmrf({

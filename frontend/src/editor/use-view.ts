@@ -1,7 +1,6 @@
 /** The view of the canvas: what is seen at first, what Fit shows, and how it follows a run. */
 import type { ReactFlowInstance } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
-import type { Progress } from "../api/progress";
 import type { Arrow, CanvasNode } from "../canvas/elements";
 import { CARD, type Places, type Sizes } from "../canvas/geometry/arrange";
 import {
@@ -15,6 +14,7 @@ import {
   whole,
 } from "../canvas/geometry/viewport";
 import { ENTRY, type Key, type Position } from "../graph/model";
+import type { Progress } from "../status/progress";
 import type { View } from "./bench";
 
 interface Given {

@@ -6,7 +6,6 @@ import type { ReactNode } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
 import { sentence } from "../api/http";
-import { endWords, runWord, tookOf } from "../api/progress";
 import {
   type Comparison,
   EVERYTHING,
@@ -17,9 +16,10 @@ import {
 } from "../api/review";
 import { getRun, type Run, type Visit } from "../api/runs";
 import { useLive } from "../api/use-live";
+import { spanWords, tookWords } from "../status/durations";
+import { endWords, runWord, tookOf } from "../status/progress";
+import { StateWord } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import { StateWord } from "../ui/state-word";
-import { spanWords, tookWords } from "../ui/took";
 import { clock, day, instant, useNow } from "../ui/when";
 import style from "./compare-page.module.css";
 import type { BarParts } from "./run-page";

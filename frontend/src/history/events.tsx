@@ -3,10 +3,10 @@
 import { TextInput } from "@mantine/core";
 import { useMemo, useState } from "react";
 import { authorName } from "../api/graphs";
-import { atMost, begun, ended, endWords, type Tone } from "../api/progress";
 import type { FilmMark } from "../api/review";
 import { placeOf, type Run } from "../api/runs";
-import { toneColor } from "../ui/state-word";
+import { atMost, begun, ended, endWords, type Tone } from "../status/progress";
+import { toneColor } from "../status/state-label";
 import { clock, instant } from "../ui/when";
 import style from "./events.module.css";
 import { wordsOf } from "./film-signs";

@@ -1,9 +1,9 @@
 /** What a run was, in a table. */
 
-import { endWords } from "../api/progress";
 import { useRaw } from "../api/review";
 import { placeOf, type Run, whence } from "../api/runs";
-import { spanWords } from "../ui/took";
+import { spanWords } from "../status/durations";
+import { endWords } from "../status/progress";
 import { clock, day, instant, useNow } from "../ui/when";
 import style from "./facts.module.css";
 

@@ -1,7 +1,7 @@
 /** What of a film stands on the time axis, and what its marks say in words. */
 import type { Film, FilmMark } from "../api/review";
 import type { Run } from "../api/runs";
-import type { TimeGap, TimeSign } from "../ui/timeline";
+import type { TimeGap, TimeSign } from "../status/timeline";
 import { clock, instant } from "../ui/when";
 
 const SIGNS: Record<string, TimeSign["tone"]> = {

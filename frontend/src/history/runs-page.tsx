@@ -14,7 +14,6 @@ import { useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
 import { sentence } from "../api/http";
-import { endWords, runWord } from "../api/progress";
 import {
   filterOf,
   type ListedRun,
@@ -25,9 +24,10 @@ import {
 } from "../api/review";
 import { hasEnded, placeOf, type Run } from "../api/runs";
 import { useLive } from "../api/use-live";
+import { spanWords } from "../status/durations";
+import { endWords, runWord } from "../status/progress";
+import { StateWord } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import { StateWord } from "../ui/state-word";
-import { spanWords } from "../ui/took";
 import { clock, day, instant, stopwatch, useNow } from "../ui/when";
 import { Filters } from "./filters";
 import style from "./runs-page.module.css";

@@ -4,13 +4,13 @@ import { IconAlertTriangle, IconChartBar } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link, useSearch } from "wouter";
 import { sentence } from "../api/http";
-import { runWord } from "../api/progress";
 import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
 import type { Run, Took } from "../api/runs";
 import { useLive } from "../api/use-live";
+import { spanWords } from "../status/durations";
+import { runWord } from "../status/progress";
+import { toneColor } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import { toneColor } from "../ui/state-word";
-import { spanWords } from "../ui/took";
 import type { BarParts } from "./run-page";
 import style from "./statistics-page.module.css";
 

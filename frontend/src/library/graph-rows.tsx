@@ -3,9 +3,9 @@ import { Skeleton } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { Link } from "wouter";
 import type { GraphSummary } from "../api/graphs";
-import { endWords, runWord, type Tone } from "../api/progress";
 import { newestRun, useLive } from "../api/use-live";
-import { toneColor } from "../ui/state-word";
+import { endWords, runWord, type Tone } from "../status/progress";
+import { toneColor } from "../status/state-label";
 import { ago, instant, stopwatch, useNow } from "../ui/when";
 import style from "./sidebar.module.css";
 

@@ -8,7 +8,7 @@ import { sentence } from "../api/http";
 import { useMay } from "../api/person";
 import { forgetRobot, type Registration, type Robot } from "../api/robots";
 import { useHeard, useLive } from "../api/use-live";
-import { EngineWord } from "../ui/engine-word";
+import { EngineWord } from "../status/engine-label";
 import { robotColor } from "../ui/robot";
 import { ago, clock, instant, useNow } from "../ui/when";
 import { FlightRecord } from "./flight-record";

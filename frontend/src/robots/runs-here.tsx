@@ -4,10 +4,10 @@ import { notifications } from "@mantine/notifications";
 import { IconFileImport, IconSquareFilled } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { sentence } from "../api/http";
-import { runWord } from "../api/progress";
 import { heldGraph, type Robot, stopRobot } from "../api/robots";
 import { foreignGraphs, openRuns, useLive } from "../api/use-live";
-import { StateWord } from "../ui/state-word";
+import { runWord } from "../status/progress";
+import { StateWord } from "../status/state-label";
 import style from "./runs-here.module.css";
 
 interface Props {

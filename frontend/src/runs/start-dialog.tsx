@@ -9,7 +9,7 @@ import { useMay } from "../api/person";
 import { lookBefore, type Preflight, type Robot, SIMULATOR } from "../api/robots";
 import type { Run } from "../api/runs";
 import { useLive } from "../api/use-live";
-import { EngineWord } from "../ui/engine-word";
+import { EngineWord } from "../status/engine-label";
 import { HoldButton } from "../ui/hold-button";
 import { robotColor } from "../ui/robot";
 import { PreflightList } from "./preflight-list";

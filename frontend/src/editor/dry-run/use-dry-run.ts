@@ -1,8 +1,8 @@
 /** The state of a dry-run: what is played, where in it one is, and what was decided. */
 import { useCallback, useEffect, useMemo, useState } from "react";
-import type { Progress } from "../../api/progress";
 import { useRehearsal } from "../../api/rehearsal";
 import type { Graph, Key } from "../../graph/model";
+import type { Progress } from "../../status/progress";
 import { endName } from "../bench";
 import { keysByName, momentsOf, type Sighting, sightingAt, wordsOf } from "./play";
 import {

@@ -9,15 +9,15 @@ import {
   IconPlayerPlay,
 } from "@tabler/icons-react";
 import { memo, useId, useState } from "react";
-import type { Progress } from "../../api/progress";
 import { useTalk } from "../../canvas/card-highlights";
 import { noteColor } from "../../canvas/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import type { Note } from "../../graph/edit/notes";
 import { cardLines, lineText } from "../../graph/value-text";
+import { moreOf } from "../../status/durations";
+import type { Progress } from "../../status/progress";
+import { StateWord } from "../../status/state-label";
 import { robotColor } from "../../ui/robot";
-import { StateWord } from "../../ui/state-word";
-import { moreOf } from "../../ui/took";
 import style from "./outline.module.css";
 import { deedsOf, type RowDeed } from "./row-deeds";
 import { type Change, RowEdit } from "./row-edit";

@@ -7,9 +7,9 @@
 import { Button, Kbd } from "@mantine/core";
 import { IconListTree, IconPlus } from "@tabler/icons-react";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
-import type { Progress } from "../../api/progress";
 import { useRobotInLight } from "../../canvas/card-highlights";
 import { ENTRY, type Key } from "../../graph/model";
+import type { Progress } from "../../status/progress";
 import { announcer } from "../../ui/announcer";
 import { Empty } from "../../ui/empty";
 import { useIsPhone } from "../../ui/screen";

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
+import type { ActionRun, Run } from "../api/runs";
 import { endWords, progressByAid, progressOf, runWord } from "./progress";
-import type { ActionRun, Run } from "./runs";
 
 const run: Run = {
   id: "r",

@@ -9,8 +9,8 @@ import {
   IconSquareFilled,
   IconX,
 } from "@tabler/icons-react";
-import type { Tone } from "../api/progress";
-import style from "./state-word.module.css";
+import type { Tone } from "./progress";
+import style from "./state-label.module.css";
 
 const signs = {
   idle: IconCircle,

@@ -7,7 +7,7 @@ import {
   IconRotateClockwise2,
 } from "@tabler/icons-react";
 import type { EngineState, Robot } from "../api/robots";
-import style from "./engine-word.module.css";
+import style from "./engine-label.module.css";
 
 const WORDS: Record<EngineState, { word: string; sign: typeof IconCircleCheck }> = {
   answering: { word: "answers", sign: IconCircleCheck },

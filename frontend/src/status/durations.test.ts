@@ -1,7 +1,7 @@
 /** How long something took is told no more exactly than it was seen. */
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { spanWords, tookWords } from "./took";
+import { spanWords, tookWords } from "./durations";
 
 test.each([
   [null, null, null],

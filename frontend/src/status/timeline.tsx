@@ -1,13 +1,13 @@
 /** Lanes of a run over time: one for each action, with what is not known left hatched. */
 import { Fragment, type PointerEvent, useEffect, useRef } from "react";
-import { begun, ended, progressOf, type Tone } from "../api/progress";
 import type { Run, Visit } from "../api/runs";
-import type { Lane } from "./lanes";
-import { robotColor } from "./robot";
-import { StateWord, toneColor } from "./state-word";
+import { robotColor } from "../ui/robot";
+import { duration, instant } from "../ui/when";
+import { moreOf } from "./durations";
+import { begun, ended, progressOf, type Tone } from "./progress";
+import { StateWord, toneColor } from "./state-label";
 import style from "./timeline.module.css";
-import { moreOf } from "./took";
-import { duration, instant } from "./when";
+import type { Lane } from "./timeline-lanes";
 
 interface Props {
   run: Run;

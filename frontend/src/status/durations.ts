@@ -1,7 +1,8 @@
 /** How long something took, in words: exactly, or between two bounds, which are never told closer. */
-import type { Progress } from "../api/progress";
+
 import type { Took } from "../api/runs";
-import { duration } from "./when";
+import { duration } from "../ui/when";
+import type { Progress } from "./progress";
 
 /** Down (or up) to what `duration` can show. */
 function shown(ms: number, round: (value: number) => number): number {

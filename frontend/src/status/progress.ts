@@ -1,5 +1,5 @@
 /** What can be said of an action of a run, and of the run, in one word and one tone. */
-import type { ActionRun, Run, Visit } from "./runs";
+import type { ActionRun, Run, Visit } from "../api/runs";
 
 export type Tone = "idle" | "run" | "true" | "false" | "error" | "stopped" | "done" | "unknown";
 
