@@ -17,7 +17,7 @@ import { sentence } from "../api/http";
 import { usePerson } from "../api/person";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
 import { useLive } from "../api/use-live";
-import { initials, personColor } from "../ui/robot";
+import { initials, personColor } from "../ui/name-colors";
 
 const schemes = [
   { value: "light", label: <IconSun size={15} aria-label="Light" /> },

@@ -6,7 +6,7 @@ import { sentence } from "../api/http";
 import { codeUrl, type Invitation, useRevoke } from "../api/sharing";
 import { useLive } from "../api/use-live";
 import { copyText } from "../ui/copy-text";
-import { ago, instant, useNow } from "../ui/when";
+import { ago, instant, useNow } from "../ui/times";
 import style from "./share-dialog.module.css";
 
 const MOST_GUESTS = 6;

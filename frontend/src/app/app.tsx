@@ -14,7 +14,7 @@ import { actionCarrier } from "../canvas/action-drag";
 import { StopNotice } from "../runs/stop-notice";
 import { UnsureStartNotice } from "../runs/unsure-start";
 import { LiveRegion } from "../ui/announcer";
-import { CarriedGhost } from "../ui/placing";
+import { CarriedGhost } from "../ui/pointer-drag";
 import { theme, variables } from "../ui/theme";
 import { DropFiles } from "./drop-files";
 import { GraphScreen } from "./graph-screen";

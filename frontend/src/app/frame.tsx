@@ -7,8 +7,8 @@ import { AccountMenu } from "../account/account-menu";
 import { ShareDialog } from "../account/share-dialog";
 import { useMay } from "../api/person";
 import { StopButton } from "../runs/stop-button";
-import { useSteady } from "../ui/steady";
 import { type Crumb, TopBar } from "../ui/top-bar";
+import { useSteady } from "../ui/use-stable-callback";
 import style from "./frame.module.css";
 
 interface Props {

@@ -3,7 +3,7 @@
 import { type Note, notesOf } from "../graph/edit/notes";
 import type { Graph, Key, Position, Precondition } from "../graph/model";
 import { cardLines, lineText } from "../graph/value-text";
-import { robotColor } from "../ui/robot";
+import { robotColor } from "../ui/name-colors";
 import { type Arrow, aroundOf, type CanvasNode, edgesOf, nodesOf, shareOf } from "./elements";
 import { CARD, PILL, type Sizes } from "./geometry/arrange";
 import { lineOf } from "./geometry/arrow-path";

@@ -7,8 +7,8 @@ import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outc
 import { endsOf } from "../graph/document-keys";
 import { connect, moveRelation, together } from "../graph/edit";
 import { ENTRY, EXIT, type Key, type Precondition } from "../graph/model";
+import { robotColor } from "../ui/name-colors";
 import { matching, type Option, PickList } from "../ui/pick-list";
-import { robotColor } from "../ui/robot";
 import style from "./arrow-dialog.module.css";
 import { type Bench, endName, freePlace, placeAction } from "./bench";
 

@@ -2,7 +2,7 @@
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { type FocusEvent, type ReactNode, use, useEffect, useRef } from "react";
 import { useEditors, usePeople, useRoom } from "../sync/use-room";
-import { colorsOf } from "../ui/robot";
+import { colorsOf } from "../ui/name-colors";
 import { ProblemsContext, problemsAt } from "./details/problem-places";
 import style from "./field-of.module.css";
 import { Initial, onePerId } from "./people";

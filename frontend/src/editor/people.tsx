@@ -6,7 +6,7 @@ import { CARD, type Places, type Sizes } from "../canvas/geometry/arrange";
 import { splitKey } from "../graph/document-keys";
 import type { Person } from "../sync/presence/presence";
 import { useFollowing, usePeople } from "../sync/use-room";
-import { colorsOf, initials } from "../ui/robot";
+import { colorsOf, initials } from "../ui/name-colors";
 import style from "./people.module.css";
 
 const MOST = 4;

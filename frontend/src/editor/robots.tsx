@@ -1,7 +1,7 @@
 /** The robots of a graph: what each is called, its colour, and putting one in the light. */
 import { memo, useMemo } from "react";
 import { spotlight, useRobotInLight } from "../canvas/card-highlights";
-import { robotColor } from "../ui/robot";
+import { robotColor } from "../ui/name-colors";
 import { useBench } from "./bench";
 import style from "./robots.module.css";
 

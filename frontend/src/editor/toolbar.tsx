@@ -2,7 +2,7 @@
 import { ActionIcon, Menu, Tooltip } from "@mantine/core";
 import { IconDots } from "@tabler/icons-react";
 import { Fragment, memo } from "react";
-import { useSteady } from "../ui/steady";
+import { useSteady } from "../ui/use-stable-callback";
 import { useBench } from "./bench";
 import {
   add,

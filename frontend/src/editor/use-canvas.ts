@@ -32,7 +32,7 @@ import type { Graph, Key, Position } from "../graph/model";
 import type { Progress } from "../status/progress";
 import type { Person } from "../sync/presence/presence";
 import { usePeople, useRoom } from "../sync/use-room";
-import { colorsOf } from "../ui/robot";
+import { colorsOf } from "../ui/name-colors";
 import { arrowAt, pointOf } from "./hit";
 
 export interface Size {

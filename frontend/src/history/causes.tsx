@@ -2,7 +2,7 @@
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { type Cause, useCauses, wentWrong } from "../api/review";
 import type { Run } from "../api/runs";
-import { clock, instant } from "../ui/when";
+import { clock, instant } from "../ui/times";
 import style from "./causes.module.css";
 
 interface Props {

@@ -20,7 +20,7 @@ import { spanWords, tookWords } from "../status/durations";
 import { endWords, runWord, tookOf } from "../status/progress";
 import { StateWord } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import { clock, day, instant, useNow } from "../ui/when";
+import { clock, day, instant, useNow } from "../ui/times";
 import style from "./compare-page.module.css";
 import type { BarParts } from "./run-page";
 

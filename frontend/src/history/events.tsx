@@ -7,7 +7,7 @@ import type { FilmMark } from "../api/review";
 import { placeOf, type Run } from "../api/runs";
 import { atMost, begun, ended, endWords, type Tone } from "../status/progress";
 import { toneColor } from "../status/state-label";
-import { clock, instant } from "../ui/when";
+import { clock, instant } from "../ui/times";
 import style from "./events.module.css";
 import { wordsOf } from "./film-signs";
 

@@ -2,7 +2,7 @@
 import type { Film, FilmMark } from "../api/review";
 import type { Run } from "../api/runs";
 import type { TimeGap, TimeSign } from "../status/timeline";
-import { clock, instant } from "../ui/when";
+import { clock, instant } from "../ui/times";
 
 const SIGNS: Record<string, TimeSign["tone"]> = {
   "run.stop_requested.v1": "stopped",

@@ -8,7 +8,7 @@ import {
   IconPlayerTrackPrev,
 } from "@tabler/icons-react";
 import { useEffect, useRef } from "react";
-import { duration } from "../ui/when";
+import { duration } from "../ui/times";
 import style from "./player.module.css";
 import { type Replay, SPEEDS } from "./use-replay";
 

@@ -28,7 +28,7 @@ import { spanWords } from "../status/durations";
 import { endWords, runWord } from "../status/progress";
 import { StateWord } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import { clock, day, instant, stopwatch, useNow } from "../ui/when";
+import { clock, day, instant, stopwatch, useNow } from "../ui/times";
 import { Filters } from "./filters";
 import style from "./runs-page.module.css";
 import { useVersionLabel } from "./version-label";

@@ -6,7 +6,7 @@ import type { GraphSummary } from "../api/graphs";
 import { newestRun, useLive } from "../api/use-live";
 import { endWords, runWord, type Tone } from "../status/progress";
 import { toneColor } from "../status/state-label";
-import { ago, instant, stopwatch, useNow } from "../ui/when";
+import { ago, instant, stopwatch, useNow } from "../ui/times";
 import style from "./sidebar.module.css";
 
 function subtitle(graph: GraphSummary, words: string | null, now: number): string {

@@ -6,7 +6,7 @@ import { fromUmrf } from "../canvas/from-umrf";
 import { arrange } from "../canvas/geometry/arrange";
 import { outcomeColor } from "../canvas/outcome";
 import { ENTRY, EXIT, type Graph, spoken } from "../graph/model";
-import { robotColor } from "../ui/robot";
+import { robotColor } from "../ui/name-colors";
 
 const MARGIN = 26;
 const CARD = { width: 150, height: 84 } as const;

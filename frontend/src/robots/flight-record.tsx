@@ -4,7 +4,7 @@ import { IconFileImport } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { commandedGraph, type Told, useFlight } from "../api/robots";
 import { useLive } from "../api/use-live";
-import { clock, day, instant } from "../ui/when";
+import { clock, day, instant } from "../ui/times";
 import style from "./flight-record.module.css";
 import { complain } from "./runs-here";
 

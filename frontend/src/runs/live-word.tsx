@@ -2,7 +2,7 @@
 import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
 import type { Run } from "../api/runs";
 import { useLive, useSeen } from "../api/use-live";
-import { clock, duration, useNow } from "../ui/when";
+import { clock, duration, useNow } from "../ui/times";
 import style from "./live-word.module.css";
 
 const OLD = 2_500; // ms; a run is looked at each second

@@ -3,7 +3,7 @@ import { Loader } from "@mantine/core";
 import { IconAlertTriangle, IconCheck, IconX } from "@tabler/icons-react";
 import type { Item, Preflight } from "../api/robots";
 import { SIMULATOR } from "../api/robots";
-import { robotColor } from "../ui/robot";
+import { robotColor } from "../ui/name-colors";
 import style from "./preflight-list.module.css";
 
 const WAITING: Readonly<Record<string, string>> = {

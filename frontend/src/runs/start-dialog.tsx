@@ -11,7 +11,7 @@ import type { Run } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { EngineWord } from "../status/engine-label";
 import { HoldButton } from "../ui/hold-button";
-import { robotColor } from "../ui/robot";
+import { robotColor } from "../ui/name-colors";
 import { PreflightList } from "./preflight-list";
 import style from "./start-dialog.module.css";
 import { rememberEngines, useStart } from "./use-start";

@@ -4,7 +4,7 @@ import { useState } from "react";
 import type { LiveNow, StopAsked } from "../api/live";
 import { awaitsLook, type Run } from "../api/runs";
 import { foreignGraphs, openRuns, useLive } from "../api/use-live";
-import { clock, duration, useNow } from "../ui/when";
+import { clock, duration, useNow } from "../ui/times";
 import { RestButton } from "./rest-button";
 import style from "./stop-notice.module.css";
 

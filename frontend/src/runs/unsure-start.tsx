@@ -7,7 +7,7 @@ import { SIMULATOR } from "../api/robots";
 import { findStart, type Run, type StartFound } from "../api/runs";
 import { useLive } from "../api/use-live";
 import { runWord } from "../status/progress";
-import { robotColor } from "../ui/robot";
+import { robotColor } from "../ui/name-colors";
 import style from "./unsure-start.module.css";
 import { type SentStart, unsureStarts } from "./unsure-starts";
 

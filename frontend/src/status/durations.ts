@@ -1,7 +1,7 @@
 /** How long something took, in words: exactly, or between two bounds, which are never told closer. */
 
 import type { Took } from "../api/runs";
-import { duration } from "../ui/when";
+import { duration } from "../ui/times";
 import type { Progress } from "./progress";
 
 /** Down (or up) to what `duration` can show. */

@@ -1,8 +1,8 @@
 /** Lanes of a run over time: one for each action, with what is not known left hatched. */
 import { Fragment, type PointerEvent, useEffect, useRef } from "react";
 import type { Run, Visit } from "../api/runs";
-import { robotColor } from "../ui/robot";
-import { duration, instant } from "../ui/when";
+import { robotColor } from "../ui/name-colors";
+import { duration, instant } from "../ui/times";
 import { moreOf } from "./durations";
 import { begun, ended, progressOf, type Tone } from "./progress";
 import { StateWord, toneColor } from "./state-label";

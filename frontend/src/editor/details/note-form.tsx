@@ -4,8 +4,8 @@ import { IconTrash } from "@tabler/icons-react";
 import { noteColor } from "../../canvas/note-colors";
 import { removeNotes } from "../../graph/edit";
 import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../../graph/edit/notes";
+import { DraftInput } from "../../ui/draft-input";
 import { useBench } from "../bench";
-import { DraftInput } from "../draft-input";
 import { FieldOf } from "../field-of";
 import style from "./details.module.css";
 

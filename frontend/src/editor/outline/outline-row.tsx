@@ -17,7 +17,7 @@ import { cardLines, lineText } from "../../graph/value-text";
 import { moreOf } from "../../status/durations";
 import type { Progress } from "../../status/progress";
 import { StateWord } from "../../status/state-label";
-import { robotColor } from "../../ui/robot";
+import { robotColor } from "../../ui/name-colors";
 import style from "./outline.module.css";
 import { deedsOf, type RowDeed } from "./row-deeds";
 import { type Change, RowEdit } from "./row-edit";

@@ -12,7 +12,7 @@ import { ENTRY, type Key } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 import { announcer } from "../../ui/announcer";
 import { Empty } from "../../ui/empty";
-import { useIsPhone } from "../../ui/screen";
+import { useIsPhone } from "../../ui/use-screen-size";
 import { useBench } from "../bench";
 import { Robots } from "../robots";
 import style from "./outline.module.css";

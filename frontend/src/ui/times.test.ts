@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { ago, day, duration, instant, stopwatch } from "./when";
+import { ago, day, duration, instant, stopwatch } from "./times";
 
 test("durations are as precise as they are short", () => {
   expect([400, 12_440, 72_000, 7_500_000].map(duration)).toEqual([

@@ -1,6 +1,6 @@
 /** Something carried by the pointer from a list to a place that takes it. By pointer events: works for fingers. */
 import { type PointerEvent as ReactPointerEvent, useEffect, useSyncExternalStore } from "react";
-import style from "./placing.module.css";
+import style from "./pointer-drag.module.css";
 
 export interface Carried<T> {
   readonly load: T;

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { initials } from "./robot";
+import { initials } from "./name-colors";
 
 test.each([
   ["Ada", "AD"],
