@@ -14,9 +14,9 @@ import {
 import { IconDeviceDesktop, IconLogout, IconMoon, IconShare, IconSun } from "@tabler/icons-react";
 import { useState } from "react";
 import { sentence } from "../api/http";
-import { usePerson } from "../api/person";
+import { useLive } from "../api/live/use-live";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
-import { useLive } from "../api/use-live";
+import { usePerson } from "../api/use-person";
 import { initials, personColor } from "../ui/name-colors";
 
 const schemes = [

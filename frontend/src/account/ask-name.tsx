@@ -2,8 +2,8 @@
 import { Button, CloseButton, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { sentence } from "../api/http";
-import { usePerson } from "../api/person";
 import { rememberedName } from "../api/session";
+import { usePerson } from "../api/use-person";
 import style from "./ask-name.module.css";
 
 const SUGGESTION = "Operator";

@@ -8,9 +8,7 @@ import {
   useState,
   useSyncExternalStore,
 } from "react";
-import { sessionEnd } from "../api/ended";
 import { Refusal, sentence } from "../api/http";
-import { PersonContext } from "../api/person";
 import {
   currentPerson,
   type Invited,
@@ -23,6 +21,8 @@ import {
   rename,
   takeKey,
 } from "../api/session";
+import { sessionEnd } from "../api/session-end";
+import { PersonContext } from "../api/use-person";
 import { Invitation } from "./invitation";
 import { SignIn } from "./sign-in";
 import { SignInBar } from "./sign-in-bar";

@@ -4,7 +4,7 @@ import { useMediaQuery } from "@mantine/hooks";
 import { IconLock, IconLockOpen2, IconPlugConnectedX } from "@tabler/icons-react";
 import { useState } from "react";
 import { sentence } from "../api/http";
-import { pageUrl } from "../api/place";
+import { pageUrl } from "../api/page-url";
 import { ROLE_WORDS, type Role } from "../api/session";
 import { type Sharing, useInvite, useSharing } from "../api/sharing";
 import style from "./share-dialog.module.css";

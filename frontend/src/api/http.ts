@@ -1,7 +1,7 @@
 /** Requests to editor and runner, and how they refuse. */
 
-import { sessionEnd } from "./ended";
-import { here } from "./place";
+import { here } from "./page-url";
+import { sessionEnd } from "./session-end";
 
 /** RFC 9457 as both processes answer it. */
 export interface ProblemDetails {

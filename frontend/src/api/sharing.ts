@@ -2,7 +2,7 @@
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import type { Author } from "./graphs";
 import { ask } from "./http";
-import { here } from "./place";
+import { here } from "./page-url";
 import type { Role } from "./roles";
 
 export interface Guest {

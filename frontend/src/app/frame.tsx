@@ -5,7 +5,7 @@ import { memo, type ReactNode, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
 import { ShareDialog } from "../account/share-dialog";
-import { useMay } from "../api/person";
+import { useMay } from "../api/use-person";
 import { StopButton } from "../runs/stop-button";
 import { type Crumb, TopBar } from "../ui/top-bar";
 import { useSteady } from "../ui/use-stable-callback";

@@ -6,7 +6,7 @@
  */
 import { notifications } from "@mantine/notifications";
 import { place, sentence } from "../api/http";
-import { readPieces } from "../api/pieces";
+import { readPieces } from "../api/umrf-keys";
 import { arrange } from "../canvas/geometry/arrange";
 import { mapsFrom } from "../graph/document-keys";
 import { type Clip, clipOf, isEmpty, paste } from "../graph/edit/clip";

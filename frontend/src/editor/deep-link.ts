@@ -1,6 +1,6 @@
 /** Addresses of a graph and of what is in it: an action, an arrow, a problem. */
 
-import { pageUrl } from "../api/place";
+import { pageUrl } from "../api/page-url";
 import { relationId } from "../graph/document-keys";
 import type { Graph } from "../graph/model";
 

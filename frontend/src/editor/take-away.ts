@@ -1,6 +1,6 @@
 /** Taking a graph away as a file: UMRF as the server writes it, or a picture of the canvas. */
 import { notifications } from "@mantine/notifications";
-import { here } from "../api/place";
+import { here } from "../api/page-url";
 import { pictureOf } from "../canvas/svg-picture";
 import type { Bench, Format } from "./bench";
 

@@ -2,7 +2,7 @@
 
 import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
-import { useMay } from "../api/person";
+import { useMay } from "../api/use-person";
 import { CARD } from "../canvas/geometry/arrange";
 import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../sync/use-room";
 import {

@@ -6,6 +6,7 @@ import type { ReactNode } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
 import { sentence } from "../api/http";
+import { useLive } from "../api/live/use-live";
 import {
   type Comparison,
   EVERYTHING,
@@ -15,7 +16,6 @@ import {
   useComparison,
 } from "../api/review";
 import { getRun, type Run, type Visit } from "../api/runs";
-import { useLive } from "../api/use-live";
 import { spanWords, tookWords } from "../status/durations";
 import { endWords, runWord, tookOf } from "../status/progress";
 import { StateWord } from "../status/state-label";

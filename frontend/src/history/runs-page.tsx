@@ -14,6 +14,7 @@ import { useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
 import { sentence } from "../api/http";
+import { useLive } from "../api/live/use-live";
 import {
   filterOf,
   type ListedRun,
@@ -23,7 +24,6 @@ import {
   takeInExamples,
 } from "../api/review";
 import { hasEnded, placeOf, type Run } from "../api/runs";
-import { useLive } from "../api/use-live";
 import { spanWords } from "../status/durations";
 import { endWords, runWord } from "../status/progress";
 import { StateWord } from "../status/state-label";

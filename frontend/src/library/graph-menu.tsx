@@ -13,8 +13,8 @@ import {
   renameGraph,
 } from "../api/graphs";
 import { sentence } from "../api/http";
-import { useMay } from "../api/person";
-import { here } from "../api/place";
+import { here } from "../api/page-url";
+import { useMay } from "../api/use-person";
 import style from "./home.module.css";
 
 /** "x copy", "x copy 2" …: the first that no graph is called. */

@@ -3,7 +3,7 @@ import { Skeleton } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { Link } from "wouter";
 import type { GraphSummary } from "../api/graphs";
-import { newestRun, useLive } from "../api/use-live";
+import { newestRun, useLive } from "../api/live/use-live";
 import { endWords, runWord, type Tone } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { ago, instant, stopwatch, useNow } from "../ui/times";

@@ -3,7 +3,7 @@ import { Button, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconFileImport, IconPlus } from "@tabler/icons-react";
 import { useGraphs } from "../api/graphs";
 import { sentence } from "../api/http";
-import { useMay } from "../api/person";
+import { useMay } from "../api/use-person";
 import { Empty } from "../ui/empty";
 import { GraphCards } from "./graph-cards";
 import style from "./home.module.css";

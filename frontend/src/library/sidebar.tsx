@@ -3,7 +3,7 @@ import { ActionIcon, Kbd, TextInput, Tooltip } from "@mantine/core";
 import { IconFileImport, IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { useGraphs } from "../api/graphs";
-import { useMay } from "../api/person";
+import { useMay } from "../api/use-person";
 import type { NewAction } from "../graph/edit";
 import { ActionRow } from "./action-row";
 import { fits } from "./choose";

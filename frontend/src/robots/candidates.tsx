@@ -1,8 +1,8 @@
 /** Engines in sight that nobody registered: one tap takes them in. */
 import { Button } from "@mantine/core";
 import { IconRadar2 } from "@tabler/icons-react";
+import { useLive } from "../api/live/use-live";
 import { type Candidate, useCandidates } from "../api/robots";
-import { useLive } from "../api/use-live";
 import style from "./candidates.module.css";
 
 interface Props {

@@ -2,8 +2,8 @@
 import { Button, Text } from "@mantine/core";
 import { IconFileImport } from "@tabler/icons-react";
 import { Link } from "wouter";
+import { useLive } from "../api/live/use-live";
 import { commandedGraph, type Told, useFlight } from "../api/robots";
-import { useLive } from "../api/use-live";
 import { clock, day, instant } from "../ui/times";
 import style from "./flight-record.module.css";
 import { complain } from "./runs-here";

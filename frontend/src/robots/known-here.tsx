@@ -1,7 +1,7 @@
 /** The actions and graphs that a robot has indexed. */
 import { Text } from "@mantine/core";
+import { useLive } from "../api/live/use-live";
 import { useKnown } from "../api/robots";
-import { useLive } from "../api/use-live";
 import style from "./known-here.module.css";
 
 function parameters(inputs: Record<string, string>): string {

@@ -5,9 +5,9 @@ import { IconAlertTriangle, IconCheck, IconDots, IconPencil, IconTrash } from "@
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { sentence } from "../api/http";
-import { useMay } from "../api/person";
+import { useHeard, useLive } from "../api/live/use-live";
 import { forgetRobot, type Registration, type Robot } from "../api/robots";
-import { useHeard, useLive } from "../api/use-live";
+import { useMay } from "../api/use-person";
 import { EngineWord } from "../status/engine-label";
 import { robotColor } from "../ui/name-colors";
 import { ago, clock, instant, useNow } from "../ui/times";

@@ -13,8 +13,8 @@ import {
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { Refusal, sentence } from "../api/http";
+import { useLive } from "../api/live/use-live";
 import { changeRobot, type Registration, registerRobot } from "../api/robots";
-import { useLive } from "../api/use-live";
 import type { Editing } from "./robots-page";
 
 export const NEW: Registration = {

@@ -2,10 +2,10 @@
 import { Button, Code, Skeleton } from "@mantine/core";
 import { IconPlus, IconRobot } from "@tabler/icons-react";
 import { useState } from "react";
-import { useMay } from "../api/person";
+import { useLive } from "../api/live/use-live";
 import type { Candidate, Registration } from "../api/robots";
 import { useReach } from "../api/robots";
-import { useLive } from "../api/use-live";
+import { useMay } from "../api/use-person";
 import { Empty } from "../ui/empty";
 import { Candidates } from "./candidates";
 import { RobotCard } from "./robot-card";

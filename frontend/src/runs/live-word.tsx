@@ -1,7 +1,7 @@
 /** Whether the page hears the runner, and how old what it shows of a run is, in words. */
 import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
+import { useLive, useSeen } from "../api/live/use-live";
 import type { Run } from "../api/runs";
-import { useLive, useSeen } from "../api/use-live";
 import { clock, duration, useNow } from "../ui/times";
 import style from "./live-word.module.css";
 

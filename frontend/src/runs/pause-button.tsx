@@ -4,9 +4,9 @@ import { notifications } from "@mantine/notifications";
 import { IconPlayerPause, IconPlayerPlay } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { sentence } from "../api/http";
-import { useMay } from "../api/person";
+import { useLive } from "../api/live/use-live";
 import { playedBy, type Run, steerRun } from "../api/runs";
-import { useLive } from "../api/use-live";
+import { useMay } from "../api/use-person";
 
 export function PauseButton({ run }: { run: Run }) {
   const { runner, now } = useLive();

@@ -1,9 +1,9 @@
 /** Makes a dry-run a run: started in the simulator, with the same decisions, and recorded. */
 import { IconPlayerPlayFilled } from "@tabler/icons-react";
+import type { Script } from "../api/dry-runs";
 import { useVersions } from "../api/graphs";
-import type { Script } from "../api/rehearsal";
+import { useLive } from "../api/live/use-live";
 import { SIMULATOR } from "../api/robots";
-import { useLive } from "../api/use-live";
 import { HoldButton } from "../ui/hold-button";
 import { nextLabel, useStart } from "./use-start";
 

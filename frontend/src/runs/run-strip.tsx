@@ -4,8 +4,8 @@ import { IconChevronDown, IconChevronUp, IconTimeline } from "@tabler/icons-reac
 import { useMemo } from "react";
 import { Link } from "wouter";
 import { authorName } from "../api/graphs";
+import { useLive } from "../api/live/use-live";
 import { alarmNow, type Run } from "../api/runs";
-import { useLive } from "../api/use-live";
 import type { Graph } from "../graph/model";
 import { spanWords } from "../status/durations";
 import { endWords, runWord } from "../status/progress";

@@ -1,9 +1,9 @@
 /** What became of a Stop, in words, until it is proven. */
 import { CloseButton } from "@mantine/core";
 import { useState } from "react";
-import type { LiveNow, StopAsked } from "../api/live";
+import type { LiveNow, StopAsked } from "../api/live/live-socket";
+import { foreignGraphs, openRuns, useLive } from "../api/live/use-live";
 import { awaitsLook, type Run } from "../api/runs";
-import { foreignGraphs, openRuns, useLive } from "../api/use-live";
 import { clock, duration, useNow } from "../ui/times";
 import { RestButton } from "./rest-button";
 import style from "./stop-notice.module.css";

@@ -1,11 +1,11 @@
 /** A start: publishes what is on screen and sends exactly that to the runner, once. */
 import { notifications } from "@mantine/notifications";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
+import type { Script } from "../api/dry-runs";
 import { keys, publish, type Version, versionName } from "../api/graphs";
 import { leavesOpen, place, sentence } from "../api/http";
-import type { Script } from "../api/rehearsal";
+import { useLive } from "../api/live/use-live";
 import { type Started, type StartOrder, startRun } from "../api/runs";
-import { useLive } from "../api/use-live";
 import { newAid } from "../graph/ids";
 import { memberText } from "../graph/json-members";
 import { unsureStarts } from "./unsure-starts";

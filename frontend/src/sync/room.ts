@@ -2,7 +2,7 @@
 
 import type { Awareness } from "y-protocols/awareness";
 import type * as Y from "yjs";
-import { here } from "../api/place";
+import { here } from "../api/page-url";
 import type { Device, Shelf } from "./indexed-db";
 import type { Stranded } from "./replaced-history";
 

@@ -2,7 +2,7 @@
 
 import { Fragment, type ReactNode } from "react";
 import { Link } from "wouter";
-import { here } from "../api/place";
+import { here } from "../api/page-url";
 import style from "./top-bar.module.css";
 
 export interface Crumb {

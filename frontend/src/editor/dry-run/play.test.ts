@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import type { TraceEvent } from "../../api/rehearsal";
+import type { TraceEvent } from "../../api/dry-runs";
 import { mapsOf } from "../../graph/document-keys";
 import { addAction, connect, setEntry, setExit } from "../../graph/edit";
 import { readGraph } from "../../graph/read";

@@ -1,5 +1,5 @@
 /** What a person has decided in a dry-run, as the script that the simulator plays. Pure. */
-import type { Behaviour, Command, Script } from "../../api/rehearsal";
+import type { Behaviour, Command, Script } from "../../api/dry-runs";
 import type { Going } from "./play";
 
 export type Choice = "on_true" | "on_false" | "on_error";

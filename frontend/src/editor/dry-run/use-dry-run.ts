@@ -1,6 +1,6 @@
 /** The state of a dry-run: what is played, where in it one is, and what was decided. */
 import { useCallback, useEffect, useMemo, useState } from "react";
-import { useRehearsal } from "../../api/rehearsal";
+import { useRehearsal } from "../../api/dry-runs";
 import type { Graph, Key } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 import { endName } from "../bench";

@@ -2,7 +2,7 @@
 import { Button, Textarea, Tooltip } from "@mantine/core";
 import { IconCheck, IconMessageCircle, IconRotate2 } from "@tabler/icons-react";
 import { useState } from "react";
-import { usePerson } from "../../api/person";
+import { usePerson } from "../../api/use-person";
 import { beginThread, reply, resolve, type Thread, unsay } from "../../graph/edit/comments";
 import type { Key } from "../../graph/model";
 import { Empty } from "../../ui/empty";

@@ -1,7 +1,7 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { sessionEnd } from "./ended";
-import { Live } from "./live";
-import type { Run } from "./runs";
+import type { Run } from "../runs";
+import { sessionEnd } from "../session-end";
+import { Live } from "./live-socket";
 
 /** The browser's end of a socket whose other end is the test. */
 class Wire {

@@ -1,7 +1,7 @@
 /** Why no socket to the runner opens, found out by asking it, and the editor, over HTTP. */
 
-import { knowsUs } from "./http";
-import { pageUrl } from "./place";
+import { knowsUs } from "../http";
+import { pageUrl } from "../page-url";
 
 /**
  * `ended`: nobody is signed in any more. `strange`: asking again soon is of no use. `mute`: it answers,

@@ -1,10 +1,10 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
-import { newAid } from "../graph/ids";
-import { sessionEnd } from "./ended";
-import { isFinal, sentence } from "./http";
-import type { Robot } from "./robots";
-import { getRun, postStop, type Run } from "./runs";
-import { forbidden, type Unreached, unreached } from "./unreached";
+import { newAid } from "../../graph/ids";
+import { isFinal, sentence } from "../http";
+import type { Robot } from "../robots";
+import { getRun, postStop, type Run } from "../runs";
+import { sessionEnd } from "../session-end";
+import { forbidden, type Unreached, unreached } from "./unreachable-runner";
 
 export type LiveLink = "connecting" | "live" | "down";
 

@@ -9,11 +9,11 @@ import {
   useState,
   useSyncExternalStore,
 } from "react";
-import { useConfig } from "./graphs";
-import { sentence } from "./http";
-import { Live, type LiveNow } from "./live";
-import type { Held, Robot } from "./robots";
-import type { Run } from "./runs";
+import { useConfig } from "../graphs";
+import { sentence } from "../http";
+import type { Held, Robot } from "../robots";
+import type { Run } from "../runs";
+import { Live, type LiveNow } from "./live-socket";
 
 interface LiveHold {
   live: Live | null;
