@@ -1,11 +1,16 @@
 /** The menu of what was pressed, at the place where it was pressed. */
 import { Menu } from "@mantine/core";
 import { Fragment, useEffect, useRef } from "react";
-import { type Bench, selectedActions, selectedNotes, selectedRelations } from "./bench";
+import * as deeds from "../edit-actions/all";
+import { type Deed, isEnabled, labelOf } from "../edit-actions/edit-action";
+import {
+  type Bench,
+  selectedActions,
+  selectedNotes,
+  selectedRelations,
+} from "../edit-actions/editor-context";
+import { Shortcut } from "../edit-actions/shortcut-keys";
 import style from "./context-menu.module.css";
-import * as deeds from "./deeds/all";
-import { type Deed, isEnabled, labelOf } from "./deeds/deed";
-import { Shortcut } from "./shortcut";
 
 /** What can be done with the selection, in groups. */
 export function offered(bench: Bench): readonly (readonly Deed[])[] {

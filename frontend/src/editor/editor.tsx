@@ -7,6 +7,14 @@ import type { Script } from "../api/dry-runs";
 import { type Problems, useProblems } from "../api/graphs";
 import { actionCarrier } from "../canvas/action-drag";
 import { marksOf } from "../canvas/problem-marks";
+import {
+  type Bench,
+  BenchContext,
+  freePlace,
+  type Panel,
+  placeAction,
+} from "../edit-actions/editor-context";
+import { useShortcuts } from "../edit-actions/shortcuts";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import type { Progress } from "../status/progress";
@@ -14,8 +22,6 @@ import type { Link } from "../sync/room-connection";
 import { useCalmLink } from "../sync/use-room";
 import type { Crumb } from "../ui/top-bar";
 import { useIsPhone, useIsWide } from "../ui/use-screen-size";
-import { type Bench, BenchContext, freePlace, type Panel, placeAction } from "./bench";
-import { useShortcuts } from "./deeds/keys";
 import { Details } from "./details/details";
 import { scriptOf } from "./dry-run/script";
 import style from "./editor.module.css";

@@ -1,7 +1,7 @@
 /** How many problems the graph has, in words; opens their list. */
 import { IconAlertTriangle } from "@tabler/icons-react";
 import type { Problems } from "../api/graphs";
-import { useBench } from "./bench";
+import { useBench } from "../edit-actions/editor-context";
 import style from "./problem-word.module.css";
 
 export function ProblemWord({ problems }: { problems: Problems | undefined }) {

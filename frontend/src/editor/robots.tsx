@@ -1,8 +1,8 @@
 /** The robots of a graph: what each is called, its colour, and putting one in the light. */
 import { memo, useMemo } from "react";
 import { spotlight, useRobotInLight } from "../canvas/card-highlights";
+import { useBench } from "../edit-actions/editor-context";
 import { robotColor } from "../ui/name-colors";
-import { useBench } from "./bench";
 import style from "./robots.module.css";
 
 /** How many actions each robot has, by name; those for any robot last. */

@@ -7,10 +7,10 @@ import {
   IconEye,
   IconRefresh,
 } from "@tabler/icons-react";
+import { useBench } from "../edit-actions/editor-context";
 import type { Link, Why } from "../sync/room-connection";
 import { whyNot } from "../sync/unsaved-reasons";
 import { useLink, useRoom } from "../sync/use-room";
-import { useBench } from "./bench";
 import style from "./saved-word.module.css";
 
 const whys: Record<Why, string> = {

@@ -1,6 +1,7 @@
 /** What opens over the editor, one at a time: menus, the palette, dialogs of single deeds. */
+
+import type { Bench, Surface } from "../edit-actions/editor-context";
 import { ArrowDialog, RetargetDialog } from "./arrow-dialog";
-import type { Bench, Surface } from "./bench";
 import { ContextMenu } from "./context-menu";
 import { KeysSheet } from "./keys-sheet";
 import { Palette } from "./palette";

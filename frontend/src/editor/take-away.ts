@@ -2,7 +2,7 @@
 import { notifications } from "@mantine/notifications";
 import { here } from "../api/page-url";
 import { pictureOf } from "../canvas/svg-picture";
-import type { Bench, Format } from "./bench";
+import type { Bench, Format } from "../edit-actions/editor-context";
 
 const LARGEST = 8_000; // px of a PNG's longer side; browsers refuse much more
 

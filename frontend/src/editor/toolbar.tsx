@@ -2,8 +2,6 @@
 import { ActionIcon, Menu, Tooltip } from "@mantine/core";
 import { IconDots } from "@tabler/icons-react";
 import { Fragment, memo } from "react";
-import { useSteady } from "../ui/use-stable-callback";
-import { useBench } from "./bench";
 import {
   add,
   DEEDS,
@@ -19,9 +17,11 @@ import {
   undo,
   zoomIn,
   zoomOut,
-} from "./deeds/all";
-import { type Deed, type Group, isEnabled, labelOf } from "./deeds/deed";
-import { Shortcut } from "./shortcut";
+} from "../edit-actions/all";
+import { type Deed, type Group, isEnabled, labelOf } from "../edit-actions/edit-action";
+import { useBench } from "../edit-actions/editor-context";
+import { Shortcut } from "../edit-actions/shortcut-keys";
+import { useSteady } from "../ui/use-stable-callback";
 import style from "./toolbar.module.css";
 
 function Tool({ deed, pressed }: { deed: Deed; pressed?: boolean }) {

@@ -4,7 +4,6 @@ import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/use-person";
 import { CARD } from "../canvas/geometry/arrange";
-import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../sync/use-room";
 import {
   type AddRequest,
   type Bench,
@@ -14,7 +13,8 @@ import {
   type Surface,
   type Tool,
   type View,
-} from "./bench";
+} from "../edit-actions/editor-context";
+import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../sync/use-room";
 import { useDryRun } from "./dry-run/use-dry-run";
 import { takeAway } from "./take-away";
 

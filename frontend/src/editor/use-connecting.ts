@@ -2,10 +2,10 @@
 import type { Connection, FinalConnectionState, OnConnectEnd } from "@xyflow/react";
 import { type MouseEvent, useCallback, useEffect, useRef, useState } from "react";
 import type { Arrow } from "../canvas/elements";
+import type { Bench } from "../edit-actions/editor-context";
 import { connect, moveRelation, retarget } from "../graph/edit";
 import type { Key, Position, Precondition } from "../graph/model";
 import { ENTRY } from "../graph/model";
-import type { Bench } from "./bench";
 import { nodeAt, pointOf } from "./hit";
 
 export interface Pending {

@@ -2,9 +2,9 @@
 import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
 import { useSearch } from "wouter";
-import type { Bench } from "./bench";
-import { shownKeys } from "./deeds/look";
-import { present, targetOf } from "./deep-link";
+import type { Bench } from "../edit-actions/editor-context";
+import { present, targetOf } from "../edit-actions/graph-links";
+import { shownKeys } from "../edit-actions/view";
 
 const SETTLED = 160; // ms after which the canvas has measured its cards and shown the whole
 

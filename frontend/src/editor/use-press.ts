@@ -1,7 +1,7 @@
 /** Menus where one presses: the right button of a mouse, or a finger that rests. */
 import { type PointerEvent, useEffect, useMemo, useRef } from "react";
+import type { Bench } from "../edit-actions/editor-context";
 import type { Position } from "../graph/model";
-import type { Bench } from "./bench";
 import { arrowAt, nodeAt } from "./hit";
 
 const REST = 500; // ms

@@ -13,9 +13,9 @@ import {
   readable,
   whole,
 } from "../canvas/geometry/viewport";
+import type { View } from "../edit-actions/editor-context";
 import { ENTRY, type Key, type Position } from "../graph/model";
 import type { Progress } from "../status/progress";
-import type { View } from "./bench";
 
 interface Given {
   flow: ReactFlowInstance<CanvasNode, Arrow>;

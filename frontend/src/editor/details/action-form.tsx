@@ -1,11 +1,11 @@
 /** The properties of an action. */
 import { Autocomplete, Button, Group } from "@mantine/core";
 import { IconGhost2 } from "@tabler/icons-react";
+import { useBench } from "../../edit-actions/editor-context";
 import { adoptGhost, rename, setField } from "../../graph/edit";
 import type { Action, Graph } from "../../graph/model";
 import { DraftInput } from "../../ui/draft-input";
 import { robotColor } from "../../ui/name-colors";
-import { useBench } from "../bench";
 import { FieldOf } from "../field-of";
 import { Arrows } from "./arrows";
 import style from "./details.module.css";

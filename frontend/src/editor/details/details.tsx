@@ -2,11 +2,17 @@
 import { Tabs } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";
 import type { Problem, Problems } from "../../api/graphs";
+import {
+  type Bench,
+  type Panel,
+  selectedActions,
+  selectedRelations,
+  useBench,
+} from "../../edit-actions/editor-context";
 import { relationId } from "../../graph/document-keys";
 import type { Thread } from "../../graph/edit/comments";
 import { notesOf } from "../../graph/edit/notes";
 import { EXIT } from "../../graph/model";
-import { type Bench, type Panel, selectedActions, selectedRelations, useBench } from "../bench";
 import { FieldOf } from "../field-of";
 import { Comments } from "../talk/comments";
 import { ActionForm } from "./action-form";

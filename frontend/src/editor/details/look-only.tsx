@@ -1,7 +1,7 @@
 /** For people who may only look: what changes the graph is off, what shows it is not. */
 import { MantineThemeProvider } from "@mantine/core";
 import type { ReactNode } from "react";
-import { useBench } from "../bench";
+import { useBench } from "../../edit-actions/editor-context";
 import style from "./details.module.css";
 
 const OFF = { defaultProps: { disabled: true } };

@@ -2,10 +2,10 @@
 import { Button } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { noteColor } from "../../canvas/note-colors";
+import { useBench } from "../../edit-actions/editor-context";
 import { removeNotes } from "../../graph/edit";
 import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../../graph/edit/notes";
 import { DraftInput } from "../../ui/draft-input";
-import { useBench } from "../bench";
 import { FieldOf } from "../field-of";
 import style from "./details.module.css";
 

@@ -2,12 +2,12 @@
 import { ActionIcon, SegmentedControl, Select, Tooltip } from "@mantine/core";
 import { IconAdjustments, IconBackspace, IconLock } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";
+import { useBench } from "../../edit-actions/editor-context";
 import type { Side } from "../../graph/document-keys";
 import { setParameter } from "../../graph/edit";
 import type { Key, Parameter } from "../../graph/model";
 import { pathWords } from "../../graph/value-text";
 import { DraftInput } from "../../ui/draft-input";
-import { useBench } from "../bench";
 import style from "./details.module.css";
 import { ParameterSettings } from "./parameter-settings";
 import { complaint, type Field, fieldOf, shown, typed, withValue } from "./pvf";

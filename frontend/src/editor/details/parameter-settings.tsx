@@ -1,12 +1,12 @@
 /** What a parameter is, apart from its value: name, type, allowed values, required, locked. */
 import { Autocomplete, Button, Group, Switch } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
+import { useBench } from "../../edit-actions/editor-context";
 import type { Side } from "../../graph/document-keys";
 import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
 import type { Key, Parameter } from "../../graph/model";
 import { pathWords } from "../../graph/value-text";
 import { DraftInput } from "../../ui/draft-input";
-import { useBench } from "../bench";
 import style from "./details.module.css";
 import { pathFrom, taken } from "./parameter-path";
 import { allowedLines, fieldOf, TYPES, withAllowed, withLock, withRequired, withType } from "./pvf";

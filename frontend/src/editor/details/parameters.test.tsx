@@ -3,11 +3,11 @@ import { MantineProvider } from "@mantine/core";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { type Bench, BenchContext } from "../../edit-actions/editor-context";
 import { addAction } from "../../graph/edit";
 import { graphOf } from "../../graph/edit/document-writes";
 import { RoomProvider, useGraph, useRoom } from "../../sync/use-room";
 import { FakeServer } from "../../testing/fake-server";
-import { type Bench, BenchContext } from "../bench";
 import { Parameters } from "./parameters";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);

@@ -2,11 +2,11 @@
 import { Button, Group, Select, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
+import { useBench } from "../../edit-actions/editor-context";
 import type { Side } from "../../graph/document-keys";
 import { addParameter, together } from "../../graph/edit";
 import type { Action } from "../../graph/model";
 import { pathWords } from "../../graph/value-text";
-import { useBench } from "../bench";
 import { FieldOf } from "../field-of";
 import style from "./details.module.css";
 import { ParameterField } from "./parameter-field";

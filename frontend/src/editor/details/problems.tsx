@@ -4,6 +4,9 @@ import { notifications } from "@mantine/notifications";
 import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
 import type { Problem, Problems } from "../../api/graphs";
 import { bySeverity, placeOf } from "../../canvas/problem-marks";
+import { copyLinkTo } from "../../edit-actions/clipboard";
+import { type Bench, endName, useBench } from "../../edit-actions/editor-context";
+import { linkToProblem } from "../../edit-actions/graph-links";
 import { relationId } from "../../graph/document-keys";
 import {
   ABOUT,
@@ -15,9 +18,6 @@ import {
   safeOnes,
 } from "../../graph/edit/fixes";
 import type { Graph } from "../../graph/model";
-import { type Bench, endName, useBench } from "../bench";
-import { copyLinkTo } from "../clipboard";
-import { linkToProblem } from "../deep-link";
 import style from "./problems.module.css";
 
 /** Where a problem is, as a person would say it; empty for the graph as a whole. */

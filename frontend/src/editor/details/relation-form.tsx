@@ -2,11 +2,11 @@
 import { Button, Select, Switch } from "@mantine/core";
 import { IconArrowDown, IconTrash } from "@tabler/icons-react";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
+import { endName, useBench } from "../../edit-actions/editor-context";
 import { relationId } from "../../graph/document-keys";
 import { removeRelation, setRequired, setResponse } from "../../graph/edit";
 import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../../graph/model";
 import { ignoredWords, relationWords } from "../../graph/relation-words";
-import { endName, useBench } from "../bench";
 import { FieldOf } from "../field-of";
 import style from "./details.module.css";
 import { Remaps } from "./remaps";

@@ -2,10 +2,10 @@
 import { ActionIcon, Button, Select } from "@mantine/core";
 import { IconArrowDown, IconX } from "@tabler/icons-react";
 import { useState } from "react";
+import { endName, useBench } from "../../edit-actions/editor-context";
 import { relationId } from "../../graph/document-keys";
 import { setRemap } from "../../graph/edit";
 import type { Relation } from "../../graph/model";
-import { endName, useBench } from "../bench";
 import style from "./details.module.css";
 import { type Choice, misfit, passed, sources, targets } from "./remap";
 

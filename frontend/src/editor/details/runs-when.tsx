@@ -1,7 +1,8 @@
 /** When something runs, as sentences: what the engine would really do. */
+
+import { useBench } from "../../edit-actions/editor-context";
 import type { Key } from "../../graph/model";
 import { startWords } from "../../graph/relation-words";
-import { useBench } from "../bench";
 import style from "./details.module.css";
 
 export function RunsWhen({ of, title }: { of: Key; title: string }) {

@@ -12,12 +12,12 @@ import {
 import type { ReactNode } from "react";
 import { sentence } from "../../api/http";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
+import * as deeds from "../../edit-actions/dry-run-actions";
+import type { Deed } from "../../edit-actions/edit-action";
+import { labelOf } from "../../edit-actions/edit-action";
+import { type Bench, endName, selectedActions } from "../../edit-actions/editor-context";
+import { Shortcut } from "../../edit-actions/shortcut-keys";
 import { fullName } from "../../graph/model";
-import { type Bench, endName, selectedActions } from "../bench";
-import type { Deed } from "../deeds/deed";
-import { labelOf } from "../deeds/deed";
-import * as deeds from "../deeds/dry-run";
-import { Shortcut } from "../shortcut";
 import style from "./dry-run-bar.module.css";
 import type { Going } from "./play";
 import { type FaultKind, faultWords } from "./script";

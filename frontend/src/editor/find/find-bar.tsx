@@ -10,8 +10,8 @@ import {
 } from "@tabler/icons-react";
 import { useDeferredValue, useEffect, useId, useMemo, useRef, useState } from "react";
 import type { Problem } from "../../api/graphs";
-import { useBench } from "../bench";
-import { keysOf } from "../deeds/deed";
+import { keysOf } from "../../edit-actions/edit-action";
+import { useBench } from "../../edit-actions/editor-context";
 import { find, type Hit } from "./find";
 import style from "./find-bar.module.css";
 

@@ -1,5 +1,6 @@
 /** What can be done to a row of the outline, with its key. */
 
+import { type Bench, endName } from "../../edit-actions/editor-context";
 import { relationId } from "../../graph/document-keys";
 import {
   removeActions,
@@ -9,7 +10,6 @@ import {
   swapOrder,
 } from "../../graph/edit";
 import { ENTRY, type Key, spoken } from "../../graph/model";
-import { type Bench, endName } from "../bench";
 import type { Change } from "./row-edit";
 import type { Row } from "./rows";
 

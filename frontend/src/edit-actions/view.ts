@@ -12,9 +12,9 @@ import {
   IconZoomIn,
   IconZoomOut,
 } from "@tabler/icons-react";
-import { ENTRY, type Key } from "../../graph/model";
-import { type Bench, selectedRelations } from "../bench";
-import type { Deed } from "./deed";
+import { ENTRY, type Key } from "../graph/model";
+import type { Deed } from "./edit-action";
+import { type Bench, selectedRelations } from "./editor-context";
 
 const always = () => true;
 const look = { group: "Look", changes: false, enabled: always } as const;

@@ -15,11 +15,11 @@ import {
   IconLayoutDistributeVertical,
   IconSitemap,
 } from "@tabler/icons-react";
-import { type Align, align, type Block, distribute, tidied } from "../../canvas/geometry/align";
-import { arrange, CARD } from "../../canvas/geometry/arrange";
-import { moveActions } from "../../graph/edit";
-import { type Bench, GRID, putPlaces, selectedActions, selectedNotes } from "../bench";
-import type { Deed } from "./deed";
+import { type Align, align, type Block, distribute, tidied } from "../canvas/geometry/align";
+import { arrange, CARD } from "../canvas/geometry/arrange";
+import { moveActions } from "../graph/edit";
+import type { Deed } from "./edit-action";
+import { type Bench, GRID, putPlaces, selectedActions, selectedNotes } from "./editor-context";
 
 /** Everything chosen that stands somewhere: actions, ends, notes. */
 function blocks(bench: Bench): Block[] {

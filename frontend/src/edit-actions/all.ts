@@ -1,19 +1,19 @@
 /** Every deed there is, in the order in which menus and help list them. */
 import { ALIGN, DISTRIBUTE, NUDGE, snap, tidy, tidySelection } from "./arrange";
-import type { Deed } from "./deed";
 import * as draw from "./draw";
-import { DRY_RUN } from "./dry-run";
-import * as graph from "./graph";
-import * as look from "./look";
+import { DRY_RUN } from "./dry-run-actions";
+import type { Deed } from "./edit-action";
 import * as notes from "./notes";
 import { PANELS } from "./panels";
+import * as graph from "./share";
+import * as look from "./view";
 
 export * from "./arrange";
 export * from "./draw";
-export { dryRun } from "./dry-run";
-export * from "./graph";
-export * from "./look";
+export { dryRun } from "./dry-run-actions";
 export * from "./notes";
+export * from "./share";
+export * from "./view";
 
 export const DEEDS: readonly Deed[] = [
   draw.add,

@@ -9,9 +9,9 @@ import {
   IconPlayerTrackPrev,
   IconX,
 } from "@tabler/icons-react";
-import type { Bench } from "../bench";
-import type { Choice } from "../dry-run/script";
-import type { Deed } from "./deed";
+import type { Choice } from "../editor/dry-run/script";
+import type { Deed } from "./edit-action";
+import type { Bench } from "./editor-context";
 
 const part = { group: "Dry-run", changes: false, also: "simulate rehearse play test" } as const;
 const playing = (bench: Bench) => bench.dryRun !== null && bench.dryRun.moments.length > 0;

@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
-import { EMPTY_GRAPH } from "../../graph/model";
-import type { Bench } from "../bench";
+import { EMPTY_GRAPH } from "../graph/model";
 import { DEEDS } from "./all";
-import { deedFor, isEnabled, isPressed, keysOf, labelOf } from "./deed";
+import { deedFor, isEnabled, isPressed, keysOf, labelOf } from "./edit-action";
+import type { Bench } from "./editor-context";
 
 const press = (
   key: string,

@@ -1,7 +1,7 @@
 /** A deed's first shortcut, as it is printed on keys. */
 import { Kbd } from "@mantine/core";
-import { type Deed, keysOf } from "./deeds/deed";
-import style from "./toolbar.module.css";
+import style from "../editor/toolbar.module.css";
+import { type Deed, keysOf } from "./edit-action";
 
 export function Keys({ shortcut }: { shortcut: string }) {
   return (

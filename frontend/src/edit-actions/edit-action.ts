@@ -1,6 +1,6 @@
 /** A deed: something a person can do, as a value. Toolbar, menus, palette, keys and help are made of these. */
 import type { Icon } from "@tabler/icons-react";
-import type { Bench } from "../bench";
+import type { Bench } from "./editor-context";
 
 /** Under which heading help and menus list it. */
 export type Group = "Draw" | "Arrange" | "Look" | "Graph" | "Dry-run";

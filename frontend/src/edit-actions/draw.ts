@@ -16,7 +16,7 @@ import {
   IconSelectAll,
   IconTrash,
 } from "@tabler/icons-react";
-import { relationId } from "../../graph/document-keys";
+import { relationId } from "../graph/document-keys";
 import {
   removeActions,
   removeNotes,
@@ -26,13 +26,13 @@ import {
   together,
   unsetEntry,
   unsetExit,
-} from "../../graph/edit";
-import { clipOf, paste } from "../../graph/edit/clip";
-import { type Action, ENTRY, EXIT } from "../../graph/model";
-import { copyText } from "../../ui/copy-text";
-import { type Bench, selectedActions, selectedNotes, selectedRelations } from "../bench";
-import { copied, hold, pasteText, readText } from "../clipboard";
-import type { Deed } from "./deed";
+} from "../graph/edit";
+import { clipOf, paste } from "../graph/edit/clip";
+import { type Action, ENTRY, EXIT } from "../graph/model";
+import { copyText } from "../ui/copy-text";
+import { copied, hold, pasteText, readText } from "./clipboard";
+import type { Deed } from "./edit-action";
+import { type Bench, selectedActions, selectedNotes, selectedRelations } from "./editor-context";
 
 const always = () => true;
 const anyAction = (bench: Bench) => bench.graph.actions.length > 0;

@@ -6,11 +6,11 @@ import {
   IconPencil,
   IconRowInsertBottom,
 } from "@tabler/icons-react";
-import { CARD } from "../../canvas/geometry/arrange";
-import { relationId } from "../../graph/document-keys";
-import { writeNote } from "../../graph/edit/notes";
-import { type Bench, selectedNotes, selectedRelations } from "../bench";
-import type { Deed } from "./deed";
+import { CARD } from "../canvas/geometry/arrange";
+import { relationId } from "../graph/document-keys";
+import { writeNote } from "../graph/edit/notes";
+import type { Deed } from "./edit-action";
+import { type Bench, selectedNotes, selectedRelations } from "./editor-context";
 
 const SIZE = [200, 84] as const; // px of a new note
 const AIR = 28; // px between a frame and what lies in it

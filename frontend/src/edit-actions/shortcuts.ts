@@ -1,10 +1,10 @@
 /** Shortcuts of deeds, where nobody is typing; and the clipboard's own events. */
 import { useLocalStorage } from "@mantine/hooks";
 import { useEffect, useRef } from "react";
-import type { Bench } from "../bench";
-import { copied, hold, pasteText } from "../clipboard";
 import { DEEDS } from "./all";
-import { deedFor, isEnabled } from "./deed";
+import { copied, hold, pasteText } from "./clipboard";
+import { deedFor, isEnabled } from "./edit-action";
+import type { Bench } from "./editor-context";
 
 /** Whether single letters are shortcuts: speech input types letters by itself. */
 export function useSingleKeys() {

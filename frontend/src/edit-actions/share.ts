@@ -1,9 +1,9 @@
 /** Deeds about the graph as a whole: take it elsewhere, point others to it. */
 
 import { IconDownload, IconLink, IconPhoto, IconVectorTriangle } from "@tabler/icons-react";
-import { copyLinkTo } from "../clipboard";
-import { linkTo } from "../deep-link";
-import type { Deed } from "./deed";
+import { copyLinkTo } from "./clipboard";
+import type { Deed } from "./edit-action";
+import { linkTo } from "./graph-links";
 
 const graph = { group: "Graph", changes: false, enabled: () => true } as const;
 

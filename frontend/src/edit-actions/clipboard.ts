@@ -13,7 +13,7 @@ import { type Clip, clipOf, isEmpty, paste } from "../graph/edit/clip";
 import { readGraph } from "../graph/read";
 import { umrfText } from "../graph/umrf-text";
 import { copyText } from "../ui/copy-text";
-import { type Bench, selectedActions } from "./bench";
+import { type Bench, selectedActions } from "./editor-context";
 
 export interface Held {
   /** What the system's clipboard got. */

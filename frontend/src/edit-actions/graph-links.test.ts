@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { linkTo, linkToProblem, targetOf } from "./deep-link";
+import { linkTo, linkToProblem, targetOf } from "./graph-links";
 
 const origin = "https://robots.example";
 

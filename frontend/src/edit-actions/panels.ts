@@ -1,6 +1,6 @@
 /** Deeds that look for something in the graph, or at another side of it. */
 import { IconListTree, IconMessageCircle, IconSearch } from "@tabler/icons-react";
-import type { Deed } from "./deed";
+import type { Deed } from "./edit-action";
 
 const look = { group: "Look", changes: false, enabled: () => true } as const;
 
