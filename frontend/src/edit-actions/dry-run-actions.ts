@@ -9,7 +9,7 @@ import {
   IconPlayerTrackPrev,
   IconX,
 } from "@tabler/icons-react";
-import type { Choice } from "../editor/dry-run/script";
+import type { Choice } from "../dry-run/script";
 import type { Deed } from "./edit-action";
 import type { Bench } from "./editor-context";
 

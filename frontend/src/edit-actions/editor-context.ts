@@ -2,7 +2,7 @@
 import { createContext, use } from "react";
 import type * as Y from "yjs";
 import { CARD, unplaced } from "../canvas/geometry/arrange";
-import type { DryRun } from "../editor/dry-run/use-dry-run";
+import type { DryRun } from "../dry-run/use-dry-run";
 import { relationId } from "../graph/document-keys";
 import { addAction, moveActions, type NewAction, together } from "../graph/edit";
 import { notesOf, placeNotes, withContents } from "../graph/edit/notes";

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
+import { onePerId } from "../people/people";
 import type { Person } from "../sync/presence/presence";
-import { onePerId } from "./people";
 import { candidates } from "./quick-add";
 import { dragged, selectionAfter } from "./use-canvas";
 

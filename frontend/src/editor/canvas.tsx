@@ -25,12 +25,12 @@ import { type Bench, endName, GRID, placeAction } from "../edit-actions/editor-c
 import { insertInto, removeNotes, together } from "../graph/edit";
 import { changeNote } from "../graph/edit/notes";
 import type { Position } from "../graph/model";
+import { AtCards, Cursors } from "../people/people";
 import { useRoom } from "../sync/use-room";
 import { robotColor } from "../ui/name-colors";
 import { useSteady } from "../ui/use-stable-callback";
 import style from "./canvas.module.css";
 import { arrowAt } from "./hit";
-import { AtCards, Cursors } from "./people";
 import type { useCanvas } from "./use-canvas";
 import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
 import { usePinch, ZOOM } from "./use-pinch";

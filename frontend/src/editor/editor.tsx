@@ -7,6 +7,8 @@ import type { Script } from "../api/dry-runs";
 import { type Problems, useProblems } from "../api/graphs";
 import { actionCarrier } from "../canvas/action-drag";
 import { marksOf } from "../canvas/problem-marks";
+import { useTalkOnCards, useThreads } from "../comments/use-threads";
+import { scriptOf } from "../dry-run/script";
 import {
   type Bench,
   BenchContext,
@@ -15,26 +17,24 @@ import {
   placeAction,
 } from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/shortcuts";
+import { FindBar } from "../find/find-bar";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
+import { Outline } from "../outline/outline";
+import { People } from "../people/people";
 import type { Progress } from "../status/progress";
 import type { Link } from "../sync/room-connection";
 import { useCalmLink } from "../sync/use-room";
 import type { Crumb } from "../ui/top-bar";
 import { useIsPhone, useIsWide } from "../ui/use-screen-size";
 import { Details } from "./details/details";
-import { scriptOf } from "./dry-run/script";
 import style from "./editor.module.css";
-import { FindBar } from "./find/find-bar";
 import { Notices } from "./notices";
-import { Outline } from "./outline/outline";
-import { People } from "./people";
 import { ProblemWord } from "./problem-word";
 import { QuickAdd } from "./quick-add";
 import { SavedWord } from "./saved-word";
 import { Stage } from "./stage";
 import { Surfaces } from "./surfaces";
-import { useTalkOnCards, useThreads } from "./talk/use-threads";
 import { useEditor } from "./use-bench";
 import { useRemoteNews, useRunNews } from "./use-news";
 

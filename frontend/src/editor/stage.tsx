@@ -6,19 +6,19 @@ import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import type { Marks } from "../canvas/problem-marks";
 import { type Bench, useBench } from "../edit-actions/editor-context";
 import type { Key, Position } from "../graph/model";
+import { Robots } from "../outline/robot-filter";
+import { FollowFrame } from "../people/people";
+import { useFollowedView } from "../people/use-followed-view";
 import type { Progress } from "../status/progress";
 import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
 import { Canvas } from "./canvas";
 import { DryRunBar } from "./dry-run/dry-run-bar";
-import { FollowFrame } from "./people";
-import { Robots } from "./robots";
 import style from "./stage.module.css";
 import { Toolbar } from "./toolbar";
 import type { EditorState } from "./use-bench";
 import { useCanvas } from "./use-canvas";
 import { useDeepLink } from "./use-deep-link";
-import { useFollowedView } from "./use-following";
 import { useView } from "./use-view";
 
 interface Props {

@@ -4,6 +4,7 @@ import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/use-person";
 import { CARD } from "../canvas/geometry/arrange";
+import { useDryRun } from "../dry-run/use-dry-run";
 import {
   type AddRequest,
   type Bench,
@@ -15,7 +16,6 @@ import {
   type View,
 } from "../edit-actions/editor-context";
 import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../sync/use-room";
-import { useDryRun } from "./dry-run/use-dry-run";
 import { takeAway } from "./take-away";
 
 const NONE: ReadonlySet<string> = new Set();

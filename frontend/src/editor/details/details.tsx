@@ -2,6 +2,7 @@
 import { Tabs } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";
 import type { Problem, Problems } from "../../api/graphs";
+import { Comments } from "../../comments/comments";
 import {
   type Bench,
   type Panel,
@@ -14,7 +15,6 @@ import type { Thread } from "../../graph/edit/comments";
 import { notesOf } from "../../graph/edit/notes";
 import { EXIT } from "../../graph/model";
 import { FieldOf } from "../field-of";
-import { Comments } from "../talk/comments";
 import { ActionForm } from "./action-form";
 import style from "./details.module.css";
 import { GraphForm } from "./graph-form";

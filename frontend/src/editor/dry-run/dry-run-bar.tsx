@@ -12,6 +12,9 @@ import {
 import type { ReactNode } from "react";
 import { sentence } from "../../api/http";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
+import type { Going } from "../../dry-run/playback";
+import { type FaultKind, faultWords } from "../../dry-run/script";
+import { type DryRun, SPEEDS } from "../../dry-run/use-dry-run";
 import * as deeds from "../../edit-actions/dry-run-actions";
 import type { Deed } from "../../edit-actions/edit-action";
 import { labelOf } from "../../edit-actions/edit-action";
@@ -19,9 +22,6 @@ import { type Bench, endName, selectedActions } from "../../edit-actions/editor-
 import { Shortcut } from "../../edit-actions/shortcut-keys";
 import { fullName } from "../../graph/model";
 import style from "./dry-run-bar.module.css";
-import type { Going } from "./play";
-import { type FaultKind, faultWords } from "./script";
-import { type DryRun, SPEEDS } from "./use-dry-run";
 
 const CHOICES = ["on_true", "on_false", "on_error"] as const;
 

@@ -1,9 +1,9 @@
 /** Finding actions and arrows of a graph by anything that they say. Pure. */
-import type { Problem } from "../../api/graphs";
-import { placeOf } from "../../canvas/problem-marks";
-import { relationId } from "../../graph/document-keys";
-import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS } from "../../graph/model";
-import { pathWords, valueText } from "../../graph/value-text";
+import type { Problem } from "../api/graphs";
+import { placeOf } from "../canvas/problem-marks";
+import { relationId } from "../graph/document-keys";
+import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS } from "../graph/model";
+import { pathWords, valueText } from "../graph/value-text";
 
 export interface Hit {
   /** Key of the action, or id of the relation. */

@@ -2,14 +2,14 @@
 import { Button, Textarea, Tooltip } from "@mantine/core";
 import { IconCheck, IconMessageCircle, IconRotate2 } from "@tabler/icons-react";
 import { useState } from "react";
-import { usePerson } from "../../api/use-person";
-import { keysOf } from "../../edit-actions/edit-action";
-import { endName, selectedActions, useBench } from "../../edit-actions/editor-context";
-import { beginThread, reply, resolve, type Thread, unsay } from "../../graph/edit/comments";
-import type { Key } from "../../graph/model";
-import { Empty } from "../../ui/empty";
-import { initials, personColor } from "../../ui/name-colors";
-import { ago, useNow } from "../../ui/times";
+import { usePerson } from "../api/use-person";
+import { keysOf } from "../edit-actions/edit-action";
+import { endName, selectedActions, useBench } from "../edit-actions/editor-context";
+import { beginThread, reply, resolve, type Thread, unsay } from "../graph/edit/comments";
+import type { Key } from "../graph/model";
+import { Empty } from "../ui/empty";
+import { initials, personColor } from "../ui/name-colors";
+import { ago, useNow } from "../ui/times";
 import style from "./comments.module.css";
 
 interface WriteProps {

@@ -1,11 +1,11 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { mapsOf } from "../../graph/document-keys";
-import { addAction, connect, setEntry, setExit, setResponse } from "../../graph/edit";
-import { writeNote } from "../../graph/edit/notes";
-import { type Graph, PRECONDITIONS } from "../../graph/model";
-import { readGraph } from "../../graph/read";
+import { mapsOf } from "../graph/document-keys";
+import { addAction, connect, setEntry, setExit, setResponse } from "../graph/edit";
+import { writeNote } from "../graph/edit/notes";
+import { type Graph, PRECONDITIONS } from "../graph/model";
+import { readGraph } from "../graph/read";
 import { inOrder, type Row, rowsOf } from "./rows";
 
 const read = (doc: Y.Doc) => readGraph(mapsOf(doc));

@@ -1,10 +1,10 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import type { TraceEvent } from "../../api/dry-runs";
-import { mapsOf } from "../../graph/document-keys";
-import { addAction, connect, setEntry, setExit } from "../../graph/edit";
-import { readGraph } from "../../graph/read";
-import { momentsOf, sightingAt, wordsOf } from "./play";
+import type { TraceEvent } from "../api/dry-runs";
+import { mapsOf } from "../graph/document-keys";
+import { addAction, connect, setEntry, setExit } from "../graph/edit";
+import { readGraph } from "../graph/read";
+import { momentsOf, sightingAt, wordsOf } from "./playback";
 import { commandsOf, decide, NOTHING_DECIDED, scriptOf } from "./script";
 
 const doc = new Y.Doc();

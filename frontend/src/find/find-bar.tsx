@@ -9,9 +9,9 @@ import {
   IconX,
 } from "@tabler/icons-react";
 import { useDeferredValue, useEffect, useId, useMemo, useRef, useState } from "react";
-import type { Problem } from "../../api/graphs";
-import { keysOf } from "../../edit-actions/edit-action";
-import { useBench } from "../../edit-actions/editor-context";
+import type { Problem } from "../api/graphs";
+import { keysOf } from "../edit-actions/edit-action";
+import { useBench } from "../edit-actions/editor-context";
 import { find, type Hit } from "./find";
 import style from "./find-bar.module.css";
 

@@ -1,9 +1,9 @@
 /** The threads of the open graph, kept in step with the document. */
 import { useEffect, useMemo, useRef, useSyncExternalStore } from "react";
-import { spotlight } from "../../canvas/card-highlights";
-import { rootOf } from "../../graph/document-keys";
-import { openTalk, readThreads, type Thread } from "../../graph/edit/comments";
-import { useRoom } from "../../sync/use-room";
+import { spotlight } from "../canvas/card-highlights";
+import { rootOf } from "../graph/document-keys";
+import { openTalk, readThreads, type Thread } from "../graph/edit/comments";
+import { useRoom } from "../sync/use-room";
 
 const NONE: readonly Thread[] = [];
 

@@ -3,7 +3,7 @@ import { memo, useMemo } from "react";
 import { spotlight, useRobotInLight } from "../canvas/card-highlights";
 import { useBench } from "../edit-actions/editor-context";
 import { robotColor } from "../ui/name-colors";
-import style from "./robots.module.css";
+import style from "./robot-filter.module.css";
 
 /** How many actions each robot has, by name; those for any robot last. */
 export function robotsOf(actors: readonly string[]): [name: string, actions: number][] {

@@ -9,17 +9,17 @@ import {
   IconPlayerPlay,
 } from "@tabler/icons-react";
 import { memo, useId, useState } from "react";
-import { useTalk } from "../../canvas/card-highlights";
-import { noteColor } from "../../canvas/note-colors";
-import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
-import type { Note } from "../../graph/edit/notes";
-import { cardLines, lineText } from "../../graph/value-text";
-import { moreOf } from "../../status/durations";
-import type { Progress } from "../../status/progress";
-import { StateWord } from "../../status/state-label";
-import { robotColor } from "../../ui/name-colors";
+import { useTalk } from "../canvas/card-highlights";
+import { noteColor } from "../canvas/note-colors";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
+import type { Note } from "../graph/edit/notes";
+import { cardLines, lineText } from "../graph/value-text";
+import { moreOf } from "../status/durations";
+import type { Progress } from "../status/progress";
+import { StateWord } from "../status/state-label";
+import { robotColor } from "../ui/name-colors";
 import style from "./outline.module.css";
-import { deedsOf, type RowDeed } from "./row-deeds";
+import { deedsOf, type RowDeed } from "./row-actions";
 import { type Change, RowEdit } from "./row-edit";
 import type { Row } from "./rows";
 

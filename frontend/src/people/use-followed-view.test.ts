@@ -1,6 +1,6 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { lookingAt, viewOf } from "./use-following";
+import { lookingAt, viewOf } from "./use-followed-view";
 
 const size = fc.record({
   width: fc.integer({ min: 200, max: 3000 }),

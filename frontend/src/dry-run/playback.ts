@@ -1,8 +1,8 @@
 /** A trace as something to play: moments, what is seen at each, and what it says in words. Pure. */
 
-import type { TraceEvent } from "../../api/dry-runs";
-import { fullName, type Graph, type Key } from "../../graph/model";
-import type { Progress, Tone } from "../../status/progress";
+import type { TraceEvent } from "../api/dry-runs";
+import { fullName, type Graph, type Key } from "../graph/model";
+import type { Progress, Tone } from "../status/progress";
 
 /** All that happens at one time. */
 export interface Moment {

@@ -1,6 +1,6 @@
 /** The graph as rows of an outline: actions, their outcomes, and what follows each. Pure. */
-import { relationId } from "../../graph/document-keys";
-import { type Note, notesOf } from "../../graph/edit/notes";
+import { relationId } from "../graph/document-keys";
+import { type Note, notesOf } from "../graph/edit/notes";
 import {
   type Action,
   ENTRY,
@@ -11,7 +11,7 @@ import {
   type Precondition,
   type Relation,
   type Response,
-} from "../../graph/model";
+} from "../graph/model";
 
 interface Place {
   readonly id: string;

@@ -1,6 +1,6 @@
 /** What a person has decided in a dry-run, as the script that the simulator plays. Pure. */
-import type { Behaviour, Command, Script } from "../../api/dry-runs";
-import type { Going } from "./play";
+import type { Behaviour, Command, Script } from "../api/dry-runs";
+import type { Going } from "./playback";
 
 export type Choice = "on_true" | "on_false" | "on_error";
 export type FaultKind = "error" | "never" | "exception" | "deaf" | "stop";

@@ -7,17 +7,17 @@
 import { Button, Kbd } from "@mantine/core";
 import { IconListTree, IconPlus } from "@tabler/icons-react";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
-import { useRobotInLight } from "../../canvas/card-highlights";
-import { useBench } from "../../edit-actions/editor-context";
-import { ENTRY, type Key } from "../../graph/model";
-import type { Progress } from "../../status/progress";
-import { announcer } from "../../ui/announcer";
-import { Empty } from "../../ui/empty";
-import { useIsPhone } from "../../ui/use-screen-size";
-import { Robots } from "../robots";
+import { useRobotInLight } from "../canvas/card-highlights";
+import { useBench } from "../edit-actions/editor-context";
+import { ENTRY, type Key } from "../graph/model";
+import type { Progress } from "../status/progress";
+import { announcer } from "../ui/announcer";
+import { Empty } from "../ui/empty";
+import { useIsPhone } from "../ui/use-screen-size";
 import style from "./outline.module.css";
 import { type Hands, OutlineRow } from "./outline-row";
-import { deedFor, move, type RowDeed, remove } from "./row-deeds";
+import { Robots } from "./robot-filter";
+import { deedFor, move, type RowDeed, remove } from "./row-actions";
 import type { Change } from "./row-edit";
 import { namesOf, type Row, rowsOf, subjectOf } from "./rows";
 

@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { mapsOf } from "../../graph/document-keys";
-import { addAction, connect, setRemap, setRequired } from "../../graph/edit";
-import { readGraph } from "../../graph/read";
+import { mapsOf } from "../graph/document-keys";
+import { addAction, connect, setRemap, setRequired } from "../graph/edit";
+import { readGraph } from "../graph/read";
 import { find } from "./find";
 
 const doc = new Y.Doc();
