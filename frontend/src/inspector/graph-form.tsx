@@ -1,11 +1,11 @@
 /** The properties of the graph itself, and how to begin. */
 import { Kbd, TagsInput } from "@mantine/core";
-import { keysOf } from "../../edit-actions/edit-action";
-import { useBench } from "../../edit-actions/editor-context";
-import { setGraphDescription, setGraphName } from "../../graph/edit";
-import { DraftInput } from "../../ui/draft-input";
-import { FieldOf } from "../field-of";
-import style from "./details.module.css";
+import { keysOf } from "../edit-actions/edit-action";
+import { useBench } from "../edit-actions/editor-context";
+import { setGraphDescription, setGraphName } from "../graph/edit";
+import { DraftInput } from "../ui/draft-input";
+import { FieldOf } from "./fields/shared-field";
+import style from "./inspector.module.css";
 import { labelsOf, setLabels } from "./labels";
 
 export function GraphForm() {

@@ -1,10 +1,10 @@
 /** What people sort a graph under: `labels` in its `gui_attributes`, which no engine reads. */
 import type * as Y from "yjs";
-import { rootOf } from "../../graph/document-keys";
-import { together } from "../../graph/edit/document-writes";
-import { memberText, withMember } from "../../graph/json-members";
-import type { Graph } from "../../graph/model";
-import { asJsonText } from "../../graph/values";
+import { rootOf } from "../graph/document-keys";
+import { together } from "../graph/edit/document-writes";
+import { memberText, withMember } from "../graph/json-members";
+import type { Graph } from "../graph/model";
+import { asJsonText } from "../graph/values";
 
 const KEY = "x/gui_attributes";
 

@@ -2,12 +2,12 @@
 import { ActionIcon, Button, Tooltip } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
-import type { Problem, Problems } from "../../api/graphs";
-import { bySeverity, placeOf } from "../../canvas/problem-marks";
-import { copyLinkTo } from "../../edit-actions/clipboard";
-import { type Bench, endName, useBench } from "../../edit-actions/editor-context";
-import { linkToProblem } from "../../edit-actions/graph-links";
-import { relationId } from "../../graph/document-keys";
+import type { Problem, Problems } from "../api/graphs";
+import { bySeverity, placeOf } from "../canvas/problem-marks";
+import { copyLinkTo } from "../edit-actions/clipboard";
+import { type Bench, endName, useBench } from "../edit-actions/editor-context";
+import { linkToProblem } from "../edit-actions/graph-links";
+import { relationId } from "../graph/document-keys";
 import {
   ABOUT,
   applyExamples,
@@ -16,9 +16,9 @@ import {
   exampleOnes,
   fixOf,
   safeOnes,
-} from "../../graph/edit/fixes";
-import type { Graph } from "../../graph/model";
-import style from "./problems.module.css";
+} from "../graph/edit/fixes";
+import type { Graph } from "../graph/model";
+import style from "./problem-list.module.css";
 
 /** Where a problem is, as a person would say it; empty for the graph as a whole. */
 function placeWords(graph: Graph, place: string | null): string {

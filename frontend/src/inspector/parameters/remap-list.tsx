@@ -6,8 +6,8 @@ import { endName, useBench } from "../../edit-actions/editor-context";
 import { relationId } from "../../graph/document-keys";
 import { setRemap } from "../../graph/edit";
 import type { Relation } from "../../graph/model";
-import style from "./details.module.css";
-import { type Choice, misfit, passed, sources, targets } from "./remap";
+import style from "../inspector.module.css";
+import { type Choice, misfit, passed, sources, targets } from "./remap-choices";
 
 function labelOf({ name, type, reason }: Choice): string {
   return `${name} · ${reason ?? type ?? "no type"}`;

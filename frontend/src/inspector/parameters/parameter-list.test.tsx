@@ -8,7 +8,7 @@ import { addAction } from "../../graph/edit";
 import { graphOf } from "../../graph/edit/document-writes";
 import { RoomProvider, useGraph, useRoom } from "../../sync/use-room";
 import { FakeServer } from "../../testing/fake-server";
-import { Parameters } from "./parameters";
+import { Parameters } from "./parameter-list";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
 vi.stubGlobal("matchMedia", () => ({

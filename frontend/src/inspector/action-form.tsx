@@ -1,16 +1,16 @@
 /** The properties of an action. */
 import { Autocomplete, Button, Group } from "@mantine/core";
 import { IconGhost2 } from "@tabler/icons-react";
-import { useBench } from "../../edit-actions/editor-context";
-import { adoptGhost, rename, setField } from "../../graph/edit";
-import type { Action, Graph } from "../../graph/model";
-import { DraftInput } from "../../ui/draft-input";
-import { robotColor } from "../../ui/name-colors";
-import { FieldOf } from "../field-of";
-import { Arrows } from "./arrows";
-import style from "./details.module.css";
-import { Parameters } from "./parameters";
-import { RunsWhen } from "./runs-when";
+import { useBench } from "../edit-actions/editor-context";
+import { adoptGhost, rename, setField } from "../graph/edit";
+import type { Action, Graph } from "../graph/model";
+import { DraftInput } from "../ui/draft-input";
+import { robotColor } from "../ui/name-colors";
+import { Arrows } from "./arrow-list";
+import { FieldOf } from "./fields/shared-field";
+import style from "./inspector.module.css";
+import { Parameters } from "./parameters/parameter-list";
+import { RunsWhen } from "./run-conditions";
 
 function robots(graph: Graph): string[] {
   return [...new Set(graph.actions.map((action) => action.actor))].filter(Boolean).sort();

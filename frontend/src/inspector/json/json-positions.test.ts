@@ -5,7 +5,7 @@ import { mapsOf } from "../../graph/document-keys";
 import { addAction, connect, setEntry, setExit } from "../../graph/edit";
 import { EXIT } from "../../graph/model";
 import { readGraph } from "../../graph/read";
-import { actionAt, lineOf, rangeOf, rangeOfArrow } from "./json-places";
+import { actionAt, lineOf, rangeOf, rangeOfArrow } from "./json-positions";
 
 const graph = {
   graph_name: "g",

@@ -1,13 +1,13 @@
 /** A note or a frame as a form: what the canvas shows, without a pointer. */
 import { Button } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
-import { noteColor } from "../../canvas/note-colors";
-import { useBench } from "../../edit-actions/editor-context";
-import { removeNotes } from "../../graph/edit";
-import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../../graph/edit/notes";
-import { DraftInput } from "../../ui/draft-input";
-import { FieldOf } from "../field-of";
-import style from "./details.module.css";
+import { noteColor } from "../canvas/note-colors";
+import { useBench } from "../edit-actions/editor-context";
+import { removeNotes } from "../graph/edit";
+import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../graph/edit/notes";
+import { DraftInput } from "../ui/draft-input";
+import { FieldOf } from "./fields/shared-field";
+import style from "./inspector.module.css";
 
 const LEAST = { width: 60, height: 32 }; // px, as it is read
 const MOST = 20_000; // px

@@ -1,9 +1,9 @@
 /** When something runs, as sentences: what the engine would really do. */
 
-import { useBench } from "../../edit-actions/editor-context";
-import type { Key } from "../../graph/model";
-import { startWords } from "../../graph/relation-words";
-import style from "./details.module.css";
+import { useBench } from "../edit-actions/editor-context";
+import type { Key } from "../graph/model";
+import { startWords } from "../graph/relation-words";
+import style from "./inspector.module.css";
 
 export function RunsWhen({ of, title }: { of: Key; title: string }) {
   const { graph } = useBench();

@@ -1,11 +1,11 @@
 /** A field that several people may write in: who has the caret there, and what is wrong there. */
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { type FocusEvent, type ReactNode, use, useEffect, useRef } from "react";
-import { Initial, onePerId } from "../people/people";
-import { useEditors, usePeople, useRoom } from "../sync/use-room";
-import { colorsOf } from "../ui/name-colors";
-import { ProblemsContext, problemsAt } from "./details/problem-places";
-import style from "./field-of.module.css";
+import { Initial, onePerId } from "../../people/people";
+import { useEditors, usePeople, useRoom } from "../../sync/use-room";
+import { colorsOf } from "../../ui/name-colors";
+import { ProblemsContext, problemsAt } from "./field-problems";
+import style from "./shared-field.module.css";
 
 interface Props {
   /** The key of the action, the id of the arrow, or `graph`. */

@@ -2,7 +2,7 @@
 import { MantineThemeProvider } from "@mantine/core";
 import type { ReactNode } from "react";
 import { useBench } from "../../edit-actions/editor-context";
-import style from "./details.module.css";
+import style from "../inspector.module.css";
 
 const OFF = { defaultProps: { disabled: true } };
 /** Its text can be marked and copied. */

@@ -4,7 +4,7 @@ import { useEffect, useRef, useState, useSyncExternalStore } from "react";
 import { graphMoment, type Rewriting, rewritingOf } from "../../api/graphs";
 import { Refusal, sentence } from "../../api/http";
 import type { Fault } from "./json-editor";
-import { lineOf } from "./json-places";
+import { lineOf } from "./json-positions";
 
 const PAUSE = 400; // ms
 

@@ -8,9 +8,9 @@ import { setParameter } from "../../graph/edit";
 import type { Key, Parameter } from "../../graph/model";
 import { pathWords } from "../../graph/value-text";
 import { DraftInput } from "../../ui/draft-input";
-import style from "./details.module.css";
+import style from "../inspector.module.css";
 import { ParameterSettings } from "./parameter-settings";
-import { complaint, type Field, fieldOf, shown, typed, withValue } from "./pvf";
+import { complaint, type Field, fieldOf, shown, typed, withValue } from "./parameter-values";
 
 interface Props {
   owner: Key;

@@ -24,7 +24,7 @@ import {
 } from "@codemirror/view";
 import { classHighlighter } from "@lezer/highlight";
 import { useEffect, useRef } from "react";
-import type { Lines } from "./json-places";
+import type { Lines } from "./json-positions";
 import style from "./json-view.module.css";
 
 export interface Fault {

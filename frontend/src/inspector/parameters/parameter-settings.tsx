@@ -7,9 +7,17 @@ import { removeParameter, renameParameter, setParameter } from "../../graph/edit
 import type { Key, Parameter } from "../../graph/model";
 import { pathWords } from "../../graph/value-text";
 import { DraftInput } from "../../ui/draft-input";
-import style from "./details.module.css";
+import style from "../inspector.module.css";
 import { pathFrom, taken } from "./parameter-path";
-import { allowedLines, fieldOf, TYPES, withAllowed, withLock, withRequired, withType } from "./pvf";
+import {
+  allowedLines,
+  fieldOf,
+  TYPES,
+  withAllowed,
+  withLock,
+  withRequired,
+  withType,
+} from "./parameter-values";
 
 interface Props {
   owner: Key;

@@ -5,7 +5,7 @@ import { addAction } from "../../graph/edit";
 import type { Action } from "../../graph/model";
 import { readGraph } from "../../graph/read";
 import { families, pathFrom, taken } from "./parameter-path";
-import { misfit, passed, sources, targets } from "./remap";
+import { misfit, passed, sources, targets } from "./remap-choices";
 
 const parameter = (path: string, type: string, more = "") => ({
   path,

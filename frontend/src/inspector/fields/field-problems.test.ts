@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Problem } from "../../api/graphs";
-import { fieldOfProblem, problemsAt } from "./problem-places";
+import { fieldOfProblem, problemsAt } from "./field-problems";
 
 const problem = (path: string, where: object = {}): Problem => ({
   code: "P1",

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { mapsOf } from "../../graph/document-keys";
-import { readGraph } from "../../graph/read";
+import { mapsOf } from "../graph/document-keys";
+import { readGraph } from "../graph/read";
 import { labelsOf, setLabels } from "./labels";
 
 test("labels come and go, and what a file keeps beside them stays as it is spelled", () => {

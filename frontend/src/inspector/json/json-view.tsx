@@ -7,9 +7,9 @@ import { sentence } from "../../api/http";
 import { keysOf } from "../../edit-actions/edit-action";
 import { selectedActions, selectedRelations, useBench } from "../../edit-actions/editor-context";
 import type { Fault } from "./json-editor";
-import { actionAt, rangeOf, rangeOfArrow } from "./json-places";
+import { actionAt, rangeOf, rangeOfArrow } from "./json-positions";
+import { collisions, places, rewrite } from "./json-rewrite";
 import style from "./json-view.module.css";
-import { collisions, places, rewrite } from "./rewrite";
 import { useJson, type Verdict } from "./use-json";
 
 const JsonEditor = lazy(() => import("./json-editor"));

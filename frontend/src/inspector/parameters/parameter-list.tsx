@@ -7,11 +7,11 @@ import type { Side } from "../../graph/document-keys";
 import { addParameter, together } from "../../graph/edit";
 import type { Action } from "../../graph/model";
 import { pathWords } from "../../graph/value-text";
-import { FieldOf } from "../field-of";
-import style from "./details.module.css";
+import { FieldOf } from "../fields/shared-field";
+import style from "../inspector.module.css";
 import { ParameterField } from "./parameter-field";
 import { type Family, families, pathFrom, taken } from "./parameter-path";
-import { fresh, GROUPS, TYPES } from "./pvf";
+import { fresh, GROUPS, TYPES } from "./parameter-values";
 
 interface AddProps {
   action: Action;

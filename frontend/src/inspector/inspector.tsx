@@ -1,30 +1,30 @@
 /** The panel on the right: properties of what is selected, JSON, problems. */
 import { Tabs } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";
-import type { Problem, Problems } from "../../api/graphs";
-import { Comments } from "../../comments/comments";
+import type { Problem, Problems } from "../api/graphs";
+import { Comments } from "../comments/comments";
 import {
   type Bench,
   type Panel,
   selectedActions,
   selectedRelations,
   useBench,
-} from "../../edit-actions/editor-context";
-import { relationId } from "../../graph/document-keys";
-import type { Thread } from "../../graph/edit/comments";
-import { notesOf } from "../../graph/edit/notes";
-import { EXIT } from "../../graph/model";
-import { FieldOf } from "../field-of";
+} from "../edit-actions/editor-context";
+import { relationId } from "../graph/document-keys";
+import type { Thread } from "../graph/edit/comments";
+import { notesOf } from "../graph/edit/notes";
+import { EXIT } from "../graph/model";
 import { ActionForm } from "./action-form";
-import style from "./details.module.css";
+import { ProblemsContext } from "./fields/field-problems";
+import { FieldOf } from "./fields/shared-field";
+import { LookOnly } from "./fields/view-only";
 import { GraphForm } from "./graph-form";
-import { JsonView } from "./json-view";
-import { LookOnly } from "./look-only";
+import style from "./inspector.module.css";
+import { JsonView } from "./json/json-view";
 import { NoteForm } from "./note-form";
-import { ProblemsContext } from "./problem-places";
-import { ProblemList, ProblemsHere } from "./problems";
+import { ProblemList, ProblemsHere } from "./problem-list";
 import { RelationForm } from "./relation-form";
-import { RunsWhen } from "./runs-when";
+import { RunsWhen } from "./run-conditions";
 
 const NONE: readonly Problem[] = [];
 
