@@ -1,6 +1,6 @@
 /** A deed's first shortcut, as it is printed on keys. */
 import { Kbd } from "@mantine/core";
-import style from "../editor/toolbar.module.css";
+import style from "../editor/menus/toolbar.module.css";
 import { type Deed, keysOf } from "./edit-action";
 
 export function Keys({ shortcut }: { shortcut: string }) {

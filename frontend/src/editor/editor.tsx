@@ -28,15 +28,15 @@ import type { Link } from "../sync/room-connection";
 import { useCalmLink } from "../sync/use-room";
 import type { Crumb } from "../ui/top-bar";
 import { useIsPhone, useIsWide } from "../ui/use-screen-size";
+import { QuickAdd } from "./canvas/quick-add";
+import { Stage } from "./canvas-pane";
 import style from "./editor.module.css";
-import { Notices } from "./notices";
-import { ProblemWord } from "./problem-word";
-import { QuickAdd } from "./quick-add";
-import { SavedWord } from "./saved-word";
-import { Stage } from "./stage";
-import { Surfaces } from "./surfaces";
-import { useEditor } from "./use-bench";
-import { useRemoteNews, useRunNews } from "./use-news";
+import { Surfaces } from "./menus/overlays";
+import { ProblemWord } from "./problem-count";
+import { Notices } from "./room-notices";
+import { SavedWord } from "./save-status";
+import { useRemoteNews, useRunNews } from "./use-announcements";
+import { useEditor } from "./use-editor";
 
 /** What the page around the editor may want to know. */
 export interface Shown {

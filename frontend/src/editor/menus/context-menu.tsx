@@ -1,15 +1,15 @@
 /** The menu of what was pressed, at the place where it was pressed. */
 import { Menu } from "@mantine/core";
 import { Fragment, useEffect, useRef } from "react";
-import * as deeds from "../edit-actions/all";
-import { type Deed, isEnabled, labelOf } from "../edit-actions/edit-action";
+import * as deeds from "../../edit-actions/all";
+import { type Deed, isEnabled, labelOf } from "../../edit-actions/edit-action";
 import {
   type Bench,
   selectedActions,
   selectedNotes,
   selectedRelations,
-} from "../edit-actions/editor-context";
-import { Shortcut } from "../edit-actions/shortcut-keys";
+} from "../../edit-actions/editor-context";
+import { Shortcut } from "../../edit-actions/shortcut-keys";
 import style from "./context-menu.module.css";
 
 /** What can be done with the selection, in groups. */

@@ -1,8 +1,8 @@
 /** The view of the canvas: what is seen at first, what Fit shows, and how it follows a run. */
 import type { ReactFlowInstance } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
-import type { Arrow, CanvasNode } from "../canvas/elements";
-import { CARD, type Places, type Sizes } from "../canvas/geometry/arrange";
+import type { Arrow, CanvasNode } from "../../canvas/elements";
+import { CARD, type Places, type Sizes } from "../../canvas/geometry/arrange";
 import {
   alike,
   boundsOf,
@@ -12,10 +12,10 @@ import {
   READABLE,
   readable,
   whole,
-} from "../canvas/geometry/viewport";
-import type { View } from "../edit-actions/editor-context";
-import { ENTRY, type Key, type Position } from "../graph/model";
-import type { Progress } from "../status/progress";
+} from "../../canvas/geometry/viewport";
+import type { View } from "../../edit-actions/editor-context";
+import { ENTRY, type Key, type Position } from "../../graph/model";
+import type { Progress } from "../../status/progress";
 
 interface Given {
   flow: ReactFlowInstance<CanvasNode, Arrow>;

@@ -16,7 +16,7 @@ import {
   type View,
 } from "../edit-actions/editor-context";
 import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../sync/use-room";
-import { takeAway } from "./take-away";
+import { takeAway } from "./export-graph";
 
 const NONE: ReadonlySet<string> = new Set();
 

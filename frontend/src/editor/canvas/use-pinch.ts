@@ -1,8 +1,8 @@
 /** Two fingers move and zoom the view also while one finger selects. */
 import { useReactFlow, useStoreApi } from "@xyflow/react";
 import { type PointerEvent, useMemo, useRef } from "react";
-import type { Bench } from "../edit-actions/editor-context";
-import type { Position } from "../graph/model";
+import type { Bench } from "../../edit-actions/editor-context";
+import type { Position } from "../../graph/model";
 
 export const ZOOM = { least: 0.08, most: 2.2 } as const;
 

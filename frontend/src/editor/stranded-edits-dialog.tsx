@@ -4,8 +4,8 @@ import { useCallback, useEffect, useMemo, useState } from "react";
 import { type Change, changesOf, chosen, type Line } from "../graph/changes";
 import { mapsOf } from "../graph/document-keys";
 import { type Choice, useChoice, useGraph, useLink, useRoom } from "../sync/use-room";
-import style from "./choice.module.css";
-import { saveChanges, sentenceOf } from "./choice-file";
+import style from "./stranded-edits-dialog.module.css";
+import { saveChanges, sentenceOf } from "./stranded-edits-file";
 
 const signs = { added: "+", removed: "−", changed: "~" } as const;
 

@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
-import { onePerId } from "../people/people";
-import type { Person } from "../sync/presence/presence";
+import { onePerId } from "../../people/people";
+import type { Person } from "../../sync/presence/presence";
 import { candidates } from "./quick-add";
-import { dragged, selectionAfter } from "./use-canvas";
+import { dragged, selectionAfter } from "./use-canvas-elements";
 
 const select = (id: string, selected: boolean) => ({ type: "select" as const, id, selected });
 

@@ -1,5 +1,5 @@
 /** What lies under a point of the screen. */
-import type { Position } from "../graph/model";
+import type { Position } from "../../graph/model";
 
 type Pointed = { clientX: number; clientY: number } | { changedTouches: TouchList };
 

@@ -4,9 +4,9 @@ import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
-import type { Bench } from "../edit-actions/editor-context";
-import { graphOf } from "../graph/edit/document-writes";
-import { EMPTY_GRAPH } from "../graph/model";
+import type { Bench } from "../../edit-actions/editor-context";
+import { graphOf } from "../../graph/edit/document-writes";
+import { EMPTY_GRAPH } from "../../graph/model";
 import { QuickAdd } from "./quick-add";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);

@@ -13,28 +13,28 @@ import {
   useStoreApi,
 } from "@xyflow/react";
 import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
-import { actionCarrier } from "../canvas/action-drag";
-import type { Arrow, CanvasNode } from "../canvas/elements";
-import { CARD } from "../canvas/geometry/arrange";
-import { edgeTypes, nodeTypes } from "../canvas/graph-view";
-import { type NoteDesk, NoteDeskContext } from "../canvas/note-card";
-import { noteColor } from "../canvas/note-colors";
-import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
-import { ArrowTips } from "../canvas/outcome-arrow";
-import { type Bench, endName, GRID, placeAction } from "../edit-actions/editor-context";
-import { insertInto, removeNotes, together } from "../graph/edit";
-import { changeNote } from "../graph/edit/notes";
-import type { Position } from "../graph/model";
-import { AtCards, Cursors } from "../people/people";
-import { useRoom } from "../sync/use-room";
-import { robotColor } from "../ui/name-colors";
-import { useSteady } from "../ui/use-stable-callback";
-import style from "./canvas.module.css";
-import { arrowAt } from "./hit";
-import type { useCanvas } from "./use-canvas";
+import { actionCarrier } from "../../canvas/action-drag";
+import type { Arrow, CanvasNode } from "../../canvas/elements";
+import { CARD } from "../../canvas/geometry/arrange";
+import { edgeTypes, nodeTypes } from "../../canvas/graph-view";
+import { type NoteDesk, NoteDeskContext } from "../../canvas/note-card";
+import { noteColor } from "../../canvas/note-colors";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
+import { ArrowTips } from "../../canvas/outcome-arrow";
+import { type Bench, endName, GRID, placeAction } from "../../edit-actions/editor-context";
+import { insertInto, removeNotes, together } from "../../graph/edit";
+import { changeNote } from "../../graph/edit/notes";
+import type { Position } from "../../graph/model";
+import { AtCards, Cursors } from "../../people/people";
+import { useRoom } from "../../sync/use-room";
+import { robotColor } from "../../ui/name-colors";
+import { useSteady } from "../../ui/use-stable-callback";
+import style from "./editable-canvas.module.css";
+import { arrowAt } from "./hit-test";
+import type { useCanvas } from "./use-canvas-elements";
 import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
+import { usePress } from "./use-context-menu";
 import { usePinch, ZOOM } from "./use-pinch";
-import { usePress } from "./use-press";
 
 // What React Flow gets anew, it hands on to all that is drawn.
 const SNAP_GRID: [number, number] = [GRID, GRID];

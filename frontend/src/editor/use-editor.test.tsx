@@ -6,7 +6,7 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { PersonContext } from "../api/use-person";
 import { RoomProvider } from "../sync/use-room";
 import { FakeServer } from "../testing/fake-server";
-import { useEditor } from "./use-bench";
+import { useEditor } from "./use-editor";
 
 let server: FakeServer;
 let root: Root;

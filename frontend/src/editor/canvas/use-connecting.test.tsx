@@ -3,9 +3,9 @@ import { act, type MouseEvent } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
-import type { Bench } from "../edit-actions/editor-context";
-import { addAction } from "../graph/edit";
-import { graphOf } from "../graph/edit/document-writes";
+import type { Bench } from "../../edit-actions/editor-context";
+import { addAction } from "../../graph/edit";
+import { graphOf } from "../../graph/edit/document-writes";
 import { useConnecting } from "./use-connecting";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);

@@ -1,6 +1,6 @@
 // @vitest-environment jsdom
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { focusCard } from "./use-view";
+import { focusCard } from "./use-viewport";
 
 beforeEach(() => {
   vi.useFakeTimers();

@@ -2,7 +2,7 @@
 import { IconAlertTriangle } from "@tabler/icons-react";
 import type { Problems } from "../api/graphs";
 import { useBench } from "../edit-actions/editor-context";
-import style from "./problem-word.module.css";
+import style from "./problem-count.module.css";
 
 export function ProblemWord({ problems }: { problems: Problems | undefined }) {
   const { setPanel } = useBench();

@@ -1,12 +1,12 @@
 /** Drawing arrows by hand: drag from an outcome, tap an outcome and then what follows, lead elsewhere. */
 import type { Connection, FinalConnectionState, OnConnectEnd } from "@xyflow/react";
 import { type MouseEvent, useCallback, useEffect, useRef, useState } from "react";
-import type { Arrow } from "../canvas/elements";
-import type { Bench } from "../edit-actions/editor-context";
-import { connect, moveRelation, retarget } from "../graph/edit";
-import type { Key, Position, Precondition } from "../graph/model";
-import { ENTRY } from "../graph/model";
-import { nodeAt, pointOf } from "./hit";
+import type { Arrow } from "../../canvas/elements";
+import type { Bench } from "../../edit-actions/editor-context";
+import { connect, moveRelation, retarget } from "../../graph/edit";
+import type { Key, Position, Precondition } from "../../graph/model";
+import { ENTRY } from "../../graph/model";
+import { nodeAt, pointOf } from "./hit-test";
 
 export interface Pending {
   readonly key: Key;

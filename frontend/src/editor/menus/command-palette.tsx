@@ -3,13 +3,13 @@ import { Modal } from "@mantine/core";
 import { IconRouteSquare2, IconSquareRounded } from "@tabler/icons-react";
 import { useMemo, useRef } from "react";
 import { useLocation } from "wouter";
-import { useGraphs } from "../api/graphs";
-import { DEEDS } from "../edit-actions/all";
-import { isEnabled, labelOf } from "../edit-actions/edit-action";
-import type { Bench } from "../edit-actions/editor-context";
-import { Shortcut } from "../edit-actions/shortcut-keys";
-import { robotColor } from "../ui/name-colors";
-import { matching, type Option, PickList } from "../ui/pick-list";
+import { useGraphs } from "../../api/graphs";
+import { DEEDS } from "../../edit-actions/all";
+import { isEnabled, labelOf } from "../../edit-actions/edit-action";
+import type { Bench } from "../../edit-actions/editor-context";
+import { Shortcut } from "../../edit-actions/shortcut-keys";
+import { robotColor } from "../../ui/name-colors";
+import { matching, type Option, PickList } from "../../ui/pick-list";
 
 const MOST = 60;
 /** Names of deeds that were done from here, the last first. */

@@ -22,18 +22,18 @@ import {
   edgesOf,
   keep,
   nodesOf,
-} from "../canvas/elements";
-import { type Places, placesOf, unplaced } from "../canvas/geometry/arrange";
-import { notePlaces } from "../canvas/note-nodes";
-import type { Marks } from "../canvas/problem-marks";
-import { insertInto, moveActions, together } from "../graph/edit";
-import { type Note, notesOf, placeNotes, withContents } from "../graph/edit/notes";
-import type { Graph, Key, Position } from "../graph/model";
-import type { Progress } from "../status/progress";
-import type { Person } from "../sync/presence/presence";
-import { usePeople, useRoom } from "../sync/use-room";
-import { colorsOf } from "../ui/name-colors";
-import { arrowAt, pointOf } from "./hit";
+} from "../../canvas/elements";
+import { type Places, placesOf, unplaced } from "../../canvas/geometry/arrange";
+import { notePlaces } from "../../canvas/note-nodes";
+import type { Marks } from "../../canvas/problem-marks";
+import { insertInto, moveActions, together } from "../../graph/edit";
+import { type Note, notesOf, placeNotes, withContents } from "../../graph/edit/notes";
+import type { Graph, Key, Position } from "../../graph/model";
+import type { Progress } from "../../status/progress";
+import type { Person } from "../../sync/presence/presence";
+import { usePeople, useRoom } from "../../sync/use-room";
+import { colorsOf } from "../../ui/name-colors";
+import { arrowAt, pointOf } from "./hit-test";
 
 export interface Size {
   readonly width: number;

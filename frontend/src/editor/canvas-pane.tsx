@@ -12,14 +12,14 @@ import { useFollowedView } from "../people/use-followed-view";
 import type { Progress } from "../status/progress";
 import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
-import { Canvas } from "./canvas";
-import { DryRunBar } from "./dry-run/dry-run-bar";
-import style from "./stage.module.css";
-import { Toolbar } from "./toolbar";
-import type { EditorState } from "./use-bench";
-import { useCanvas } from "./use-canvas";
-import { useDeepLink } from "./use-deep-link";
-import { useView } from "./use-view";
+import { Canvas } from "./canvas/editable-canvas";
+import { useCanvas } from "./canvas/use-canvas-elements";
+import { useView } from "./canvas/use-viewport";
+import style from "./canvas-pane.module.css";
+import { DryRunBar } from "./dry-run-bar";
+import { Toolbar } from "./menus/toolbar";
+import type { EditorState } from "./use-editor";
+import { useDeepLink } from "./use-graph-link";
 
 interface Props {
   me: string;

@@ -10,17 +10,17 @@ import {
   IconX,
 } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { sentence } from "../../api/http";
-import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
-import type { Going } from "../../dry-run/playback";
-import { type FaultKind, faultWords } from "../../dry-run/script";
-import { type DryRun, SPEEDS } from "../../dry-run/use-dry-run";
-import * as deeds from "../../edit-actions/dry-run-actions";
-import type { Deed } from "../../edit-actions/edit-action";
-import { labelOf } from "../../edit-actions/edit-action";
-import { type Bench, endName, selectedActions } from "../../edit-actions/editor-context";
-import { Shortcut } from "../../edit-actions/shortcut-keys";
-import { fullName } from "../../graph/model";
+import { sentence } from "../api/http";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
+import type { Going } from "../dry-run/playback";
+import { type FaultKind, faultWords } from "../dry-run/script";
+import { type DryRun, SPEEDS } from "../dry-run/use-dry-run";
+import * as deeds from "../edit-actions/dry-run-actions";
+import type { Deed } from "../edit-actions/edit-action";
+import { labelOf } from "../edit-actions/edit-action";
+import { type Bench, endName, selectedActions } from "../edit-actions/editor-context";
+import { Shortcut } from "../edit-actions/shortcut-keys";
+import { fullName } from "../graph/model";
 import style from "./dry-run-bar.module.css";
 
 const CHOICES = ["on_true", "on_false", "on_error"] as const;

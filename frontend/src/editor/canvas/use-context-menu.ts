@@ -1,8 +1,8 @@
 /** Menus where one presses: the right button of a mouse, or a finger that rests. */
 import { type PointerEvent, useEffect, useMemo, useRef } from "react";
-import type { Bench } from "../edit-actions/editor-context";
-import type { Position } from "../graph/model";
-import { arrowAt, nodeAt } from "./hit";
+import type { Bench } from "../../edit-actions/editor-context";
+import type { Position } from "../../graph/model";
+import { arrowAt, nodeAt } from "./hit-test";
 
 const REST = 500; // ms
 const STILL = 8; // px that a resting finger may move

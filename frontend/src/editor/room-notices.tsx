@@ -12,9 +12,9 @@ import {
   useNotice,
   useOthersWaiting,
 } from "../sync/use-room";
-import { ChoiceDialog, useChoosing } from "./choice";
-import { saveChanges } from "./choice-file";
-import style from "./notices.module.css";
+import style from "./room-notices.module.css";
+import { ChoiceDialog, useChoosing } from "./stranded-edits-dialog";
+import { saveChanges } from "./stranded-edits-file";
 
 const words: Record<Notice, string> = {
   "went-back":

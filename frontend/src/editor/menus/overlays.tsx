@@ -1,10 +1,10 @@
 /** What opens over the editor, one at a time: menus, the palette, dialogs of single deeds. */
 
-import type { Bench, Surface } from "../edit-actions/editor-context";
+import type { Bench, Surface } from "../../edit-actions/editor-context";
 import { ArrowDialog, RetargetDialog } from "./arrow-dialog";
+import { Palette } from "./command-palette";
 import { ContextMenu } from "./context-menu";
-import { KeysSheet } from "./keys-sheet";
-import { Palette } from "./palette";
+import { KeysSheet } from "./shortcut-sheet";
 
 interface Props {
   bench: Bench;

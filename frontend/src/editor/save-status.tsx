@@ -11,7 +11,7 @@ import { useBench } from "../edit-actions/editor-context";
 import type { Link, Why } from "../sync/room-connection";
 import { whyNot } from "../sync/unsaved-reasons";
 import { useLink, useRoom } from "../sync/use-room";
-import style from "./saved-word.module.css";
+import style from "./save-status.module.css";
 
 const whys: Record<Why, string> = {
   "session-ended": "Signed out",

@@ -1,10 +1,10 @@
 /** Every shortcut on one sheet, and the switch for single letters. */
 import { Modal, Switch } from "@mantine/core";
-import { DEEDS } from "../edit-actions/all";
-import type { Group } from "../edit-actions/edit-action";
-import { Keys } from "../edit-actions/shortcut-keys";
-import { useSingleKeys } from "../edit-actions/shortcuts";
-import style from "./keys-sheet.module.css";
+import { DEEDS } from "../../edit-actions/all";
+import type { Group } from "../../edit-actions/edit-action";
+import { Keys } from "../../edit-actions/shortcut-keys";
+import { useSingleKeys } from "../../edit-actions/shortcuts";
+import style from "./shortcut-sheet.module.css";
 
 const GROUPS: readonly Group[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
 

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { savedWords } from "./saved-word";
+import { savedWords } from "./save-status";
 
 test("saved is said only when nothing waits and the room is live", () => {
   expect(savedWords({ state: "live", unsaved: 0, seq: 4 }).words).toBe("Saved");

@@ -3,7 +3,7 @@ import type { Run } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
 import type { Progress } from "../status/progress";
 import { progressByAid } from "../status/progress";
-import { runNews } from "./use-news";
+import { runNews } from "./use-announcements";
 
 const graph = fromUmrf({
   graph_name: "g",

@@ -17,11 +17,11 @@ import {
   undo,
   zoomIn,
   zoomOut,
-} from "../edit-actions/all";
-import { type Deed, type Group, isEnabled, labelOf } from "../edit-actions/edit-action";
-import { useBench } from "../edit-actions/editor-context";
-import { Shortcut } from "../edit-actions/shortcut-keys";
-import { useSteady } from "../ui/use-stable-callback";
+} from "../../edit-actions/all";
+import { type Deed, type Group, isEnabled, labelOf } from "../../edit-actions/edit-action";
+import { useBench } from "../../edit-actions/editor-context";
+import { Shortcut } from "../../edit-actions/shortcut-keys";
+import { useSteady } from "../../ui/use-stable-callback";
 import style from "./toolbar.module.css";
 
 function Tool({ deed, pressed }: { deed: Deed; pressed?: boolean }) {

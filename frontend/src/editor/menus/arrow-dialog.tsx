@@ -3,13 +3,13 @@ import { Button, Modal } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconFlag, IconPlayerPlay, IconPlus, IconSquareRounded } from "@tabler/icons-react";
 import { useEffect, useRef, useState } from "react";
-import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
-import { type Bench, endName, freePlace, placeAction } from "../edit-actions/editor-context";
-import { endsOf } from "../graph/document-keys";
-import { connect, moveRelation, together } from "../graph/edit";
-import { ENTRY, EXIT, type Key, type Precondition } from "../graph/model";
-import { robotColor } from "../ui/name-colors";
-import { matching, type Option, PickList } from "../ui/pick-list";
+import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
+import { type Bench, endName, freePlace, placeAction } from "../../edit-actions/editor-context";
+import { endsOf } from "../../graph/document-keys";
+import { connect, moveRelation, together } from "../../graph/edit";
+import { ENTRY, EXIT, type Key, type Precondition } from "../../graph/model";
+import { robotColor } from "../../ui/name-colors";
+import { matching, type Option, PickList } from "../../ui/pick-list";
 import style from "./arrow-dialog.module.css";
 
 /** Everything an arrow can lead from or to, those that are near first. */
