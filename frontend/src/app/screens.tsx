@@ -1,12 +1,12 @@
 /** The screens around the features: home, runs, one run. */
 import { useLocation } from "wouter";
 import { useVersions } from "../api/graphs";
-import { ComparePage } from "../history/compare-page";
-import type { StartAgain } from "../history/run-menu";
-import { RunPage } from "../history/run-page";
-import { RunsPage } from "../history/runs-page";
-import { StatisticsPage } from "../history/statistics-page";
 import { Home } from "../library/home";
+import { ComparePage } from "../review/compare-page";
+import type { StartAgain } from "../review/run/run-menu";
+import { RunPage } from "../review/run/run-page";
+import { RunsPage } from "../review/runs-page";
+import { StatisticsPage } from "../review/statistics-page";
 import { RobotsPage } from "../robots/robots-page";
 import { StartDialog } from "../runs/start-dialog";
 import { nextLabel } from "../runs/use-start";

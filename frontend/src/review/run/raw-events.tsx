@@ -2,10 +2,10 @@
 import { Button } from "@mantine/core";
 import { IconDownload, IconRefresh } from "@tabler/icons-react";
 import { useState } from "react";
-import { sentence } from "../api/http";
-import { exportUrl, useRawEvents } from "../api/review";
-import type { Run } from "../api/runs";
-import style from "./raw.module.css";
+import { sentence } from "../../api/http";
+import { exportUrl, useRawEvents } from "../../api/review";
+import type { Run } from "../../api/runs";
+import style from "./raw-events.module.css";
 
 interface Stored {
   seq: number;

@@ -4,9 +4,9 @@ import { notifications } from "@mantine/notifications";
 import { IconPin, IconPinFilled } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useEffect, useState } from "react";
-import { sentence } from "../api/http";
-import { type RunMarks, setMarks, useLabels, useMarks } from "../api/review";
-import style from "./notes.module.css";
+import { sentence } from "../../api/http";
+import { type RunMarks, setMarks, useLabels, useMarks } from "../../api/review";
+import style from "./run-notes.module.css";
 
 /** The marks of a run and a way to change them, shown at once and taken back if refused. */
 function useEditedMarks(runner: string | undefined, run: string) {

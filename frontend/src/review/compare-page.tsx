@@ -22,7 +22,7 @@ import { StateWord } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, useNow } from "../ui/times";
 import style from "./compare-page.module.css";
-import type { BarParts } from "./run-page";
+import type { BarParts } from "./run/run-page";
 
 /** How it ended; that nobody knows how is something else than that nobody saw an end. */
 function outcome(visit: Visit): string {

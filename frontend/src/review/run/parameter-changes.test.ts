@@ -1,7 +1,7 @@
 /** Values as executed stand beside those that were sent, and what nobody saw is not made up. */
 import { expect, test } from "vitest";
-import type { ActionRun, Visit } from "../api/runs";
-import { executed } from "./executed";
+import type { ActionRun, Visit } from "../../api/runs";
+import { executed } from "./parameter-changes";
 
 function visit(inputs: Visit["inputs"]): Visit {
   const at = "2026-11-20T09:00:00Z";

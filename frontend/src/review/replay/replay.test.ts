@@ -1,7 +1,7 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import type { Film, Frame } from "../api/review";
-import type { Run, Visit } from "../api/runs";
+import type { Film, Frame } from "../../api/review";
+import type { Run, Visit } from "../../api/runs";
 import { blank, chapterAt, follow, framesBy, Player, shows } from "./replay";
 
 const at = (ms: number) => new Date(1_000_000 + ms).toISOString();

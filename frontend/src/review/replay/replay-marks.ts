@@ -1,8 +1,8 @@
 /** What of a film stands on the time axis, and what its marks say in words. */
-import type { Film, FilmMark } from "../api/review";
-import type { Run } from "../api/runs";
-import type { TimeGap, TimeSign } from "../status/timeline";
-import { clock, instant } from "../ui/times";
+import type { Film, FilmMark } from "../../api/review";
+import type { Run } from "../../api/runs";
+import type { TimeGap, TimeSign } from "../../status/timeline";
+import { clock, instant } from "../../ui/times";
 
 const SIGNS: Record<string, TimeSign["tone"]> = {
   "run.stop_requested.v1": "stopped",

@@ -2,14 +2,14 @@
 
 import { TextInput } from "@mantine/core";
 import { useMemo, useState } from "react";
-import { authorName } from "../api/graphs";
-import type { FilmMark } from "../api/review";
-import { placeOf, type Run } from "../api/runs";
-import { atMost, begun, ended, endWords, type Tone } from "../status/progress";
-import { toneColor } from "../status/state-label";
-import { clock, instant } from "../ui/times";
+import { authorName } from "../../api/graphs";
+import type { FilmMark } from "../../api/review";
+import { placeOf, type Run } from "../../api/runs";
+import { atMost, begun, ended, endWords, type Tone } from "../../status/progress";
+import { toneColor } from "../../status/state-label";
+import { clock, instant } from "../../ui/times";
+import { wordsOf } from "../replay/replay-marks";
 import style from "./events.module.css";
-import { wordsOf } from "./film-signs";
 
 interface Happening {
   at: number;

@@ -1,6 +1,6 @@
 /** What a run tells is told in the order in which it can have happened. */
 import { expect, test } from "vitest";
-import type { Run } from "../api/runs";
+import type { Run } from "../../api/runs";
 import { happenings } from "./events";
 
 /** An action that the engine says to have begun and ended at these times. */

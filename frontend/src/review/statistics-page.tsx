@@ -11,7 +11,7 @@ import { spanWords } from "../status/durations";
 import { runWord } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import type { BarParts } from "./run-page";
+import type { BarParts } from "./run/run-page";
 import style from "./statistics-page.module.css";
 
 const seconds = (took: Took | null) => spanWords(took) ?? "—";

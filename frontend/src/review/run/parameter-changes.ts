@@ -1,5 +1,5 @@
 /** What the visits of an action ran with, against what was sent. Pure. */
-import type { ActionRun } from "../api/runs";
+import type { ActionRun } from "../../api/runs";
 
 export interface Row {
   parameter: string;

@@ -1,10 +1,10 @@
 /** Asks for one fault, and starts the run once more with it, in the simulator. */
 import { Button, Modal, SegmentedControl, Select, Stack, Text } from "@mantine/core";
 import { useState } from "react";
-import { sentence } from "../api/http";
-import type { Fault } from "../api/review";
-import type { Run } from "../api/runs";
-import { type Repeated, repeat, type Which } from "./again";
+import { sentence } from "../../api/http";
+import type { Fault } from "../../api/review";
+import type { Run } from "../../api/runs";
+import { type Repeated, repeat, type Which } from "./repeat-run";
 
 const FAULTS: { value: Fault; label: string }[] = [
   { value: "error", label: "It ends in error" },

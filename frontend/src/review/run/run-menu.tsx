@@ -13,12 +13,12 @@ import {
 } from "@tabler/icons-react";
 import { useState } from "react";
 import { useLocation } from "wouter";
-import { graphMoment, useVersions, versionName } from "../api/graphs";
-import { sentence } from "../api/http";
-import { expectRun, exportUrl } from "../api/review";
-import type { Run } from "../api/runs";
-import { type Repeated, repeat, type Which } from "./again";
+import { graphMoment, useVersions, versionName } from "../../api/graphs";
+import { sentence } from "../../api/http";
+import { expectRun, exportUrl } from "../../api/review";
+import type { Run } from "../../api/runs";
 import { FaultDialog } from "./fault-dialog";
+import { type Repeated, repeat, type Which } from "./repeat-run";
 import style from "./run-page.module.css";
 
 /** A start like any other one, that begins with what a run had. */

@@ -8,8 +8,8 @@ import {
   IconPlayerTrackPrev,
 } from "@tabler/icons-react";
 import { useEffect, useRef } from "react";
-import { duration } from "../ui/times";
-import style from "./player.module.css";
+import { duration } from "../../ui/times";
+import style from "./replay-controls.module.css";
 import { type Replay, SPEEDS } from "./use-replay";
 
 interface Props {

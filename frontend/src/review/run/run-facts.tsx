@@ -1,11 +1,11 @@
 /** What a run was, in a table. */
 
-import { useRaw } from "../api/review";
-import { placeOf, type Run, whence } from "../api/runs";
-import { spanWords } from "../status/durations";
-import { endWords } from "../status/progress";
-import { clock, day, instant, useNow } from "../ui/times";
-import style from "./facts.module.css";
+import { useRaw } from "../../api/review";
+import { placeOf, type Run, whence } from "../../api/runs";
+import { spanWords } from "../../status/durations";
+import { endWords } from "../../status/progress";
+import { clock, day, instant, useNow } from "../../ui/times";
+import style from "./run-facts.module.css";
 
 type Rest = NonNullable<Run["at_rest"]>;
 

@@ -1,9 +1,9 @@
 /** The cursor of a replay: where it stands, whether it plays, and the run as it was known there. */
 import { useQueryClient } from "@tanstack/react-query";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
-import { useFilm } from "../api/review";
-import type { Run } from "../api/runs";
-import { instant } from "../ui/times";
+import { useFilm } from "../../api/review";
+import type { Run } from "../../api/runs";
+import { instant } from "../../ui/times";
 import { chapterAt, Player } from "./replay";
 
 export const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;

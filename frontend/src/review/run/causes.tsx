@@ -1,8 +1,8 @@
 /** Why a run did not end well, at the top of its page: each cause with a way to where it shows. */
 import { IconAlertTriangle } from "@tabler/icons-react";
-import { type Cause, useCauses, wentWrong } from "../api/review";
-import type { Run } from "../api/runs";
-import { clock, instant } from "../ui/times";
+import { type Cause, useCauses, wentWrong } from "../../api/review";
+import type { Run } from "../../api/runs";
+import { clock, instant } from "../../ui/times";
 import style from "./causes.module.css";
 
 interface Props {

@@ -29,9 +29,9 @@ import { endWords, runWord } from "../status/progress";
 import { StateWord } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";
-import { Filters } from "./filters";
+import { useVersionLabel } from "./run/use-version-label";
+import { Filters } from "./run-filters";
 import style from "./runs-page.module.css";
-import { useVersionLabel } from "./version-label";
 
 const PAGE = 100;
 

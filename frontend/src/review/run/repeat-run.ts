@@ -1,9 +1,9 @@
 /** A run once more in the simulator: the graph that it ran or the newest one, doing what it did then. */
-import { graphMoment, publish, type Version } from "../api/graphs";
-import { askText } from "../api/http";
-import { type Fault, fittedScriptOf, scriptOf, umrfUrl } from "../api/review";
-import { type Run, startRun } from "../api/runs";
-import { memberText } from "../graph/json-members";
+import { graphMoment, publish, type Version } from "../../api/graphs";
+import { askText } from "../../api/http";
+import { type Fault, fittedScriptOf, scriptOf, umrfUrl } from "../../api/review";
+import { type Run, startRun } from "../../api/runs";
+import { memberText } from "../../graph/json-members";
 
 export type Which = "same" | "newest";
 

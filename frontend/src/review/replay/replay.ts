@@ -1,7 +1,7 @@
 /** A run at any moment of its film: what was known then, and nothing that was learned later. */
-import type { ActionFrame, Film, Frame } from "../api/review";
-import type { ActionRun, Run } from "../api/runs";
-import { instant } from "../ui/times";
+import type { ActionFrame, Film, Frame } from "../../api/review";
+import type { ActionRun, Run } from "../../api/runs";
+import { instant } from "../../ui/times";
 
 const BLANK: ActionRun = { aid: null, state: "UNINITIALIZED", visits: [], older: 0, messages: [] };
 

@@ -1,7 +1,7 @@
 /** Values as they were sent beside those that the engine reported, visit by visit. */
-import type { ActionRun, Run } from "../api/runs";
-import { executed, type Row } from "./executed";
-import style from "./parameters.module.css";
+import type { ActionRun, Run } from "../../api/runs";
+import { executed, type Row } from "./parameter-changes";
+import style from "./run-parameters.module.css";
 
 interface Props {
   run: Run;
