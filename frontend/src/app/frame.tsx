@@ -6,7 +6,7 @@ import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
 import { ShareDialog } from "../account/share-dialog";
 import { useMay } from "../api/use-person";
-import { StopButton } from "../runs/stop-button";
+import { StopButton } from "../runs/stop/stop-button";
 import { type Crumb, TopBar } from "../ui/top-bar";
 import { useSteady } from "../ui/use-stable-callback";
 import style from "./frame.module.css";

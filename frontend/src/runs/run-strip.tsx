@@ -15,8 +15,8 @@ import { lanesOf } from "../status/timeline-lanes";
 import { robotColor } from "../ui/name-colors";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";
 import { PauseButton } from "./pause-button";
-import { RestButton } from "./rest-button";
 import style from "./run-strip.module.css";
+import { RestButton } from "./stop/confirm-rest-button";
 
 /** What the notice shouts on every page already. */
 const SHOUTED: ReadonlySet<string> = new Set(["stop_unconfirmed", "moves_again"]);

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import type { LiveNow, StopAsked } from "../api/live/live-socket";
-import { awaitsLook, type Run } from "../api/runs";
+import type { LiveNow, StopAsked } from "../../api/live/live-socket";
+import { awaitsLook, type Run } from "../../api/runs";
 import { meantBy, words } from "./stop-button";
 import { movingAgain, noticeOf, othersNotice, unreached } from "./stop-notice";
 

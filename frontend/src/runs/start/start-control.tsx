@@ -2,11 +2,11 @@
 import { ActionIcon, Button } from "@mantine/core";
 import { IconChevronDown, IconPlayerPlayFilled } from "@tabler/icons-react";
 import { useState } from "react";
-import { useVersions } from "../api/graphs";
-import { sentence } from "../api/http";
-import { openRuns, useLive } from "../api/live/use-live";
-import { SIMULATOR } from "../api/robots";
-import { HoldButton } from "../ui/hold-button";
+import { useVersions } from "../../api/graphs";
+import { sentence } from "../../api/http";
+import { openRuns, useLive } from "../../api/live/use-live";
+import { SIMULATOR } from "../../api/robots";
+import { HoldButton } from "../../ui/hold-button";
 import style from "./start-control.module.css";
 import { StartDialog } from "./start-dialog";
 import { complain, lastEngines, nextLabel, useStart } from "./use-start";

@@ -3,13 +3,13 @@ import { Button, Modal, Text, TextInput } from "@mantine/core";
 import { IconEye } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
-import { sentence } from "../api/http";
-import { useLive } from "../api/live/use-live";
-import { awaitsLook, confirmRest, type Run } from "../api/runs";
-import { useMay } from "../api/use-person";
-import { HoldButton } from "../ui/hold-button";
-import style from "./rest-button.module.css";
-import { complain } from "./use-start";
+import { sentence } from "../../api/http";
+import { useLive } from "../../api/live/use-live";
+import { awaitsLook, confirmRest, type Run } from "../../api/runs";
+import { useMay } from "../../api/use-person";
+import { HoldButton } from "../../ui/hold-button";
+import { complain } from "../start/use-start";
+import style from "./confirm-rest-button.module.css";
 
 const SHORTEST = 3; // characters, as the runner asks for
 

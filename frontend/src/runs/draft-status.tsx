@@ -3,9 +3,9 @@ import { useMemo } from "react";
 import type { Run } from "../api/runs";
 import { differences } from "../graph/meaning";
 import type { Graph } from "../graph/model";
-import style from "./draft-word.module.css";
-import { SendChange } from "./send-change";
-import { useRunning } from "./use-running";
+import style from "./draft-status.module.css";
+import { SendChange } from "./modify-run";
+import { useRunning } from "./use-running-graph";
 
 interface Props {
   run: Run | null;

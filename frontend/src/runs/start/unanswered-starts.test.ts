@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
-import type { Run, StartFound } from "../api/runs";
-import { missing, unknownWords } from "./unsure-start";
-import { type SentStart, UnsureStarts } from "./unsure-starts";
+import type { Run, StartFound } from "../../api/runs";
+import { missing, unknownWords } from "./unanswered-start-notice";
+import { type SentStart, UnsureStarts } from "./unanswered-starts";
 
 const sent: SentStart = {
   request: "q",

@@ -1,10 +1,10 @@
 /** Makes a dry-run a run: started in the simulator, with the same decisions, and recorded. */
 import { IconPlayerPlayFilled } from "@tabler/icons-react";
-import type { Script } from "../api/dry-runs";
-import { useVersions } from "../api/graphs";
-import { useLive } from "../api/live/use-live";
-import { SIMULATOR } from "../api/robots";
-import { HoldButton } from "../ui/hold-button";
+import type { Script } from "../../api/dry-runs";
+import { useVersions } from "../../api/graphs";
+import { useLive } from "../../api/live/use-live";
+import { SIMULATOR } from "../../api/robots";
+import { HoldButton } from "../../ui/hold-button";
 import { nextLabel, useStart } from "./use-start";
 
 interface Props {

@@ -1,9 +1,9 @@
 /** What was looked at on one engine, item by item, in words. */
 import { Loader } from "@mantine/core";
 import { IconAlertTriangle, IconCheck, IconX } from "@tabler/icons-react";
-import type { Item, Preflight } from "../api/robots";
-import { SIMULATOR } from "../api/robots";
-import { robotColor } from "../ui/name-colors";
+import type { Item, Preflight } from "../../api/robots";
+import { SIMULATOR } from "../../api/robots";
+import { robotColor } from "../../ui/name-colors";
 import style from "./preflight-list.module.css";
 
 const WAITING: Readonly<Record<string, string>> = {

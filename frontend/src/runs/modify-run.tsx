@@ -11,8 +11,8 @@ import { modifyRun, playedBy, type Run } from "../api/runs";
 import { useMay } from "../api/use-person";
 import type { Difference } from "../graph/meaning";
 import { HoldButton } from "../ui/hold-button";
-import style from "./send-change.module.css";
-import { complain, nextLabel, published } from "./use-start";
+import style from "./modify-run.module.css";
+import { complain, nextLabel, published } from "./start/use-start";
 
 interface Props {
   run: Run;

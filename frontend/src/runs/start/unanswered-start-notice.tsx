@@ -3,13 +3,13 @@ import { CloseButton, Loader } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useEffect, useSyncExternalStore } from "react";
 import { Link } from "wouter";
-import { useLive } from "../api/live/use-live";
-import { SIMULATOR } from "../api/robots";
-import { findStart, type Run, type StartFound } from "../api/runs";
-import { runWord } from "../status/progress";
-import { robotColor } from "../ui/name-colors";
-import style from "./unsure-start.module.css";
-import { type SentStart, unsureStarts } from "./unsure-starts";
+import { useLive } from "../../api/live/use-live";
+import { SIMULATOR } from "../../api/robots";
+import { findStart, type Run, type StartFound } from "../../api/runs";
+import { runWord } from "../../status/progress";
+import { robotColor } from "../../ui/name-colors";
+import style from "./unanswered-start-notice.module.css";
+import { type SentStart, unsureStarts } from "./unanswered-starts";
 
 const AGAIN = 2_000; // ms between two looks
 const PATIENCE = 5_000; // ms that one look waits

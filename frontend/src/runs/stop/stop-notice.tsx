@@ -1,11 +1,11 @@
 /** What became of a Stop, in words, until it is proven. */
 import { CloseButton } from "@mantine/core";
 import { useState } from "react";
-import type { LiveNow, StopAsked } from "../api/live/live-socket";
-import { foreignGraphs, openRuns, useLive } from "../api/live/use-live";
-import { awaitsLook, type Run } from "../api/runs";
-import { clock, duration, useNow } from "../ui/times";
-import { RestButton } from "./rest-button";
+import type { LiveNow, StopAsked } from "../../api/live/live-socket";
+import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
+import { awaitsLook, type Run } from "../../api/runs";
+import { clock, duration, useNow } from "../../ui/times";
+import { RestButton } from "./confirm-rest-button";
 import style from "./stop-notice.module.css";
 
 const LOUD = 2_500; // ms without proof until the notice shouts

@@ -1,9 +1,9 @@
 /** STOP: one, always at the same place, never disabled; STOP ALL by keys from anywhere. */
 import { IconSquareFilled } from "@tabler/icons-react";
 import { useEffect } from "react";
-import type { Live, LiveLink } from "../api/live/live-socket";
-import { foreignGraphs, openRuns, useLive } from "../api/live/use-live";
-import type { Run } from "../api/runs";
+import type { Live, LiveLink } from "../../api/live/live-socket";
+import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
+import type { Run } from "../../api/runs";
 import style from "./stop-button.module.css";
 
 interface Props {

@@ -1,14 +1,14 @@
 /** A start: publishes what is on screen and sends exactly that to the runner, once. */
 import { notifications } from "@mantine/notifications";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
-import type { Script } from "../api/dry-runs";
-import { keys, publish, type Version, versionName } from "../api/graphs";
-import { leavesOpen, place, sentence } from "../api/http";
-import { useLive } from "../api/live/use-live";
-import { type Started, type StartOrder, startRun } from "../api/runs";
-import { newAid } from "../graph/ids";
-import { memberText } from "../graph/json-members";
-import { unsureStarts } from "./unsure-starts";
+import type { Script } from "../../api/dry-runs";
+import { keys, publish, type Version, versionName } from "../../api/graphs";
+import { leavesOpen, place, sentence } from "../../api/http";
+import { useLive } from "../../api/live/use-live";
+import { type Started, type StartOrder, startRun } from "../../api/runs";
+import { newAid } from "../../graph/ids";
+import { memberText } from "../../graph/json-members";
+import { unsureStarts } from "./unanswered-starts";
 
 export interface Order {
   /** The moment that shall run; awaited when the page has yet to hear its name. */

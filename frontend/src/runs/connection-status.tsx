@@ -3,7 +3,7 @@ import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
 import { useLive, useSeen } from "../api/live/use-live";
 import type { Run } from "../api/runs";
 import { clock, duration, useNow } from "../ui/times";
-import style from "./live-word.module.css";
+import style from "./connection-status.module.css";
 
 const OLD = 2_500; // ms; a run is looked at each second
 
