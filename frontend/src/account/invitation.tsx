@@ -10,7 +10,7 @@ import {
 } from "../api/session";
 import { Mark } from "../ui/top-bar";
 import style from "./sign-in.module.css";
-import { useEntry } from "./use-entry";
+import { useEntry } from "./use-sign-in-field";
 
 interface Props {
   link: Key;

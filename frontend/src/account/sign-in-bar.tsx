@@ -3,7 +3,7 @@ import { Button, PasswordInput } from "@mantine/core";
 import { openSession, type Person } from "../api/session";
 import { pastedKey } from "./sign-in";
 import style from "./sign-in-bar.module.css";
-import { useEntry } from "./use-entry";
+import { useEntry } from "./use-sign-in-field";
 
 export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
   const entry = useEntry((pasted) => openSession(pastedKey(pasted)), onOpen);

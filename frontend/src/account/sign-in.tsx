@@ -3,7 +3,7 @@ import { Button, Paper, PasswordInput, Text, Title } from "@mantine/core";
 import { type Key, keyIn, openSession, type Person } from "../api/session";
 import { Mark } from "../ui/top-bar";
 import style from "./sign-in.module.css";
-import { useEntry } from "./use-entry";
+import { useEntry } from "./use-sign-in-field";
 
 interface Props {
   /** Why nobody is signed in, when a link was tried. */

@@ -4,8 +4,8 @@ import { Notifications } from "@mantine/notifications";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { Route, Router, Switch } from "wouter";
-import { AskName } from "../account/ask-name";
-import { Gate } from "../account/gate";
+import { AskName } from "../account/name-prompt";
+import { Gate } from "../account/sign-in-gate";
 import { Refusal } from "../api/http";
 import { LiveProvider } from "../api/live/use-live";
 import { base } from "../api/page-url";
@@ -18,8 +18,8 @@ import { CarriedGhost } from "../ui/pointer-drag";
 import { theme, variables } from "../ui/theme";
 import { DropFiles } from "./drop-files";
 import { GraphScreen } from "./graph-screen";
-import { Lost } from "./lost";
-import { ReviewDialog } from "./review-dialog";
+import { ReviewDialog } from "./import-review-dialog";
+import { Lost } from "./not-found";
 import {
   CompareScreen,
   HomeScreen,

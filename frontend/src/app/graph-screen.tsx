@@ -8,7 +8,7 @@ import { newestRun, openRuns, useLive } from "../api/live/use-live";
 import { type Run, useLastRun } from "../api/runs";
 import { useMay, usePerson } from "../api/use-person";
 import { Editor, type Shown } from "../editor/editor";
-import { useKnownActions } from "../library/known";
+import { useKnownActions } from "../library/known-actions";
 import { Sidebar } from "../library/sidebar";
 import { LiveWord } from "../runs/connection-status";
 import { DraftWord } from "../runs/draft-status";
@@ -19,9 +19,9 @@ import { progressByAid } from "../status/progress";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom } from "../sync/use-room";
 import { Empty } from "../ui/empty";
-import { useNewGraphs } from "./files";
-import { Bar, Frame } from "./frame";
-import { useTitle } from "./title";
+import { useNewGraphs } from "./new-graphs";
+import { Bar, Frame } from "./page-frame";
+import { useTitle } from "./use-title";
 
 /** How long a start waits for the name of the moment on screen, ms. */
 const NAMED_MS = 3_000;

@@ -10,9 +10,9 @@ import { StatisticsPage } from "../review/statistics-page";
 import { RobotsPage } from "../robots/robots-page";
 import { StartDialog } from "../runs/start/start-dialog";
 import { nextLabel } from "../runs/start/use-start";
-import { useNewGraphs } from "./files";
-import { Bar, Frame } from "./frame";
-import { useTitle } from "./title";
+import { useNewGraphs } from "./new-graphs";
+import { Bar, Frame } from "./page-frame";
+import { useTitle } from "./use-title";
 
 export function HomeScreen() {
   const { create, choose } = useNewGraphs();

@@ -5,7 +5,7 @@ import { Link } from "wouter";
 import { useGraphs } from "../api/graphs";
 import { actionCarrier } from "../canvas/action-drag";
 import type { NewAction } from "../graph/edit";
-import { type KnownAction, signature } from "./known";
+import { type KnownAction, signature } from "./known-actions";
 import style from "./sidebar.module.css";
 
 function About({ known }: { known: KnownAction }) {

@@ -12,11 +12,11 @@ import { StateWord } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { initials, personColor, robotColor } from "../ui/name-colors";
 import { ago, instant, useNow } from "../ui/times";
-import { choose, labelsOf, lastRuns, ORDERS, type Order } from "./choose";
 import style from "./graph-cards.module.css";
 import { GraphMenu } from "./graph-menu";
+import { Preview } from "./graph-preview";
+import { choose, labelsOf, lastRuns, ORDERS, type Order } from "./graph-selection";
 import home from "./home.module.css";
-import { Preview } from "./preview";
 
 const FEW = 4; // robots or labels on a card
 

@@ -6,9 +6,9 @@ import { useGraphs } from "../api/graphs";
 import { useMay } from "../api/use-person";
 import type { NewAction } from "../graph/edit";
 import { ActionRow } from "./action-row";
-import { fits } from "./choose";
 import { GraphRow, RowSkeletons } from "./graph-rows";
-import { signature, useKnownActions } from "./known";
+import { fits } from "./graph-selection";
+import { signature, useKnownActions } from "./known-actions";
 import style from "./sidebar.module.css";
 
 interface Props {

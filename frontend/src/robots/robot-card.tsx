@@ -11,10 +11,10 @@ import { useMay } from "../api/use-person";
 import { EngineWord } from "../status/engine-label";
 import { robotColor } from "../ui/name-colors";
 import { ago, clock, instant, useNow } from "../ui/times";
-import { FlightRecord } from "./flight-record";
-import { KnownHere } from "./known-here";
+import { KnownHere } from "./indexed-actions";
 import style from "./robot-card.module.css";
-import { RunsHere } from "./runs-here";
+import { FlightRecord } from "./robot-log";
+import { RunsHere } from "./robot-runs";
 
 interface Props {
   robot: Robot;

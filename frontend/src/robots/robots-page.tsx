@@ -7,7 +7,7 @@ import type { Candidate, Registration } from "../api/robots";
 import { useReach } from "../api/robots";
 import { useMay } from "../api/use-person";
 import { Empty } from "../ui/empty";
-import { Candidates } from "./candidates";
+import { Candidates } from "./found-engines";
 import { RobotCard } from "./robot-card";
 import { NEW, RobotForm } from "./robot-form";
 import style from "./robots-page.module.css";

@@ -11,7 +11,7 @@ import {
   refreshGraphs,
 } from "../api/graphs";
 import { place, sentence } from "../api/http";
-import { isPlain, reviews } from "./review";
+import { isPlain, reviews } from "./import-review";
 
 const MOST_BYTES = 10 * 1024 * 1024;
 

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { GraphSummary } from "../api/graphs";
 import type { Run } from "../api/runs";
-import { choose, labelsOf, lastRuns, type Order } from "./choose";
+import { choose, labelsOf, lastRuns, type Order } from "./graph-selection";
 
 const graph = (id: string, more: Partial<GraphSummary> = {}): GraphSummary => ({
   id,

@@ -5,8 +5,8 @@ import { Link } from "wouter";
 import { useLive } from "../api/live/use-live";
 import { commandedGraph, type Told, useFlight } from "../api/robots";
 import { clock, day, instant } from "../ui/times";
-import style from "./flight-record.module.css";
-import { complain } from "./runs-here";
+import style from "./robot-log.module.css";
+import { complain } from "./robot-runs";
 
 interface Props {
   robot: string;

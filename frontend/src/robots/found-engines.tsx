@@ -3,7 +3,7 @@ import { Button } from "@mantine/core";
 import { IconRadar2 } from "@tabler/icons-react";
 import { useLive } from "../api/live/use-live";
 import { type Candidate, useCandidates } from "../api/robots";
-import style from "./candidates.module.css";
+import style from "./found-engines.module.css";
 
 interface Props {
   may: boolean;

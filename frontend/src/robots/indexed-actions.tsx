@@ -2,7 +2,7 @@
 import { Text } from "@mantine/core";
 import { useLive } from "../api/live/use-live";
 import { useKnown } from "../api/robots";
-import style from "./known-here.module.css";
+import style from "./indexed-actions.module.css";
 
 function parameters(inputs: Record<string, string>): string {
   return Object.entries(inputs)

@@ -3,8 +3,8 @@ import { Button, Group, Modal, Text } from "@mantine/core";
 import { useSyncExternalStore } from "react";
 import type { Where } from "../api/graphs";
 import { bySeverity, countWords } from "../canvas/problem-marks";
-import { dialectWords, reviews, type Waiting } from "./review";
-import style from "./review-dialog.module.css";
+import { dialectWords, reviews, type Waiting } from "./import-review";
+import style from "./import-review-dialog.module.css";
 
 const MOST_PROBLEMS = 8;
 

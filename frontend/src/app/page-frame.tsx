@@ -9,7 +9,7 @@ import { useMay } from "../api/use-person";
 import { StopButton } from "../runs/stop/stop-button";
 import { type Crumb, TopBar } from "../ui/top-bar";
 import { useSteady } from "../ui/use-stable-callback";
-import style from "./frame.module.css";
+import style from "./page-frame.module.css";
 
 interface Props {
   crumbs: readonly Crumb[];

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Preview } from "../api/graphs";
-import { dialectWords, isPlain, Reviews } from "./review";
+import { dialectWords, isPlain, Reviews } from "./import-review";
 
 const preview = (part: Partial<Preview> = {}): Preview => ({
   dialect: "D1",

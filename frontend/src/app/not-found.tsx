@@ -3,7 +3,7 @@ import { Button } from "@mantine/core";
 import { IconMapOff } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { Empty } from "../ui/empty";
-import { Bar, Frame } from "./frame";
+import { Bar, Frame } from "./page-frame";
 
 export function Lost() {
   return (

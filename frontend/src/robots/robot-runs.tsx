@@ -8,7 +8,7 @@ import { foreignGraphs, openRuns, useLive } from "../api/live/use-live";
 import { heldGraph, type Robot, stopRobot } from "../api/robots";
 import { runWord } from "../status/progress";
 import { StateWord } from "../status/state-label";
-import style from "./runs-here.module.css";
+import style from "./robot-runs.module.css";
 
 interface Props {
   robot: Robot;

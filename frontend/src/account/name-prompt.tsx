@@ -4,7 +4,7 @@ import { useState } from "react";
 import { sentence } from "../api/http";
 import { rememberedName } from "../api/session";
 import { usePerson } from "../api/use-person";
-import style from "./ask-name.module.css";
+import style from "./name-prompt.module.css";
 
 const SUGGESTION = "Operator";
 
