@@ -1,6 +1,6 @@
 """Somebody else on the domain: publishes the graph of its input as one start for a robot.
 
-`stranger.py ROBOT LISTENERS`: it waits until so many listen, the runner among them.
+`foreign_start.py ROBOT LISTENERS`: it waits until so many listen, the runner among them.
 """
 
 import json

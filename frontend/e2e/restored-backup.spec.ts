@@ -3,7 +3,7 @@
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
-import { add, card, saved } from "./bench";
+import { add, card, saved } from "./canvas";
 import { LONG, Product } from "./product";
 
 const product = new Product();

@@ -1,7 +1,7 @@
 /** A running graph is changed from the page, where that is safe: the simulator says that it is. */
 
 import { expect, test } from "@playwright/test";
-import { give, saved, start } from "./bench";
+import { give, saved, start } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();

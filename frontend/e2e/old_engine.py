@@ -1,4 +1,4 @@
-"""An engine whose starts are of another type than ours: `older.py NAME` answers on its path."""
+"""An engine whose starts are of another type than ours: `old_engine.py NAME` answers on its path."""
 
 import signal
 import sys

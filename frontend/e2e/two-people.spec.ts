@@ -1,7 +1,7 @@
 /** Two people build a graph from nothing, run it, lose both processes in between, and lose nothing. */
 
 import { expect, test } from "@playwright/test";
-import { add, card, connect, enter, give, move, saved, seenRunning, start, watch } from "./bench";
+import { add, card, connect, enter, give, move, saved, seenRunning, start, watch } from "./canvas";
 import { type Person, Product } from "./product";
 
 const product = new Product();

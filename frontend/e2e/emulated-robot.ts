@@ -101,7 +101,7 @@ export class StandIn extends Engine {
 /** An engine that was built with another generation of messages. */
 export class OlderEngine extends Engine {
   start(): void {
-    this.begin(["-c", readFileSync(join(import.meta.dirname, "older.py"), "utf8"), this.name]);
+    this.begin(["-c", readFileSync(join(import.meta.dirname, "old_engine.py"), "utf8"), this.name]);
   }
 }
 
@@ -109,7 +109,7 @@ export class OlderEngine extends Engine {
 export class Stranger extends Speaker {
   /** `listeners`: how many hear starts on the domain, the runner among them. */
   start(robot: string, graph: string, listeners: number): void {
-    const code = readFileSync(join(import.meta.dirname, "stranger.py"), "utf8");
+    const code = readFileSync(join(import.meta.dirname, "foreign_start.py"), "utf8");
     this.begin(["-c", code, robot, String(listeners)], graph);
   }
 }

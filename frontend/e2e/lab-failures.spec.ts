@@ -3,7 +3,7 @@
 import { existsSync, readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { expect, type Locator, type Page, test } from "@playwright/test";
-import { add, card, saved, start } from "./bench";
+import { add, card, saved, start } from "./canvas";
 import { LONG, Product } from "./product";
 
 const product = new Product();

@@ -1,9 +1,20 @@
 /** Drawing with a mouse: pieces travel, arrows are led, things are put in their place. */
 
 import { expect, type Locator, type Page, test } from "@playwright/test";
-import { add, arrows, boxOf, card, connect, enter, meaningOf, meant, saved, umrfOf } from "./bench";
+import {
+  add,
+  arrows,
+  boxOf,
+  card,
+  connect,
+  enter,
+  meaningOf,
+  meant,
+  saved,
+  umrfOf,
+} from "./canvas";
 import { LONG, Product } from "./product";
-import { fetching } from "./semantics";
+import { fetching } from "./task-graphs";
 
 const product = new Product();
 

@@ -1,7 +1,7 @@
 /** Problems of a graph: seen on card and arrow, gone to, mended by one press, and undone. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card, saved } from "./bench";
+import { card, saved } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();

@@ -1,7 +1,7 @@
 /** A start whose answer never comes: the page does not claim that it was not started, it looks. */
 
 import { expect, type Page, type Route, test } from "@playwright/test";
-import { saved, start } from "./bench";
+import { saved, start } from "./canvas";
 import { type Person, Product } from "./product";
 
 const product = new Product();

@@ -1,7 +1,7 @@
 /** What an action and an arrow say, and the JSON of it all: edited by hand, refused with the reason. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card, saved } from "./bench";
+import { card, saved } from "./canvas";
 import { Product, TOKEN } from "./product";
 
 const product = new Product();

@@ -1,7 +1,7 @@
 /** Home and keyboard: rename, duplicate, delete and bring back; Delete, Tab, select all, marquee. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { add, card, saved } from "./bench";
+import { add, card, saved } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();

@@ -2,9 +2,9 @@
  * somebody else's start. All of it runs first, side by side; then the pages are looked at. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card } from "./bench";
+import { card } from "./canvas";
+import { DOMAIN, NO_ROS, StandIn, Stranger } from "./emulated-robot";
 import { type Person, Product } from "./product";
-import { DOMAIN, NO_ROS, StandIn, Stranger } from "./robot";
 
 test.skip(NO_ROS !== "", NO_ROS);
 test.describe.configure({ mode: "serial" });

@@ -1,7 +1,7 @@
 /** Looking back: find a run, replay it, compare it with another, run it again with a fault. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card } from "./bench";
+import { card } from "./canvas";
 import { type Person, Product } from "./product";
 
 interface Run {

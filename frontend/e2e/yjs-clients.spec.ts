@@ -7,7 +7,7 @@ import { expect, test } from "@playwright/test";
 import WebSocket from "ws";
 import { WebsocketProvider } from "y-websocket";
 import * as Y from "yjs";
-import { add, card, saved } from "./bench";
+import { add, card, saved } from "./canvas";
 import { Product, pause, TOKEN } from "./product";
 
 const PYTHON = resolve(import.meta.dirname, "../../.venv/bin/python");
@@ -46,7 +46,12 @@ test("three kinds of clients converge, and nobody is dropped while nothing happe
   stock.on("connection-close", (event) => {
     drops.push(`${event?.code} ${event?.reason}`);
   });
-  const python = spawn(PYTHON, [resolve(import.meta.dirname, "stock.py"), room, TOKEN, "Snake"]);
+  const python = spawn(PYTHON, [
+    resolve(import.meta.dirname, "pycrdt_client.py"),
+    room,
+    TOKEN,
+    "Snake",
+  ]);
   let told = "";
   // By line: without buffering, Python writes a line and its end one after the other.
   createInterface(python.stdout).on("line", (line) => {

@@ -1,9 +1,9 @@
 /** Runs in trouble, and more than one at once: whose they are, what they wait for, why they were refused. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { saved, start } from "./bench";
+import { saved, start } from "./canvas";
+import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
 import { type Person, Product } from "./product";
-import { DOMAIN, NO_ROS, StandIn } from "./robot";
 
 test.skip(NO_ROS !== "", NO_ROS);
 test.describe.configure({ mode: "serial" });

@@ -1,7 +1,7 @@
 /** The twin of the canvas: outline and search by keyboard alone, comments between two people. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card, saved } from "./bench";
+import { card, saved } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();

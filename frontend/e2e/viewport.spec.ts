@@ -1,7 +1,7 @@
 /** What is seen: text stays readable on opening, Fit twice shows the whole, the view follows a run. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card, saved, start } from "./bench";
+import { card, saved, start } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();
