@@ -1,8 +1,8 @@
 /** The state of a dry-run: what is played, where in it one is, and what was decided. */
 import { useCallback, useEffect, useMemo, useState } from "react";
 import { useRehearsal } from "../api/dry-runs";
-import { endName } from "../edit-actions/editor-context";
 import type { Graph, Key } from "../graph/model";
+import { endName } from "../graph/relation-words";
 import type { Progress } from "../status/progress";
 import { keysByName, momentsOf, type Sighting, sightingAt, wordsOf } from "./playback";
 import {

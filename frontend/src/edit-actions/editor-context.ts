@@ -6,16 +6,7 @@ import type { DryRun } from "../dry-run/use-dry-run";
 import { relationId } from "../graph/document-keys";
 import { addAction, moveActions, type NewAction, together } from "../graph/edit";
 import { notesOf, placeNotes, withContents } from "../graph/edit/notes";
-import {
-  type Action,
-  ENTRY,
-  EXIT,
-  type Graph,
-  type Key,
-  type Position,
-  type Precondition,
-  type Relation,
-} from "../graph/model";
+import type { Action, Graph, Key, Position, Precondition, Relation } from "../graph/model";
 
 /** Where the search for an action opens, and what it is tied to once chosen. */
 export interface AddRequest {
@@ -129,16 +120,6 @@ export function putPlaces(bench: Bench, moved: ReadonlyMap<string, Position>): v
 export function selectedRelations(bench: Bench): Relation[] {
   if (bench.selection.size === 0) return [];
   return bench.graph.relations.filter((relation) => bench.selection.has(relationId(relation)));
-}
-
-/** How a person calls an end of a relation: with the number only where the name is not enough. */
-export function endName(graph: Graph, key: Key): string {
-  if (key === ENTRY) return "Entry";
-  if (key === EXIT) return "Exit";
-  const action = graph.actions.find((candidate) => candidate.key === key);
-  if (!action) return "something deleted";
-  const shared = graph.actions.some((other) => other !== action && other.name === action.name);
-  return shared ? `${action.name} ${action.instanceId}` : action.name;
 }
 
 /**

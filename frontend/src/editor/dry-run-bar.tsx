@@ -18,9 +18,10 @@ import { type DryRun, SPEEDS } from "../dry-run/use-dry-run";
 import * as deeds from "../edit-actions/dry-run-actions";
 import type { Deed } from "../edit-actions/edit-action";
 import { labelOf } from "../edit-actions/edit-action";
-import { type Bench, endName, selectedActions } from "../edit-actions/editor-context";
+import { type Bench, selectedActions } from "../edit-actions/editor-context";
 import { Shortcut } from "../edit-actions/shortcut-keys";
 import { fullName } from "../graph/model";
+import { endName } from "../graph/relation-words";
 import style from "./dry-run-bar.module.css";
 
 const CHOICES = ["on_true", "on_false", "on_error"] as const;

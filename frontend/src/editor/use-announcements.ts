@@ -1,9 +1,9 @@
 /** Says what others change and how the run goes, for those who do not see the canvas. */
 import { useEffect, useRef } from "react";
 import type * as Y from "yjs";
-import { endName } from "../edit-actions/editor-context";
 import { endsOf, rootOf, splitKey } from "../graph/document-keys";
 import type { Graph, Key } from "../graph/model";
+import { endName } from "../graph/relation-words";
 import type { Progress } from "../status/progress";
 import { useRoom } from "../sync/use-room";
 import { announcer } from "../ui/announcer";

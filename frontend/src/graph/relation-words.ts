@@ -144,3 +144,13 @@ const list = (word: string) => (items: readonly string[]) =>
     : `${items.slice(0, -1).join(", ")} ${word} ${items[items.length - 1]}`;
 const any = list("or");
 const all = list("and");
+/** How a person calls an end of a relation: with the number only where the name is not enough. */
+
+export function endName(graph: Graph, key: Key): string {
+  if (key === ENTRY) return "Entry";
+  if (key === EXIT) return "Exit";
+  const action = graph.actions.find((candidate) => candidate.key === key);
+  if (!action) return "something deleted";
+  const shared = graph.actions.some((other) => other !== action && other.name === action.name);
+  return shared ? `${action.name} ${action.instanceId}` : action.name;
+}

@@ -4,10 +4,11 @@ import { IconPlus, IconX } from "@tabler/icons-react";
 import { useState } from "react";
 import { answersOf } from "../canvas/elements";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
-import { type Bench, endName, useBench } from "../edit-actions/editor-context";
+import { type Bench, useBench } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import { connect, removeRelation, setEntry, unsetEntry } from "../graph/edit";
 import { type Action, ENTRY, EXIT, type Precondition, type Relation } from "../graph/model";
+import { endName } from "../graph/relation-words";
 import style from "./inspector.module.css";
 
 function Line({ relation, bench }: { relation: Relation; bench: Bench }) {

@@ -5,7 +5,7 @@ import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
 import type { Problem, Problems } from "../api/graphs";
 import { bySeverity, placeOf } from "../canvas/problem-marks";
 import { copyLinkTo } from "../edit-actions/clipboard";
-import { type Bench, endName, useBench } from "../edit-actions/editor-context";
+import { type Bench, useBench } from "../edit-actions/editor-context";
 import { linkToProblem } from "../edit-actions/graph-links";
 import { relationId } from "../graph/document-keys";
 import {
@@ -18,6 +18,7 @@ import {
   safeOnes,
 } from "../graph/edit/fixes";
 import type { Graph } from "../graph/model";
+import { endName } from "../graph/relation-words";
 import style from "./problem-list.module.css";
 
 /** Where a problem is, as a person would say it; empty for the graph as a whole. */

@@ -2,11 +2,11 @@
 import { Button, Select, Switch } from "@mantine/core";
 import { IconArrowDown, IconTrash } from "@tabler/icons-react";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
-import { endName, useBench } from "../edit-actions/editor-context";
+import { useBench } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import { removeRelation, setRequired, setResponse } from "../graph/edit";
 import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../graph/model";
-import { ignoredWords, relationWords } from "../graph/relation-words";
+import { endName, ignoredWords, relationWords } from "../graph/relation-words";
 import { FieldOf } from "./fields/shared-field";
 import style from "./inspector.module.css";
 import { Remaps } from "./parameters/remap-list";

@@ -1,9 +1,10 @@
 /** What can be done to a row of the outline, with its key. */
 
-import { type Bench, endName } from "../edit-actions/editor-context";
+import type { Bench } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import { removeActions, removeNotes, removeRelation, setResponse, swapOrder } from "../graph/edit";
 import { ENTRY, type Key, spoken } from "../graph/model";
+import { endName } from "../graph/relation-words";
 import type { Change } from "./row-edit";
 import type { Row } from "./rows";
 

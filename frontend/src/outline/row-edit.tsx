@@ -2,11 +2,12 @@
 import { Select, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { OUTCOMES, outcomeWord } from "../canvas/outcome";
-import { type Bench, endName, useBench } from "../edit-actions/editor-context";
+import { type Bench, useBench } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import { connect, rename, retarget, setEntry, setResponse } from "../graph/edit";
 import { changeNote } from "../graph/edit/notes";
 import { ENTRY, EXIT, type Precondition, RESPONSES, type Response } from "../graph/model";
+import { endName } from "../graph/relation-words";
 import style from "./outline.module.css";
 import type { Row } from "./rows";
 

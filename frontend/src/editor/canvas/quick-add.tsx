@@ -4,14 +4,10 @@ import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useEffect, useId, useMemo, useRef, useState } from "react";
 import { CARD } from "../../canvas/geometry/arrange";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
-import {
-  type AddRequest,
-  type Bench,
-  endName,
-  placeAction,
-} from "../../edit-actions/editor-context";
+import { type AddRequest, type Bench, placeAction } from "../../edit-actions/editor-context";
 import { connect, insertInto, type NewAction, together } from "../../graph/edit";
 import type { Position } from "../../graph/model";
+import { endName } from "../../graph/relation-words";
 import style from "./quick-add.module.css";
 
 interface Props {

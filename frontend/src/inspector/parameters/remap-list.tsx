@@ -2,10 +2,11 @@
 import { ActionIcon, Button, Select } from "@mantine/core";
 import { IconArrowDown, IconX } from "@tabler/icons-react";
 import { useState } from "react";
-import { endName, useBench } from "../../edit-actions/editor-context";
+import { useBench } from "../../edit-actions/editor-context";
 import { relationId } from "../../graph/document-keys";
 import { setRemap } from "../../graph/edit";
 import type { Relation } from "../../graph/model";
+import { endName } from "../../graph/relation-words";
 import style from "../inspector.module.css";
 import { type Choice, misfit, passed, sources, targets } from "./remap-choices";
 
