@@ -4,7 +4,7 @@ import { IconCheck, IconMessageCircle, IconRotate2 } from "@tabler/icons-react";
 import { useState } from "react";
 import { usePerson } from "../api/use-person";
 import { keysOf } from "../edit-actions/edit-action";
-import { selectedActions, useBench } from "../edit-actions/editor-context";
+import { selectedActions, useEditorContext } from "../edit-actions/editor-context";
 import { beginThread, reply, resolve, type Thread, unsay } from "../graph/edit/comments";
 import type { Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
@@ -81,7 +81,7 @@ interface CardProps {
 }
 
 function ThreadCard({ thread, place, onPlace }: CardProps) {
-  const { doc, mayEdit } = useBench();
+  const { doc, mayEdit } = useEditorContext();
   const { person } = usePerson();
   const now = useNow(30_000);
   const [answering, setAnswering] = useState(false);
@@ -157,26 +157,26 @@ function ThreadCard({ thread, place, onPlace }: CardProps) {
 }
 
 export function Comments({ threads }: { threads: readonly Thread[] }) {
-  const bench = useBench();
+  const context = useEditorContext();
   const { person } = usePerson();
   const [done, setDone] = useState(false);
-  const [action = null] = selectedActions(bench);
+  const [action = null] = selectedActions(context);
   const here = threads.filter((thread) => action === null || thread.about === action.key);
   const open = here.filter((thread) => !thread.resolved);
   const resolved = here.length - open.length;
   const go = (about: Key) => {
-    bench.select([about]);
-    bench.view.show([about]);
+    context.select([about]);
+    context.view.show([about]);
   };
   return (
     <div className={style.comments}>
-      {action !== null && bench.mayEdit && (
+      {action !== null && context.mayEdit && (
         <Write
           key={action.key}
-          label={`Comment on ${endName(bench.graph, action.key)}`}
+          label={`Comment on ${endName(context.graph, action.key)}`}
           button="Comment"
           onSay={(text) =>
-            beginThread(bench.doc, action.key, {
+            beginThread(context.doc, action.key, {
               author: { id: person.id, name: person.name },
               at: Date.now(),
               text,
@@ -196,7 +196,7 @@ export function Comments({ threads }: { threads: readonly Thread[] }) {
           <ThreadCard
             key={thread.id}
             thread={thread}
-            place={action === null ? endName(bench.graph, thread.about) : null}
+            place={action === null ? endName(context.graph, thread.about) : null}
             onPlace={() => go(thread.about)}
           />
         ))}

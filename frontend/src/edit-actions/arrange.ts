@@ -19,18 +19,24 @@ import { type Align, align, type Block, distribute, tidied } from "../canvas/geo
 import { arrange, CARD } from "../canvas/geometry/arrange";
 import { moveActions } from "../graph/edit";
 import type { Deed } from "./edit-action";
-import { type Bench, GRID, putPlaces, selectedActions, selectedNotes } from "./editor-context";
+import {
+  type EditorContext,
+  GRID,
+  selectedActions,
+  selectedNotes,
+  writePositions,
+} from "./editor-context";
 
 /** Everything chosen that stands somewhere: actions, ends, notes. */
-function blocks(bench: Bench): Block[] {
-  const [places, sizes] = [bench.places(), bench.sizes()];
-  return [...bench.selection].flatMap((key) => {
+function blocks(context: EditorContext): Block[] {
+  const [places, sizes] = [context.positions(), context.sizes()];
+  return [...context.selection].flatMap((key) => {
     const at = places.get(key);
     return at ? [{ key, x: at[0], y: at[1], ...(sizes.get(key) ?? CARD) }] : [];
   });
 }
 
-const several = (least: number) => (bench: Bench) => blocks(bench).length >= least;
+const several = (least: number) => (context: EditorContext) => blocks(context).length >= least;
 
 function aligned(name: Align, label: string, icon: Deed["icon"], shortcut?: string): Deed {
   return {
@@ -42,7 +48,7 @@ function aligned(name: Align, label: string, icon: Deed["icon"], shortcut?: stri
     changes: true,
     also: "align",
     enabled: several(2),
-    run: (bench) => putPlaces(bench, align(blocks(bench), name)),
+    run: (context) => writePositions(context, align(blocks(context), name)),
   };
 }
 
@@ -64,7 +70,7 @@ const spread = (axis: "x" | "y", label: string, icon: Deed["icon"]): Deed => ({
   changes: true,
   also: "distribute spacing",
   enabled: several(3),
-  run: (bench) => putPlaces(bench, distribute(blocks(bench), axis)),
+  run: (context) => writePositions(context, distribute(blocks(context), axis)),
 });
 
 export const DISTRIBUTE: readonly Deed[] = [
@@ -80,10 +86,10 @@ export const tidy: Deed = {
   icon: IconSitemap,
   changes: true,
   also: "auto layout arrange whole graph",
-  enabled: (bench) => bench.graph.actions.length > 0,
-  run: (bench) => {
-    moveActions(bench.doc, arrange(bench.graph, bench.sizes()));
-    requestAnimationFrame(() => bench.view.fit());
+  enabled: (context) => context.graph.actions.length > 0,
+  run: (context) => {
+    moveActions(context.doc, arrange(context.graph, context.sizes()));
+    requestAnimationFrame(() => context.view.fit());
   },
 };
 
@@ -95,10 +101,10 @@ export const tidySelection: Deed = {
   icon: IconSitemap,
   changes: true,
   also: "auto layout arrange",
-  enabled: (bench) => selectedActions(bench).length > 1,
-  run: (bench) => {
-    const keys = new Set(selectedActions(bench).map(({ key }) => key));
-    putPlaces(bench, tidied(bench.graph, keys, bench.places(), bench.sizes()));
+  enabled: (context) => selectedActions(context).length > 1,
+  run: (context) => {
+    const keys = new Set(selectedActions(context).map(({ key }) => key));
+    writePositions(context, tidied(context.graph, keys, context.positions(), context.sizes()));
   },
 };
 
@@ -110,7 +116,7 @@ export const snap: Deed = {
   icon: IconGrid4x4,
   changes: false,
   enabled: () => true,
-  run: (bench) => bench.setSnap(!bench.snap),
+  run: (context) => context.setSnap(!context.snap),
 };
 
 const STEP = 8; // px; with Shift four times as far
@@ -122,17 +128,17 @@ const WAYS = {
   ArrowDown: [0, 1, "down", IconArrowDown],
 } as const;
 
-function nudge(bench: Bench, dx: number, dy: number): void {
-  const step = bench.snap ? GRID : STEP;
+function nudge(context: EditorContext, dx: number, dy: number): void {
+  const step = context.snap ? GRID : STEP;
   const moved = new Map(
-    blocks(bench).map(({ key, x, y }) => [key, [x + dx * step, y + dy * step] as const]),
+    blocks(context).map(({ key, x, y }) => [key, [x + dx * step, y + dy * step] as const]),
   );
   // Presses in a row are one step of undo.
-  const last = bench.undo.undoStack.at(-1);
-  bench.undo.captureTimeout = last?.meta.get(NUDGED) === true ? 900 : 0;
-  putPlaces(bench, moved);
-  bench.undo.captureTimeout = 0;
-  bench.undo.undoStack.at(-1)?.meta.set(NUDGED, true);
+  const last = context.undo.undoStack.at(-1);
+  context.undo.captureTimeout = last?.meta.get(NUDGED) === true ? 900 : 0;
+  writePositions(context, moved);
+  context.undo.captureTimeout = 0;
+  context.undo.undoStack.at(-1)?.meta.set(NUDGED, true);
 }
 const NUDGED = "nudged";
 
@@ -146,8 +152,8 @@ export const NUDGE: readonly Deed[] = Object.entries(WAYS).flatMap(([key, [dx, d
       icon,
       changes: true,
       also: "nudge",
-      enabled: (bench) => selectedActions(bench).length + selectedNotes(bench).length > 0,
-      run: (bench) => nudge(bench, dx * far, dy * far),
+      enabled: (context) => selectedActions(context).length + selectedNotes(context).length > 0,
+      run: (context) => nudge(context, dx * far, dy * far),
     }),
   ),
 );

@@ -13,7 +13,7 @@ import { type Clip, clipOf, isEmpty, paste } from "../graph/edit/clip";
 import { readGraph } from "../graph/read";
 import { umrfText } from "../graph/umrf-text";
 import { copyText } from "../ui/copy-text";
-import { type Bench, selectedActions } from "./editor-context";
+import { type EditorContext, selectedActions } from "./editor-context";
 
 export interface Held {
   /** What the system's clipboard got. */
@@ -26,13 +26,13 @@ const MOST = 2_000_000; // characters that are kept for other tabs
 let latest: Held | null = null;
 
 /** What is chosen, as it goes to the clipboard. Notes alone are their own text. */
-export function copied(bench: Bench): Held {
-  const places = bench.places();
-  const clip = clipOf(bench.doc, bench.selection, places);
-  const actions = selectedActions(bench).filter(({ missing }) => !missing);
+export function copied(context: EditorContext): Held {
+  const places = context.positions();
+  const clip = clipOf(context.doc, context.selection, places);
+  const actions = selectedActions(context).filter(({ missing }) => !missing);
   if (actions.length === 0) return { text: JSON.stringify(clip.positions), clip };
   const keys = new Set(actions.map(({ key }) => key));
-  return { text: umrfText(bench.graph, keys, places), clip };
+  return { text: umrfText(context.graph, keys, places), clip };
 }
 
 /** Remembers it for this browser's pages. */
@@ -96,31 +96,31 @@ function placed(clip: Clip): Clip {
   return { ...clip, positions: { ...Object.fromEntries(arrange(graph)), ...clip.positions } };
 }
 
-function land(bench: Bench, clip: Clip, own: boolean): void {
-  const pointer = bench.view.pointer();
+function land(context: EditorContext, clip: Clip, own: boolean): void {
+  const pointer = context.view.pointer();
   const keys = paste(
-    bench.doc,
+    context.doc,
     placed(clip),
-    pointer ? { at: pointer.at } : own ? { by: [40, 40] } : { at: bench.view.middle() },
+    pointer ? { at: pointer.at } : own ? { by: [40, 40] } : { at: context.view.middle() },
   );
-  bench.select(keys);
+  context.select(keys);
   requestAnimationFrame(() => {
     const [first] = keys;
-    const at = first === undefined ? undefined : bench.places().get(first);
-    if (at) bench.view.reveal(at);
-    if (first !== undefined) bench.view.focus(first);
+    const at = first === undefined ? undefined : context.positions().get(first);
+    if (at) context.view.reveal(at);
+    if (first !== undefined) context.view.focus(first);
   });
 }
 
 /** Adds what a text holds: our own pieces exactly, any UMRF as the server reads it. */
-export async function pasteText(bench: Bench, text: string): Promise<void> {
+export async function pasteText(context: EditorContext, text: string): Promise<void> {
   const ours = held();
   if (ours !== null && ours.text === text && !isEmpty(ours.clip)) {
     // Where it came from it would lie on itself.
     const same = Object.keys(ours.clip.actions).some((key) =>
-      bench.graph.actions.some((action) => action.key === key),
+      context.graph.actions.some((action) => action.key === key),
     );
-    land(bench, ours.clip, same);
+    land(context, ours.clip, same);
     return;
   }
   if (text.trim() === "") {
@@ -130,7 +130,7 @@ export async function pasteText(bench: Bench, text: string): Promise<void> {
   try {
     const pieces = await readPieces(text);
     if (isEmpty(pieces)) failed("This UMRF text has no actions.");
-    else land(bench, pieces, false);
+    else land(context, pieces, false);
   } catch (error) {
     const where = place(error);
     failed(where === "" ? sentence(error) : `${sentence(error)} (${where})`);

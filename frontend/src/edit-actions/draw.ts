@@ -32,12 +32,18 @@ import { type Action, ENTRY, EXIT } from "../graph/model";
 import { copyText } from "../ui/copy-text";
 import { copied, hold, pasteText, readText } from "./clipboard";
 import type { Deed } from "./edit-action";
-import { type Bench, selectedActions, selectedNotes, selectedRelations } from "./editor-context";
+import {
+  type EditorContext,
+  selectedActions,
+  selectedNotes,
+  selectedRelations,
+} from "./editor-context";
 
 const always = () => true;
-const anyAction = (bench: Bench) => bench.graph.actions.length > 0;
-const someAction = (bench: Bench) => selectedActions(bench).length > 0;
-const something = (bench: Bench) => selectedActions(bench).length + selectedNotes(bench).length > 0;
+const anyAction = (context: EditorContext) => context.graph.actions.length > 0;
+const someAction = (context: EditorContext) => selectedActions(context).length > 0;
+const something = (context: EditorContext) =>
+  selectedActions(context).length + selectedNotes(context).length > 0;
 
 export const add: Deed = {
   name: "add",
@@ -48,7 +54,7 @@ export const add: Deed = {
   changes: true,
   also: "new node insert",
   enabled: always,
-  run: (bench) => bench.openAdd(),
+  run: (context) => context.openAdd(),
 };
 
 export const copy: Deed = {
@@ -61,8 +67,8 @@ export const copy: Deed = {
   event: "copy",
   also: "UMRF text clipboard",
   enabled: something,
-  run: (bench) => {
-    const held = copied(bench);
+  run: (context) => {
+    const held = copied(context);
     hold(held);
     void copyText(held.text);
   },
@@ -77,9 +83,9 @@ export const cut: Deed = {
   changes: true,
   event: "cut",
   enabled: something,
-  run: (bench) => {
-    copy.run(bench);
-    remove.run(bench);
+  run: (context) => {
+    copy.run(context);
+    remove.run(context);
   },
 };
 
@@ -93,7 +99,7 @@ export const pasteHere: Deed = {
   event: "paste",
   also: "UMRF text clipboard",
   enabled: always,
-  run: (bench) => void readText().then((text) => pasteText(bench, text)),
+  run: (context) => void readText().then((text) => pasteText(context, text)),
 };
 
 export const duplicate: Deed = {
@@ -104,11 +110,11 @@ export const duplicate: Deed = {
   icon: IconCopyPlus,
   changes: true,
   enabled: something,
-  run: (bench) => {
-    const clip = clipOf(bench.doc, bench.selection, bench.places());
-    const keys = paste(bench.doc, clip, { by: [40, 40] });
-    bench.select(keys);
-    if (keys[0] !== undefined) bench.view.focus(keys[0]);
+  run: (context) => {
+    const clip = clipOf(context.doc, context.selection, context.positions());
+    const keys = paste(context.doc, clip, { by: [40, 40] });
+    context.select(keys);
+    if (keys[0] !== undefined) context.view.focus(keys[0]);
   },
 };
 
@@ -119,16 +125,16 @@ export const remove: Deed = {
   shortcuts: ["Delete", "Backspace"],
   icon: IconTrash,
   changes: true,
-  enabled: (bench) => something(bench) || selectedRelations(bench).length > 0,
-  run: (bench) => {
-    const actions = selectedActions(bench).map((action) => action.key);
-    const relations = selectedRelations(bench).map(relationId);
-    together(bench.doc, () => {
-      removeRelations(bench.doc, relations);
-      removeActions(bench.doc, actions);
-      removeNotes(bench.doc, selectedNotes(bench));
+  enabled: (context) => something(context) || selectedRelations(context).length > 0,
+  run: (context) => {
+    const actions = selectedActions(context).map((action) => action.key);
+    const relations = selectedRelations(context).map(relationId);
+    together(context.doc, () => {
+      removeRelations(context.doc, relations);
+      removeActions(context.doc, actions);
+      removeNotes(context.doc, selectedNotes(context));
     });
-    bench.select([]);
+    context.select([]);
   },
 };
 
@@ -141,10 +147,10 @@ export const heal: Deed = {
   changes: true,
   also: "remove reconnect close the gap",
   enabled: someAction,
-  run: (bench) => {
-    const actions = selectedActions(bench).map((action) => action.key);
-    removeActions(bench.doc, actions, { heal: true });
-    bench.select([]);
+  run: (context) => {
+    const actions = selectedActions(context).map((action) => action.key);
+    removeActions(context.doc, actions, { heal: true });
+    context.select([]);
   },
 };
 
@@ -155,8 +161,8 @@ export const undo: Deed = {
   shortcuts: ["Mod+z"],
   icon: IconArrowBackUp,
   changes: true,
-  enabled: (bench) => bench.canUndo,
-  run: (bench) => bench.undo.undo(),
+  enabled: (context) => context.canUndo,
+  run: (context) => context.undo.undo(),
 };
 
 export const redo: Deed = {
@@ -166,8 +172,8 @@ export const redo: Deed = {
   shortcuts: ["Mod+Shift+z", "Mod+y"],
   icon: IconArrowForwardUp,
   changes: true,
-  enabled: (bench) => bench.canRedo,
-  run: (bench) => bench.undo.redo(),
+  enabled: (context) => context.canRedo,
+  run: (context) => context.undo.redo(),
 };
 
 export const selectAll: Deed = {
@@ -178,9 +184,9 @@ export const selectAll: Deed = {
   icon: IconSelectAll,
   changes: false,
   enabled: anyAction,
-  run: (bench) => {
-    const notes = bench.graph.notes.map(([id]) => `g/${id}`);
-    bench.select([ENTRY, EXIT, ...bench.graph.actions.map(({ key }) => key), ...notes]);
+  run: (context) => {
+    const notes = context.graph.notes.map(([id]) => `g/${id}`);
+    context.select([ENTRY, EXIT, ...context.graph.actions.map(({ key }) => key), ...notes]);
   },
 };
 
@@ -192,7 +198,7 @@ export const selectNone: Deed = {
   icon: IconDeselect,
   changes: false,
   enabled: always,
-  run: (bench) => bench.select([]),
+  run: (context) => context.select([]),
 };
 
 export const connectTo: Deed = {
@@ -204,11 +210,11 @@ export const connectTo: Deed = {
   changes: true,
   also: "connect link edge relation",
   enabled: anyAction,
-  run: (bench) => {
-    const [first, ...others] = selectedActions(bench);
-    const from = bench.selection.has(ENTRY) ? ENTRY : (first?.key ?? null);
-    const to = bench.selection.has(EXIT) ? EXIT : (others[0]?.key ?? null);
-    bench.open({ kind: "arrow", from, to });
+  run: (context) => {
+    const [first, ...others] = selectedActions(context);
+    const from = context.selection.has(ENTRY) ? ENTRY : (first?.key ?? null);
+    const to = context.selection.has(EXIT) ? EXIT : (others[0]?.key ?? null);
+    context.openOverlay({ kind: "arrow", from, to });
   },
 };
 
@@ -220,28 +226,28 @@ export const retarget: Deed = {
   icon: IconRouteAltRight,
   changes: true,
   also: "retarget reconnect redirect edge",
-  enabled: (bench) => selectedRelations(bench).length === 1,
-  run: (bench) => {
-    const [relation] = selectedRelations(bench);
-    if (relation) bench.open({ kind: "retarget", relation: relationId(relation) });
+  enabled: (context) => selectedRelations(context).length === 1,
+  run: (context) => {
+    const [relation] = selectedRelations(context);
+    if (relation) context.openOverlay({ kind: "retarget", relation: relationId(relation) });
   },
 };
 
 /** Ties all that are chosen to one end, or unties them when all of them are. */
-function toggleEnd(bench: Bench, end: typeof ENTRY | typeof EXIT): void {
+function toggleEnd(context: EditorContext, end: typeof ENTRY | typeof EXIT): void {
   const tied = (action: Action) =>
-    bench.graph.relations.some((relation) =>
+    context.graph.relations.some((relation) =>
       end === ENTRY
         ? relation.parent === ENTRY && relation.child === action.key
         : relation.parent === action.key && relation.child === EXIT,
     );
-  const actions = selectedActions(bench);
+  const actions = selectedActions(context);
   const all = actions.every(tied);
-  together(bench.doc, () => {
+  together(context.doc, () => {
     for (const { key } of actions) {
-      if (end === ENTRY) all ? unsetEntry(bench.doc, key) : setEntry(bench.doc, key);
-      else if (all) unsetExit(bench.doc, key);
-      else setExit(bench.doc, key);
+      if (end === ENTRY) all ? unsetEntry(context.doc, key) : setEntry(context.doc, key);
+      else if (all) unsetExit(context.doc, key);
+      else setExit(context.doc, key);
     }
   });
 }
@@ -255,7 +261,7 @@ export const entry: Deed = {
   changes: true,
   also: "entry begin first",
   enabled: someAction,
-  run: (bench) => toggleEnd(bench, ENTRY),
+  run: (context) => toggleEnd(context, ENTRY),
 };
 
 export const exit: Deed = {
@@ -267,5 +273,5 @@ export const exit: Deed = {
   changes: true,
   also: "exit last finish",
   enabled: someAction,
-  run: (bench) => toggleEnd(bench, EXIT),
+  run: (context) => toggleEnd(context, EXIT),
 };

@@ -11,10 +11,11 @@ import {
 } from "@tabler/icons-react";
 import type { Choice } from "../dry-run/script";
 import type { Deed } from "./edit-action";
-import type { Bench } from "./editor-context";
+import type { EditorContext } from "./editor-context";
 
 const part = { group: "Dry-run", changes: false, also: "simulate rehearse play test" } as const;
-const playing = (bench: Bench) => bench.dryRun !== null && bench.dryRun.moments.length > 0;
+const playing = (context: EditorContext) =>
+  context.dryRun !== null && context.dryRun.moments.length > 0;
 
 export const dryRun: Deed = {
   ...part,
@@ -22,8 +23,8 @@ export const dryRun: Deed = {
   label: "Dry-run",
   shortcuts: ["d"],
   icon: IconFlask,
-  enabled: (bench) => bench.dryRun !== null || bench.graph.actions.length > 0,
-  run: (bench) => (bench.dryRun === null ? bench.beginDryRun() : bench.dryRun.close()),
+  enabled: (context) => context.dryRun !== null || context.graph.actions.length > 0,
+  run: (context) => (context.dryRun === null ? context.beginDryRun() : context.dryRun.close()),
 };
 
 export const play: Deed = {
@@ -46,9 +47,11 @@ const step = (by: 1 | -1, label: string, shortcut: string, icon: Deed["icon"]): 
   label,
   shortcuts: [shortcut],
   icon,
-  enabled: (bench) =>
-    bench.dryRun !== null &&
-    (by === 1 ? bench.dryRun.index < bench.dryRun.moments.length - 1 : bench.dryRun.index > 0),
+  enabled: (context) =>
+    context.dryRun !== null &&
+    (by === 1
+      ? context.dryRun.index < context.dryRun.moments.length - 1
+      : context.dryRun.index > 0),
   run: ({ dryRun: run }) => {
     run?.play(false);
     run?.go(run.index + by);
@@ -65,7 +68,7 @@ export const restart: Deed = {
   shortcuts: ["0"],
   icon: IconPlayerSkipBack,
   enabled: playing,
-  run: (bench) => bench.dryRun?.restart(),
+  run: (context) => context.dryRun?.restart(),
 };
 
 const choice = (outcome: Choice, label: string, shortcut: string, icon: Deed["icon"]): Deed => ({
@@ -74,7 +77,7 @@ const choice = (outcome: Choice, label: string, shortcut: string, icon: Deed["ic
   label,
   shortcuts: [shortcut],
   icon,
-  enabled: (bench) => (bench.dryRun?.sighting.going.length ?? 0) > 0,
+  enabled: (context) => (context.dryRun?.sighting.going.length ?? 0) > 0,
   run: ({ dryRun: run, selection }) => {
     const chosen = run?.sighting.going.find(({ key }) => selection.has(key));
     run?.choose(outcome, chosen?.key);

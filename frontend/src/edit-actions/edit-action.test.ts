@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import { EMPTY_GRAPH } from "../graph/model";
 import { DEEDS } from "./all";
 import { deedFor, isEnabled, isPressed, keysOf, labelOf } from "./edit-action";
-import type { Bench } from "./editor-context";
+import type { EditorContext } from "./editor-context";
 
 const press = (
   key: string,
@@ -45,22 +45,22 @@ test("Mod is the command key on a Mac", () => {
 });
 
 test("who may only look is offered nothing that changes the graph, and told why", () => {
-  const bench = {
+  const context = {
     mayEdit: false,
     canUndo: true,
     canRedo: true,
     graph: { ...EMPTY_GRAPH, actions: [{ key: "a" }] },
     selection: new Set(["a"]),
-    places: () => new Map([["a", [0, 0]]]),
+    positions: () => new Map([["a", [0, 0]]]),
     sizes: () => new Map(),
-  } as unknown as Bench;
+  } as unknown as EditorContext;
   const changing = DEEDS.filter((deed) => deed.changes);
   for (const deed of changing) {
-    expect(isEnabled(deed, bench)).toBe(false);
-    expect(labelOf(deed, bench)).toBe(`${deed.label} (view only)`);
+    expect(isEnabled(deed, context)).toBe(false);
+    expect(labelOf(deed, context)).toBe(`${deed.label} (view only)`);
   }
-  const editor = { ...bench, mayEdit: true };
+  const editor = { ...context, mayEdit: true };
   expect(changing.filter((deed) => isEnabled(deed, editor)).length).toBeGreaterThan(10);
   const [copy] = DEEDS.filter(({ name }) => name === "copy");
-  expect(copy && isEnabled(copy, bench)).toBe(true);
+  expect(copy && isEnabled(copy, context)).toBe(true);
 });

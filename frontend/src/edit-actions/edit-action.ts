@@ -1,6 +1,6 @@
 /** A deed: something a person can do, as a value. Toolbar, menus, palette, keys and help are made of these. */
 import type { Icon } from "@tabler/icons-react";
-import type { Bench } from "./editor-context";
+import type { EditorContext } from "./editor-context";
 
 /** Under which heading help and menus list it. */
 export type Group = "Draw" | "Arrange" | "Look" | "Graph" | "Dry-run";
@@ -18,18 +18,18 @@ export interface Deed {
   readonly event?: "copy" | "cut" | "paste";
   /** Other words that people look for it by. */
   readonly also?: string;
-  enabled(bench: Bench): boolean;
-  run(bench: Bench): void;
+  enabled(context: EditorContext): boolean;
+  run(context: EditorContext): void;
 }
 
 /** Whether it can be done now, by this person. */
-export function isEnabled(deed: Deed, bench: Bench): boolean {
-  return (!deed.changes || bench.mayEdit) && deed.enabled(bench);
+export function isEnabled(deed: Deed, context: EditorContext): boolean {
+  return (!deed.changes || context.mayEdit) && deed.enabled(context);
 }
 
 /** What it is called, and why it is off when that is not to be seen on the canvas. */
-export function labelOf(deed: Deed, bench: Bench): string {
-  return deed.changes && !bench.mayEdit ? `${deed.label} (view only)` : deed.label;
+export function labelOf(deed: Deed, context: EditorContext): string {
+  return deed.changes && !context.mayEdit ? `${deed.label} (view only)` : deed.label;
 }
 
 const onMac = typeof navigator !== "undefined" && /Mac|iP(hone|ad)/.test(navigator.platform);

@@ -23,7 +23,7 @@ export type Panel = "details" | "outline" | "json" | "comments" | "problems";
 export type Tool = "pan" | "select";
 
 /** What opens over the editor, one at a time. */
-export type Surface =
+export type Overlay =
   | { readonly kind: "arrow"; readonly from: Key | null; readonly to: Key | null }
   | { readonly kind: "retarget"; readonly relation: string }
   /** The text of a note or frame is being written. */
@@ -33,12 +33,12 @@ export type Surface =
   | { readonly kind: "keys" };
 
 /** What a graph can be taken away as. */
-export type Format = "umrf" | "svg" | "png";
+export type ExportFormat = "umrf" | "svg" | "png";
 
 export const GRID = 20; // px
 
 /** What the canvas can do with its view. */
-export interface View {
+export interface CanvasView {
   fit(): void;
   zoomIn(): void;
   zoomOut(): void;
@@ -55,7 +55,7 @@ export interface View {
   focus(key: Key): void;
 }
 
-export interface Bench {
+export interface EditorContext {
   /** The graph's own id. */
   readonly id: string;
   readonly doc: Y.Doc;
@@ -70,7 +70,7 @@ export interface Bench {
   readonly tool: Tool;
   /** Whether what is moved by hand snaps to the grid. */
   readonly snap: boolean;
-  readonly view: View;
+  readonly view: CanvasView;
   /** The graph is played on the canvas; null while it is not. */
   readonly dryRun: DryRun | null;
   beginDryRun(): void;
@@ -79,61 +79,61 @@ export interface Bench {
   setSnap(snap: boolean): void;
   setPanel(panel: Panel): void;
   openAdd(request?: AddRequest): void;
-  open(surface: Surface | null): void;
+  openOverlay(surface: Overlay | null): void;
   openFind(): void;
   /** Where everything stands, also what has no place of its own. */
-  places(): ReadonlyMap<Key, Position>;
+  positions(): ReadonlyMap<Key, Position>;
   sizes(): ReadonlyMap<Key, { readonly width: number; readonly height: number }>;
-  download(format?: Format): void;
+  download(format?: ExportFormat): void;
 }
 
-export const BenchContext = createContext<Bench | null>(null);
+export const EditorReactContext = createContext<EditorContext | null>(null);
 
-export function useBench(): Bench {
-  const bench = use(BenchContext);
-  if (bench === null) throw new Error("useBench needs an editor around it");
-  return bench;
+export function useEditorContext(): EditorContext {
+  const context = use(EditorReactContext);
+  if (context === null) throw new Error("useBench needs an editor around it");
+  return context;
 }
 
-export function selectedActions(bench: Bench): Action[] {
-  if (bench.selection.size === 0) return [];
-  return bench.graph.actions.filter((action) => bench.selection.has(action.key));
+export function selectedActions(context: EditorContext): Action[] {
+  if (context.selection.size === 0) return [];
+  return context.graph.actions.filter((action) => context.selection.has(action.key));
 }
 
 /** Keys of the notes and frames that are chosen. */
-export function selectedNotes(bench: Bench): string[] {
-  if (bench.selection.size === 0) return [];
-  return notesOf(bench.graph).flatMap(({ key }) => (bench.selection.has(key) ? [key] : []));
+export function selectedNotes(context: EditorContext): string[] {
+  if (context.selection.size === 0) return [];
+  return notesOf(context.graph).flatMap(({ key }) => (context.selection.has(key) ? [key] : []));
 }
 
 /** Writes places by hand as one edit: frames take along what lies in them, the rest stays. */
-export function putPlaces(bench: Bench, moved: ReadonlyMap<string, Position>): void {
-  const { doc, graph } = bench;
-  const places = bench.places();
-  const all = withContents(graph, moved, places, bench.sizes());
+export function writePositions(context: EditorContext, moved: ReadonlyMap<string, Position>): void {
+  const { doc, graph } = context;
+  const places = context.positions();
+  const all = withContents(graph, moved, places, context.sizes());
   together(doc, () => {
     moveActions(doc, new Map([...unplaced(graph, places), ...all]));
     placeNotes(doc, graph, all);
   });
 }
 
-export function selectedRelations(bench: Bench): Relation[] {
-  if (bench.selection.size === 0) return [];
-  return bench.graph.relations.filter((relation) => bench.selection.has(relationId(relation)));
+export function selectedRelations(context: EditorContext): Relation[] {
+  if (context.selection.size === 0) return [];
+  return context.graph.relations.filter((relation) => context.selection.has(relationId(relation)));
 }
 
 /**
  * A free place for one more card: under what is selected, else in the middle of the view. Upper
  * left corner, on the canvas.
  */
-export function freePlace(bench: Bench): Position {
-  const [selected] = selectedActions(bench);
-  const places = bench.places();
+export function freePosition(context: EditorContext): Position {
+  const [selected] = selectedActions(context);
+  const places = context.positions();
   const at = selected && places.get(selected.key);
-  let [x, y] = at ? [at[0], at[1] + 180] : bench.view.middle();
+  let [x, y] = at ? [at[0], at[1] + 180] : context.view.middle();
   if (!at) x -= CARD.width / 2;
   const isTaken = () =>
-    bench.graph.actions.some(({ key }) => {
+    context.graph.actions.some(({ key }) => {
       const [px, py] = places.get(key) ?? [Number.POSITIVE_INFINITY, 0];
       return Math.abs(px - x) < CARD.width + 16 && Math.abs(py - y) < CARD.height + 16;
     });
@@ -142,9 +142,9 @@ export function freePlace(bench: Bench): Position {
 }
 
 /** Adds an action by hand: everything else stays where it is drawn. Answers its key. */
-export function placeAction(bench: Bench, action: NewAction, position: Position): Key {
-  return together(bench.doc, () => {
-    moveActions(bench.doc, unplaced(bench.graph, bench.places()));
-    return addAction(bench.doc, { ...action, position });
+export function addActionAt(context: EditorContext, action: NewAction, position: Position): Key {
+  return together(context.doc, () => {
+    moveActions(context.doc, unplaced(context.graph, context.positions()));
+    return addAction(context.doc, { ...action, position });
   });
 }

@@ -10,7 +10,7 @@ import { CARD } from "../canvas/geometry/arrange";
 import { relationId } from "../graph/document-keys";
 import { writeNote } from "../graph/edit/notes";
 import type { Deed } from "./edit-action";
-import { type Bench, selectedNotes, selectedRelations } from "./editor-context";
+import { type EditorContext, selectedNotes, selectedRelations } from "./editor-context";
 
 const SIZE = [200, 84] as const; // px of a new note
 const AIR = 28; // px between a frame and what lies in it
@@ -24,25 +24,28 @@ export const note: Deed = {
   changes: true,
   also: "sticky comment text",
   enabled: () => true,
-  run: (bench) => {
-    const [x, y] = bench.view.pointer()?.at ?? bench.view.middle();
+  run: (context) => {
+    const [x, y] = context.view.pointer()?.at ?? context.view.middle();
     const at = [x - SIZE[0] / 2, y - SIZE[1] / 2] as const;
-    const key = writeNote(bench.doc, { kind: "note", at, size: SIZE, text: "", color: "amber" });
-    bench.select([key]);
-    bench.open({ kind: "note", key });
+    const key = writeNote(context.doc, { kind: "note", at, size: SIZE, text: "", color: "amber" });
+    context.select([key]);
+    context.openOverlay({ kind: "note", key });
   },
 };
 
 /** Round what is chosen, else round the middle of the view. */
-function boxOf(bench: Bench): { at: readonly [number, number]; size: readonly [number, number] } {
-  const [places, sizes] = [bench.places(), bench.sizes()];
-  const boxes = [...bench.selection].flatMap((key) => {
+function boxOf(context: EditorContext): {
+  at: readonly [number, number];
+  size: readonly [number, number];
+} {
+  const [places, sizes] = [context.positions(), context.sizes()];
+  const boxes = [...context.selection].flatMap((key) => {
     const at = places.get(key);
     const { width, height } = sizes.get(key) ?? CARD;
     return at ? [[at[0], at[1], at[0] + width, at[1] + height] as const] : [];
   });
   if (boxes.length === 0) {
-    const [x, y] = bench.view.middle();
+    const [x, y] = context.view.middle();
     return { at: [x - 200, y - 40], size: [400, 280] };
   }
   const left = Math.min(...boxes.map((box) => box[0])) - AIR;
@@ -61,11 +64,11 @@ export const frame: Deed = {
   changes: true,
   also: "group section box round the selection",
   enabled: () => true,
-  run: (bench) => {
-    const { at, size } = boxOf(bench);
-    const key = writeNote(bench.doc, { kind: "frame", at, size, text: "", color: "blue" });
-    bench.select([key]);
-    bench.open({ kind: "note", key });
+  run: (context) => {
+    const { at, size } = boxOf(context);
+    const key = writeNote(context.doc, { kind: "frame", at, size, text: "", color: "blue" });
+    context.select([key]);
+    context.openOverlay({ kind: "note", key });
   },
 };
 
@@ -77,10 +80,10 @@ export const write: Deed = {
   icon: IconPencil,
   changes: true,
   also: "edit note title",
-  enabled: (bench) => bench.selection.size === 1 && selectedNotes(bench).length === 1,
-  run: (bench) => {
-    const [key] = selectedNotes(bench);
-    if (key !== undefined) bench.open({ kind: "note", key });
+  enabled: (context) => context.selection.size === 1 && selectedNotes(context).length === 1,
+  run: (context) => {
+    const [key] = selectedNotes(context);
+    if (key !== undefined) context.openOverlay({ kind: "note", key });
   },
 };
 
@@ -93,8 +96,8 @@ export const details: Deed = {
   changes: false,
   also: "parameters properties form",
   enabled: () => true,
-  run: (bench) => {
-    bench.setPanel("details");
+  run: (context) => {
+    context.setPanel("details");
     // Where the panel slides in, it cannot have the focus before it is seen.
     setTimeout(() => {
       const panel = document.querySelector(
@@ -114,14 +117,19 @@ export const insert: Deed = {
   icon: IconRowInsertBottom,
   changes: true,
   also: "splice between",
-  enabled: (bench) => selectedRelations(bench).length === 1,
-  run: (bench) => {
-    const [relation] = selectedRelations(bench);
+  enabled: (context) => selectedRelations(context).length === 1,
+  run: (context) => {
+    const [relation] = selectedRelations(context);
     if (!relation) return;
-    const [a, b] = [relation.parent, relation.child].map((key) => bench.places().get(key));
+    const [a, b] = [relation.parent, relation.child].map((key) => context.positions().get(key));
     const [x, y] =
-      a && b ? [(a[0] + b[0] + CARD.width) / 2, (a[1] + b[1]) / 2] : bench.view.middle();
+      a && b ? [(a[0] + b[0] + CARD.width) / 2, (a[1] + b[1]) / 2] : context.view.middle();
     const at = [Math.round(x), Math.round(y)] as const;
-    bench.openAdd({ screen: bench.view.screenOf(at), at, from: null, into: relationId(relation) });
+    context.openAdd({
+      screen: context.view.screenOf(at),
+      at,
+      from: null,
+      into: relationId(relation),
+    });
   },
 };

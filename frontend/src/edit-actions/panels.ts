@@ -12,8 +12,8 @@ export const PANELS: readonly Deed[] = [
     shortcuts: ["Mod+f"],
     icon: IconSearch,
     also: "search robot parameter value problem",
-    enabled: (bench) => bench.graph.actions.length > 0,
-    run: (bench) => bench.openFind(),
+    enabled: (context) => context.graph.actions.length > 0,
+    run: (context) => context.openFind(),
   },
   {
     ...look,
@@ -22,7 +22,7 @@ export const PANELS: readonly Deed[] = [
     shortcuts: ["o"],
     icon: IconListTree,
     also: "tree list rows",
-    run: (bench) => bench.setPanel("outline"),
+    run: (context) => context.setPanel("outline"),
   },
   {
     ...look,
@@ -31,6 +31,6 @@ export const PANELS: readonly Deed[] = [
     shortcuts: ["m"],
     icon: IconMessageCircle,
     also: "talk threads",
-    run: (bench) => bench.setPanel("comments"),
+    run: (context) => context.setPanel("comments"),
   },
 ];

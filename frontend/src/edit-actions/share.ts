@@ -14,7 +14,7 @@ export const exportUmrf: Deed = {
   shortcuts: ["Mod+s"],
   icon: IconDownload,
   also: "download save file JSON",
-  run: (bench) => bench.download("umrf"),
+  run: (context) => context.download("umrf"),
 };
 
 export const exportSvg: Deed = {
@@ -24,7 +24,7 @@ export const exportSvg: Deed = {
   shortcuts: [],
   icon: IconVectorTriangle,
   also: "picture image download vector",
-  run: (bench) => bench.download("svg"),
+  run: (context) => context.download("svg"),
 };
 
 export const exportPng: Deed = {
@@ -34,7 +34,7 @@ export const exportPng: Deed = {
   shortcuts: [],
   icon: IconPhoto,
   also: "picture image download",
-  run: (bench) => bench.download("png"),
+  run: (context) => context.download("png"),
 };
 
 export const copyLink: Deed = {
@@ -44,7 +44,7 @@ export const copyLink: Deed = {
   shortcuts: ["Mod+Shift+l"],
   icon: IconLink,
   also: "share url address deep link",
-  run: (bench) => {
-    void copyLinkTo(linkTo(bench.id, [...bench.selection]));
+  run: (context) => {
+    void copyLinkTo(linkTo(context.id, [...context.selection]));
   },
 };

@@ -4,7 +4,7 @@ import { useEffect, useRef } from "react";
 import { DEEDS } from "./all";
 import { copied, hold, pasteText } from "./clipboard";
 import { deedFor, isEnabled } from "./edit-action";
-import type { Bench } from "./editor-context";
+import type { EditorContext } from "./editor-context";
 
 /** Whether single letters are shortcuts: speech input types letters by itself. */
 export function useSingleKeys() {
@@ -52,9 +52,9 @@ function isOverCanvas(): boolean {
   return idle && document.querySelector(".react-flow__pane:hover") !== null;
 }
 
-export function useShortcuts(bench: Bench): void {
-  const now = useRef(bench);
-  now.current = bench;
+export function useShortcuts(context: EditorContext): void {
+  const now = useRef(context);
+  now.current = context;
   const [singles] = useSingleKeys();
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
@@ -97,13 +97,13 @@ export function useShortcuts(bench: Bench): void {
   useClipboard(now);
 }
 
-function addAtPointer(bench: Bench): void {
-  const pointer = bench.view.pointer();
-  bench.openAdd(pointer ? { ...pointer, from: null } : undefined);
+function addAtPointer(context: EditorContext): void {
+  const pointer = context.view.pointer();
+  context.openAdd(pointer ? { ...pointer, from: null } : undefined);
 }
 
 /** Copy, cut and paste come as events that carry the clipboard, also on plain http. */
-function useClipboard(now: { readonly current: Bench }): void {
+function useClipboard(now: { readonly current: EditorContext }): void {
   useEffect(() => {
     const deedOf = (event: ClipboardEvent) => {
       const deed = DEEDS.find((each) => each.event === event.type);

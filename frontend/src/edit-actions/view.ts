@@ -14,7 +14,7 @@ import {
 } from "@tabler/icons-react";
 import { ENTRY, type Key } from "../graph/model";
 import type { Deed } from "./edit-action";
-import { type Bench, selectedRelations } from "./editor-context";
+import { type EditorContext, selectedRelations } from "./editor-context";
 
 const always = () => true;
 const look = { group: "Look", changes: false, enabled: always } as const;
@@ -26,7 +26,7 @@ export const palette: Deed = {
   shortcuts: ["Mod+k"],
   icon: IconCommand,
   also: "command palette go to graph action",
-  run: (bench) => bench.open({ kind: "palette" }),
+  run: (context) => context.openOverlay({ kind: "palette" }),
 };
 
 export const keys: Deed = {
@@ -36,7 +36,7 @@ export const keys: Deed = {
   shortcuts: ["?"],
   icon: IconKeyboard,
   also: "help",
-  run: (bench) => bench.open({ kind: "keys" }),
+  run: (context) => context.openOverlay({ kind: "keys" }),
 };
 
 export const menu: Deed = {
@@ -45,14 +45,14 @@ export const menu: Deed = {
   label: "Menu for the selection",
   shortcuts: ["ContextMenu", "Shift+F10"],
   icon: IconMenu2,
-  run: (bench) => bench.open({ kind: "menu", screen: spotOf(bench) }),
+  run: (context) => context.openOverlay({ kind: "menu", screen: spotOf(context) }),
 };
 
 /** Where on screen the selection is, else the middle of the canvas. */
-function spotOf(bench: Bench): readonly [number, number] {
-  const [key] = [...bench.selection].filter((each) => bench.places().has(each));
-  const at = key === undefined ? undefined : bench.places().get(key);
-  const [x, y] = bench.view.screenOf(at ?? bench.view.middle());
+function spotOf(context: EditorContext): readonly [number, number] {
+  const [key] = [...context.selection].filter((each) => context.positions().has(each));
+  const at = key === undefined ? undefined : context.positions().get(key);
+  const [x, y] = context.view.screenOf(at ?? context.view.middle());
   return [x + 24, y + 24];
 }
 
@@ -63,10 +63,10 @@ export const toCanvas: Deed = {
   shortcuts: ["F6"],
   icon: IconFocusCentered,
   also: "leave the form focus",
-  run: (bench) => {
+  run: (context) => {
     if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
-    const [key] = [...bench.selection].filter((each) => bench.places().has(each));
-    if (key !== undefined) bench.view.focus(key);
+    const [key] = [...context.selection].filter((each) => context.positions().has(each));
+    if (key !== undefined) context.view.focus(key);
   },
 };
 
@@ -77,7 +77,7 @@ export const fit: Deed = {
   shortcuts: ["f", "Shift+!"],
   icon: IconFocusCentered,
   also: "zoom to fit all",
-  run: (bench) => bench.view.fit(),
+  run: (context) => context.view.fit(),
 };
 
 export const zoomSelection: Deed = {
@@ -87,14 +87,14 @@ export const zoomSelection: Deed = {
   shortcuts: ["z", "Shift+@"],
   icon: IconFocus2,
   also: "zoom to selection",
-  enabled: (bench) => bench.selection.size > 0,
-  run: (bench) => bench.view.show(shownKeys(bench), "whole"),
+  enabled: (context) => context.selection.size > 0,
+  run: (context) => context.view.show(shownKeys(context), "whole"),
 };
 
 /** What is chosen, and for arrows what they tie together. */
-export function shownKeys(bench: Bench): Key[] {
-  const ends = selectedRelations(bench).flatMap(({ parent, child }) => [parent, child]);
-  return [...bench.selection, ...ends].filter((key) => bench.places().has(key));
+export function shownKeys(context: EditorContext): Key[] {
+  const ends = selectedRelations(context).flatMap(({ parent, child }) => [parent, child]);
+  return [...context.selection, ...ends].filter((key) => context.positions().has(key));
 }
 
 export const zoomIn: Deed = {
@@ -103,7 +103,7 @@ export const zoomIn: Deed = {
   label: "Zoom in",
   shortcuts: ["=", "Plus"],
   icon: IconZoomIn,
-  run: (bench) => bench.view.zoomIn(),
+  run: (context) => context.view.zoomIn(),
 };
 
 export const zoomOut: Deed = {
@@ -112,7 +112,7 @@ export const zoomOut: Deed = {
   label: "Zoom out",
   shortcuts: ["-"],
   icon: IconZoomOut,
-  run: (bench) => bench.view.zoomOut(),
+  run: (context) => context.view.zoomOut(),
 };
 
 export const pan: Deed = {
@@ -121,7 +121,7 @@ export const pan: Deed = {
   label: "Pan",
   shortcuts: ["h"],
   icon: IconHandStop,
-  run: (bench) => bench.setTool("pan"),
+  run: (context) => context.setTool("pan"),
 };
 
 export const marquee: Deed = {
@@ -132,7 +132,7 @@ export const marquee: Deed = {
   icon: IconMarquee2,
   also: "marquee frame several",
   // Pressed once more it is over: small screens show no other way back.
-  run: (bench) => bench.setTool(bench.tool === "select" ? "pan" : "select"),
+  run: (context) => context.setTool(context.tool === "select" ? "pan" : "select"),
 };
 
 export const showJson: Deed = {
@@ -141,16 +141,19 @@ export const showJson: Deed = {
   label: "Show the JSON",
   shortcuts: ["j"],
   icon: IconBraces,
-  run: (bench) => bench.setPanel("json"),
+  run: (context) => context.setPanel("json"),
 };
 
 /** The nearest neighbour along arrows: down to what follows, up to what comes before, or beside. */
-export function neighbour(bench: Bench, way: "up" | "down" | "left" | "right"): Key | null {
-  const { relations, actions } = bench.graph;
-  const places = bench.places();
-  const [arrow] = selectedRelations(bench);
+export function neighbour(
+  context: EditorContext,
+  way: "up" | "down" | "left" | "right",
+): Key | null {
+  const { relations, actions } = context.graph;
+  const places = context.positions();
+  const [arrow] = selectedRelations(context);
   if (arrow && (way === "up" || way === "down")) return way === "up" ? arrow.parent : arrow.child;
-  const [from] = [...bench.selection].filter((key) => places.has(key));
+  const [from] = [...context.selection].filter((key) => places.has(key));
   if (from === undefined)
     return relations.find((r) => r.parent === ENTRY)?.child ?? actions[0]?.key ?? null;
   const at = places.get(from) ?? [0, 0];
@@ -184,12 +187,12 @@ export const WALK: readonly Deed[] = (["up", "down", "left", "right"] as const).
   shortcuts: [`Alt+Arrow${way.charAt(0).toUpperCase()}${way.slice(1)}`],
   icon: IconArrowGuide,
   also: "walk neighbour",
-  enabled: (bench: Bench) => bench.graph.actions.length > 0,
-  run: (bench: Bench) => {
-    const key = neighbour(bench, way);
+  enabled: (context: EditorContext) => context.graph.actions.length > 0,
+  run: (context: EditorContext) => {
+    const key = neighbour(context, way);
     if (key === null) return;
-    bench.select([key]);
-    bench.view.reveal(bench.places().get(key) ?? [0, 0]);
-    bench.view.focus(key);
+    context.select([key]);
+    context.view.reveal(context.positions().get(key) ?? [0, 0]);
+    context.view.focus(key);
   },
 }));

@@ -4,7 +4,7 @@ import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import type { Marks } from "../canvas/problem-marks";
-import { type Bench, useBench } from "../edit-actions/editor-context";
+import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import type { Key, Position } from "../graph/model";
 import { Robots } from "../outline/robot-filter";
 import { FollowFrame } from "../people/people";
@@ -23,7 +23,7 @@ import { useDeepLink } from "./use-graph-link";
 
 interface Props {
   me: string;
-  sight: EditorState["sight"];
+  canvasHandle: EditorState["canvasHandle"];
   progress: ReadonlyMap<Key, Progress>;
   marks: Marks;
   compact: boolean;
@@ -40,7 +40,7 @@ interface Props {
 
 function Inside({
   me,
-  sight,
+  canvasHandle,
   progress,
   marks,
   compact,
@@ -50,23 +50,23 @@ function Inside({
   record,
   corner,
 }: Props) {
-  const calm = useBench();
+  const calm = useEditorContext();
   const graph = useGraph();
   // The canvas keeps up with the hands of others; what stands beside it comes after.
-  const bench = useMemo<Bench>(() => ({ ...calm, graph }), [calm, graph]);
+  const context = useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
   const arrived = useLinkPart(({ seq }) => seq > 0);
   const canvas = useCanvas({
     me,
-    graph: bench.graph,
-    selection: bench.selection,
-    select: bench.select,
-    progress: bench.dryRun?.sighting.progress ?? progress,
+    graph: context.graph,
+    selection: context.selection,
+    select: context.select,
+    progress: context.dryRun?.sighting.progress ?? progress,
     marks,
   });
   const { flow, places, sizes } = canvas;
   const frame = useRef<HTMLDivElement>(null);
   const pointer = useRef<Position | null>(null);
-  const begun = arrived && bench.graph.actions.length > 0;
+  const begun = arrived && context.graph.actions.length > 0;
   const { view, lost, onPanned, onFollow } = useView({
     flow,
     frame,
@@ -74,26 +74,26 @@ function Inside({
     sizes,
     phone,
     begun,
-    progress: bench.dryRun ? NOTHING : progress,
-    run: bench.dryRun ? null : run,
+    progress: context.dryRun ? NOTHING : progress,
+    run: context.dryRun ? null : run,
     pointer,
   });
   const followed = useFollowedView({ flow, frame, view, onPanned });
   useEffect(() => {
-    sight.current = { places: () => places, sizes: () => sizes, view: followed.view };
-  }, [sight, followed, places, sizes]);
+    canvasHandle.current = { positions: () => places, sizes: () => sizes, view: followed.view };
+  }, [canvasHandle, followed, places, sizes]);
 
-  useDryRunInView(bench);
-  useDeepLink(bench, begun);
+  useDryRunInView(context);
+  useDeepLink(context, begun);
 
   return (
     <div className={style.whole}>
-      <div className={style.stage} ref={frame} data-dry={bench.dryRun ? true : undefined}>
+      <div className={style.stage} ref={frame} data-dry={context.dryRun ? true : undefined}>
         <Canvas
-          bench={bench}
+          context={context}
           canvas={canvas}
           me={me}
-          map={!compact && bench.graph.actions.length > 3}
+          map={!compact && context.graph.actions.length > 3}
           onPanned={() => {
             onPanned();
             followed.end();
@@ -107,20 +107,20 @@ function Inside({
             <Skeleton height={92} width={208} radius="lg" />
           </div>
         )}
-        {arrived && bench.graph.actions.length === 0 && !bench.mayEdit && (
+        {arrived && context.graph.actions.length === 0 && !context.mayEdit && (
           <div className={style.empty}>
             <Empty icon={<IconRouteAltLeft size={22} />} title="Nothing is drawn yet">
               What the others draw appears here. You are here to look.
             </Empty>
           </div>
         )}
-        {arrived && bench.graph.actions.length === 0 && bench.mayEdit && (
+        {arrived && context.graph.actions.length === 0 && context.mayEdit && (
           <div className={style.empty}>
             <Empty
               icon={<IconRouteAltLeft size={22} />}
               title="What shall be done first?"
               action={
-                <Button variant="filled" onClick={() => bench.openAdd()}>
+                <Button variant="filled" onClick={() => context.openAdd()}>
                   Add an action
                 </Button>
               }
@@ -136,7 +136,7 @@ function Inside({
           </div>
         )}
         <FollowFrame me={me} />
-        <div className={style.tools} data-hidden={(phone && bench.dryRun !== null) || undefined}>
+        <div className={style.tools} data-hidden={(phone && context.dryRun !== null) || undefined}>
           <Toolbar compact={compact} />
         </div>
         <div className={style.corner}>
@@ -145,10 +145,10 @@ function Inside({
               Follow the run
             </Button>
           )}
-          {!bench.dryRun && corner}
+          {!context.dryRun && corner}
         </div>
       </div>
-      {bench.dryRun && <DryRunBar bench={bench} run={bench.dryRun} record={record} />}
+      {context.dryRun && <DryRunBar context={context} run={context.dryRun} record={record} />}
     </div>
   );
 }
@@ -156,8 +156,8 @@ function Inside({
 const NOTHING: ReadonlyMap<Key, Progress> = new Map();
 
 /** What begins to run in a dry-run comes into view. */
-function useDryRunInView(bench: Bench): void {
-  const { dryRun, places, view } = bench;
+function useDryRunInView(context: EditorContext): void {
+  const { dryRun, positions: places, view } = context;
   const keys = dryRun?.sighting.going.map(({ key }) => key).join(" ") ?? "";
   // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
   useEffect(() => {
@@ -167,7 +167,7 @@ function useDryRunInView(bench: Bench): void {
   }, [keys]);
 }
 
-export function Stage(props: Props) {
+export function CanvasPane(props: Props) {
   return (
     <ReactFlowProvider>
       <Inside {...props} />

@@ -18,7 +18,7 @@ import { type DryRun, SPEEDS } from "../dry-run/use-dry-run";
 import * as deeds from "../edit-actions/dry-run-actions";
 import type { Deed } from "../edit-actions/edit-action";
 import { labelOf } from "../edit-actions/edit-action";
-import { type Bench, selectedActions } from "../edit-actions/editor-context";
+import { type EditorContext, selectedActions } from "../edit-actions/editor-context";
 import { Shortcut } from "../edit-actions/shortcut-keys";
 import { fullName } from "../graph/model";
 import { endName } from "../graph/relation-words";
@@ -26,21 +26,29 @@ import style from "./dry-run-bar.module.css";
 
 const CHOICES = ["on_true", "on_false", "on_error"] as const;
 
-function Step({ bench, deed, children }: { bench: Bench; deed: Deed; children?: ReactNode }) {
+function Step({
+  context,
+  deed,
+  children,
+}: {
+  context: EditorContext;
+  deed: Deed;
+  children?: ReactNode;
+}) {
   const Sign = deed.icon;
   return (
     <Tooltip
       label={
         <>
-          {labelOf(deed, bench)} <Shortcut deed={deed} />
+          {labelOf(deed, context)} <Shortcut deed={deed} />
         </>
       }
     >
       <ActionIcon
         size={34}
         aria-label={deed.label}
-        disabled={!deed.enabled(bench)}
-        onClick={() => deed.run(bench)}
+        disabled={!deed.enabled(context)}
+        onClick={() => deed.run(context)}
       >
         {children ?? <Sign size={17} aria-hidden />}
       </ActionIcon>
@@ -56,12 +64,12 @@ function time(ms: number): string {
 }
 
 /** The action whose end is to be chosen: the selected one if it runs. */
-export function asked(bench: Bench, run: DryRun): Going | undefined {
-  return run.sighting.going.find(({ key }) => bench.selection.has(key)) ?? run.sighting.going[0];
+export function asked(context: EditorContext, run: DryRun): Going | undefined {
+  return run.sighting.going.find(({ key }) => context.selection.has(key)) ?? run.sighting.going[0];
 }
 
-function Choices({ bench, run }: { bench: Bench; run: DryRun }) {
-  const going = asked(bench, run);
+function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
+  const going = asked(context, run);
   if (!going) return null;
   const others = run.sighting.going.length > 1;
   return (
@@ -69,7 +77,7 @@ function Choices({ bench, run }: { bench: Bench; run: DryRun }) {
     <div
       className={style.choices}
       role="group"
-      aria-label={`How does ${endName(bench.graph, going.key)} end?`}
+      aria-label={`How does ${endName(context.graph, going.key)} end?`}
     >
       {others ? (
         <Select
@@ -78,13 +86,13 @@ function Choices({ bench, run }: { bench: Bench; run: DryRun }) {
           aria-label="Which running action"
           data={run.sighting.going.map(({ key }) => ({
             value: key,
-            label: endName(bench.graph, key),
+            label: endName(context.graph, key),
           }))}
           value={going.key}
-          onChange={(key) => key && bench.select([key])}
+          onChange={(key) => key && context.select([key])}
         />
       ) : (
-        <b>{endName(bench.graph, going.key)}</b>
+        <b>{endName(context.graph, going.key)}</b>
       )}
       <span className={style.how}>ends</span>
       {CHOICES.map((outcome, i) => (
@@ -107,10 +115,10 @@ function Choices({ bench, run }: { bench: Bench; run: DryRun }) {
 
 const OF_ACTIONS = ["error", "never", "exception", "deaf"] as const satisfies readonly FaultKind[];
 
-function Faults({ bench, run }: { bench: Bench; run: DryRun }) {
+function Faults({ context, run }: { context: EditorContext; run: DryRun }) {
   const { fault } = run.decided;
-  const [first] = selectedActions(bench);
-  const node = (first && fullName(first)) ?? asked(bench, run)?.node;
+  const [first] = selectedActions(context);
+  const node = (first && fullName(first)) ?? asked(context, run)?.node;
   const at = run.moments[run.index]?.at ?? 0;
   const said =
     fault === null
@@ -170,11 +178,11 @@ function Said({ run }: { run: DryRun }) {
 }
 
 export function DryRunBar({
-  bench,
+  context,
   run,
   record,
 }: {
-  bench: Bench;
+  context: EditorContext;
   run: DryRun;
   record: ReactNode;
 }) {
@@ -183,20 +191,20 @@ export function DryRunBar({
     <section className={style.bar} aria-label="Dry-run">
       <div className={style.row}>
         <span className={style.title}>Dry-run</span>
-        <Step bench={bench} deed={deeds.restart}>
+        <Step context={context} deed={deeds.restart}>
           <IconPlayerSkipBack size={17} aria-hidden />
         </Step>
-        <Step bench={bench} deed={deeds.back}>
+        <Step context={context} deed={deeds.back}>
           <IconPlayerTrackPrev size={17} aria-hidden />
         </Step>
-        <Step bench={bench} deed={deeds.play}>
+        <Step context={context} deed={deeds.play}>
           {run.playing ? (
             <IconPlayerPauseFilled size={17} aria-hidden />
           ) : (
             <IconPlayerPlayFilled size={17} aria-hidden />
           )}
         </Step>
-        <Step bench={bench} deed={deeds.next}>
+        <Step context={context} deed={deeds.next}>
           <IconPlayerTrackNext size={17} aria-hidden />
         </Step>
         <input
@@ -223,7 +231,7 @@ export function DryRunBar({
           value={String(run.speed)}
           onChange={(speed) => run.setSpeed(Number(speed ?? 1))}
         />
-        <Faults bench={bench} run={run} />
+        <Faults context={context} run={run} />
         <Tooltip
           label={
             <>
@@ -240,7 +248,7 @@ export function DryRunBar({
         <p className={style.said} aria-live="polite">
           <Said run={run} />
         </p>
-        <Choices bench={bench} run={run} />
+        <Choices context={context} run={run} />
       </div>
       <div className={style.note}>
         <span>Nothing of this is recorded.</span>

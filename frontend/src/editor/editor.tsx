@@ -10,11 +10,11 @@ import { marksOf } from "../canvas/problem-marks";
 import { useTalkOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
 import {
-  type Bench,
-  BenchContext,
-  freePlace,
+  addActionAt,
+  type EditorContext,
+  EditorReactContext,
+  freePosition,
   type Panel,
-  placeAction,
 } from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/shortcuts";
 import { FindBar } from "../find/find-bar";
@@ -29,9 +29,9 @@ import { useCalmLink } from "../sync/use-room";
 import type { Crumb } from "../ui/top-bar";
 import { useIsPhone, useIsWide } from "../ui/use-screen-size";
 import { QuickAdd } from "./canvas/quick-add";
-import { Stage } from "./canvas-pane";
+import { CanvasPane } from "./canvas-pane";
 import style from "./editor.module.css";
-import { Surfaces } from "./menus/overlays";
+import { Overlays } from "./menus/overlays";
 import { ProblemWord } from "./problem-count";
 import { Notices } from "./room-notices";
 import { SavedWord } from "./save-status";
@@ -96,10 +96,10 @@ const PANES = [
   { value: "run", label: "Run" },
 ];
 
-function obstacleOf(bench: Bench, link: Link, problems: Problems | undefined) {
+function obstacleOf(context: EditorContext, link: Link, problems: Problems | undefined) {
   if (link.state !== "live") return "not connected to the editor";
   if (link.unsaved > 0) return "saving";
-  if (bench.graph.actions.length === 0) return "nothing to run yet";
+  if (context.graph.actions.length === 0) return "nothing to run yet";
   const errors = problems?.problems.filter((problem) => problem.severity === "error").length ?? 0;
   if (errors > 0 && problems?.seq === link.seq) {
     return errors === 1 ? "1 problem must be solved" : `${errors} problems must be solved`;
@@ -108,12 +108,12 @@ function obstacleOf(bench: Bench, link: Link, problems: Problems | undefined) {
 }
 
 /** Where one is: the graphs, this one, and what of it is chosen. */
-function crumbsOf(bench: Bench): Crumb[] {
-  const [only, ...others] = bench.selection;
-  const action = bench.graph.actions.find(({ key }) => key === only);
+function crumbsOf(context: EditorContext): Crumb[] {
+  const [only, ...others] = context.selection;
+  const action = context.graph.actions.find(({ key }) => key === only);
   return [
     { label: "Graphs", to: "/" },
-    { label: bench.graph.name || "Untitled" },
+    { label: context.graph.name || "Untitled" },
     ...(action && others.length === 0
       ? [{ label: `${action.name} ${action.instanceId}`, part: true }]
       : []),
@@ -142,68 +142,76 @@ export function Editor(props: Props) {
     setPane((now) => (outline ? "outline" : now === "outline" ? "details" : now));
     if (outline) requestAnimationFrame(focusOutline);
   }, []);
-  const { bench, panel, adding, finding, surface, sight, closeAdd, closeFind, close } = useEditor(
-    id,
-    onPanel,
-  );
+  const {
+    context,
+    panel,
+    adding,
+    finding,
+    overlay,
+    canvasHandle,
+    closeAdd,
+    closeFind,
+    closeOverlay: close,
+  } = useEditor(id, onPanel);
   const link = useCalmLink();
   const problems = useProblems(id, link.seq).data;
   const marks = useMemo(() => marksOf(problems?.problems ?? []), [problems]);
   const threads = useThreads();
   useTalkOnCards(threads);
-  useRemoteNews(bench.graph, link.seq > 0);
-  useRunNews(bench.graph, progress);
-  useShortcuts(bench);
+  useRemoteNews(context.graph, link.seq > 0);
+  useRunNews(context.graph, progress);
+  useShortcuts(context);
 
   const place = (template: NewAction) => {
-    if (!bench.mayEdit) return;
-    const at = freePlace(bench);
-    bench.select([placeAction(bench, template, at)]);
-    bench.view.reveal(at);
+    if (!context.mayEdit) return;
+    const at = freePosition(context);
+    context.select([addActionAt(context, template, at)]);
+    context.view.reveal(at);
     setLeft(false);
   };
-  const [selected = null] = bench.graph.actions
-    .filter((action) => bench.selection.has(action.key))
+  const [selected = null] = context.graph.actions
+    .filter((action) => context.selection.has(action.key))
     .map((action) => action.key);
   const shown: Shown = {
-    graph: bench.graph,
+    graph: context.graph,
     seq: link.seq,
-    obstacle: obstacleOf(bench, link, problems),
+    obstacle: obstacleOf(context, link, problems),
     selected,
     pick: (aid) => {
-      bench.select([aid]);
-      bench.view.show([aid]);
+      context.select([aid]);
+      context.view.show([aid]);
     },
     compact: !wide,
     folded: phone ? null : folded,
     fold: setFolded,
   };
   const stage = (
-    <Stage
+    <CanvasPane
       me={props.me}
-      sight={sight}
+      canvasHandle={canvasHandle}
       progress={progress}
       marks={marks}
       compact={!wide}
       phone={phone}
       run={props.run}
       record={
-        bench.dryRun && props.record(shown, scriptOf(bench.dryRun.decided), bench.dryRun.close)
+        context.dryRun &&
+        props.record(shown, scriptOf(context.dryRun.decided), context.dryRun.close)
       }
-      writing={surface?.kind === "note" ? surface.key : null}
+      writing={overlay?.kind === "note" ? overlay.key : null}
       corner={phone ? null : props.corner}
     />
   );
   // A dry-run is told apart from runs that are over; one that goes on is never out of sight.
-  const strip = bench.dryRun && props.run === null ? null : props.strip(shown);
+  const strip = context.dryRun && props.run === null ? null : props.strip(shown);
   const details = (
     <Details id={id} seq={link.seq} panel={panel} problems={problems} threads={threads} />
   );
   const find = finding && <FindBar problems={problems?.problems ?? []} onClose={closeFind} />;
   return (
-    <BenchContext value={bench}>
+    <EditorReactContext value={context}>
       {props.bar({
-        crumbs: crumbsOf(bench),
+        crumbs: crumbsOf(context),
         status: (
           <>
             <SavedWord />
@@ -304,8 +312,8 @@ export function Editor(props: Props) {
         </main>
       )}
       <Notices />
-      <Surfaces bench={bench} surface={surface} onClose={close} />
-      {adding && <QuickAdd bench={bench} request={adding} known={known} onClose={closeAdd} />}
-    </BenchContext>
+      <Overlays context={context} overlay={overlay} onClose={close} />
+      {adding && <QuickAdd context={context} request={adding} known={known} onClose={closeAdd} />}
+    </EditorReactContext>
   );
 }

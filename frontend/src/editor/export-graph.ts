@@ -2,7 +2,7 @@
 import { notifications } from "@mantine/notifications";
 import { here } from "../api/page-url";
 import { pictureOf } from "../canvas/svg-picture";
-import type { Bench, Format } from "../edit-actions/editor-context";
+import type { EditorContext, ExportFormat } from "../edit-actions/editor-context";
 
 const LARGEST = 8_000; // px of a PNG's longer side; browsers refuse much more
 
@@ -51,15 +51,15 @@ async function rasterised(svg: string, width: number, height: number): Promise<B
   }
 }
 
-export async function takeAway(bench: Bench, format: Format): Promise<void> {
-  const name = fileName(bench.graph.name);
+export async function takeAway(context: EditorContext, format: ExportFormat): Promise<void> {
+  const name = fileName(context.graph.name);
   if (format === "umrf") {
-    save(here(`/api/graphs/${encodeURIComponent(bench.id)}/umrf`), `${name}.umrf.graph.json`);
+    save(here(`/api/graphs/${encodeURIComponent(context.id)}/umrf`), `${name}.umrf.graph.json`);
     return;
   }
   try {
     const colors = getComputedStyle(document.documentElement);
-    const picture = pictureOf(bench.graph, bench.places(), bench.sizes(), (token) =>
+    const picture = pictureOf(context.graph, context.positions(), context.sizes(), (token) =>
       colors.getPropertyValue(token).trim(),
     );
     const { svg, width, height } = picture;

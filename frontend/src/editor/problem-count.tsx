@@ -1,11 +1,11 @@
 /** How many problems the graph has, in words; opens their list. */
 import { IconAlertTriangle } from "@tabler/icons-react";
 import type { Problems } from "../api/graphs";
-import { useBench } from "../edit-actions/editor-context";
+import { useEditorContext } from "../edit-actions/editor-context";
 import style from "./problem-count.module.css";
 
 export function ProblemWord({ problems }: { problems: Problems | undefined }) {
-  const { setPanel } = useBench();
+  const { setPanel } = useEditorContext();
   const count = problems?.problems.length ?? 0;
   if (count === 0) return null;
   const errors = problems?.problems.filter((problem) => problem.severity === "error").length ?? 0;

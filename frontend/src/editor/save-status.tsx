@@ -7,7 +7,7 @@ import {
   IconEye,
   IconRefresh,
 } from "@tabler/icons-react";
-import { useBench } from "../edit-actions/editor-context";
+import { useEditorContext } from "../edit-actions/editor-context";
 import type { Link, Why } from "../sync/room-connection";
 import { whyNot } from "../sync/unsaved-reasons";
 import { useLink, useRoom } from "../sync/use-room";
@@ -70,7 +70,7 @@ const signs = {
 export function SavedWord() {
   const link = useLink();
   const { room } = useRoom();
-  const { mayEdit } = useBench();
+  const { mayEdit } = useEditorContext();
   const { tone, words } = savedWords(link, mayEdit);
   const Sign = signs[tone];
   const why = whyNot(link);

@@ -41,8 +41,8 @@ const ada = {
 const drawn: string[] = [];
 
 function Page() {
-  const { bench } = useEditor("g", () => {});
-  drawn.push(`${bench.mayEdit ? "may edit" : "looks at"} ${bench.graph.name || "nothing"}`);
+  const { context } = useEditor("g", () => {});
+  drawn.push(`${context.mayEdit ? "may edit" : "looks at"} ${context.graph.name || "nothing"}`);
   return null;
 }
 

@@ -7,20 +7,20 @@ import { CARD } from "../canvas/geometry/arrange";
 import { useDryRun } from "../dry-run/use-dry-run";
 import {
   type AddRequest,
-  type Bench,
-  type Format,
-  freePlace,
+  type CanvasView,
+  type EditorContext,
+  type ExportFormat,
+  freePosition,
+  type Overlay,
   type Panel,
-  type Surface,
   type Tool,
-  type View,
 } from "../edit-actions/editor-context";
 import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../sync/use-room";
 import { takeAway } from "./export-graph";
 
 const NONE: ReadonlySet<string> = new Set();
 
-const BLIND: View = {
+const NO_CANVAS_VIEW: CanvasView = {
   fit: () => {},
   zoomIn: () => {},
   zoomOut: () => {},
@@ -33,22 +33,22 @@ const BLIND: View = {
 };
 
 /** What only the canvas knows; filled in by it while it is shown. */
-export interface Sight {
-  view: View;
-  places: Bench["places"];
-  sizes: Bench["sizes"];
+export interface CanvasHandle {
+  view: CanvasView;
+  positions: EditorContext["positions"];
+  sizes: EditorContext["sizes"];
 }
 
 export interface EditorState {
-  readonly bench: Bench;
+  readonly context: EditorContext;
   readonly panel: Panel;
   readonly adding: AddRequest | null;
-  readonly surface: Surface | null;
-  readonly sight: RefObject<Sight>;
+  readonly overlay: Overlay | null;
+  readonly canvasHandle: RefObject<CanvasHandle>;
   /** Whether the search in the graph is open. */
   readonly finding: boolean;
   closeAdd(): void;
-  close(): void;
+  closeOverlay(): void;
   closeFind(): void;
 }
 
@@ -60,7 +60,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   const [tool, setTool] = useState<Tool>("pan");
   const [panel, setPanelNow] = useState<Panel>("details");
   const [adding, setAdding] = useState<AddRequest | null>(null);
-  const [surface, setSurface] = useState<Surface | null>(null);
+  const [overlay, setSurface] = useState<Overlay | null>(null);
   const [snap, setSnap] = useLocalStorage({
     key: "aa.snap",
     defaultValue: false,
@@ -74,7 +74,11 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   const arrived = useLinkPart((link) => link.seq > 0);
   const mayEdit = role && readOnly === undefined && arrived;
   const [finding, setFinding] = useState(false);
-  const sight = useRef<Sight>({ view: BLIND, places: () => new Map(), sizes: () => new Map() });
+  const canvasHandle = useRef<CanvasHandle>({
+    view: NO_CANVAS_VIEW,
+    positions: () => new Map(),
+    sizes: () => new Map(),
+  });
 
   const select = useCallback(
     (ids: Iterable<string>) => {
@@ -92,25 +96,25 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
     },
     [onPanel],
   );
-  const latest = useRef<Bench | null>(null);
+  const latest = useRef<EditorContext | null>(null);
   const openAdd = useCallback((request?: AddRequest) => {
     if (latest.current?.mayEdit === false) return;
     if (request || latest.current === null) {
       setAdding(request ?? null);
       return;
     }
-    const [x, y] = freePlace(latest.current);
+    const [x, y] = freePosition(latest.current);
     const at = [x + CARD.width / 2, y] as const;
     setAdding({ screen: latest.current.view.screenOf(at), at, from: null });
   }, []);
   const closeAdd = useCallback(() => setAdding(null), []);
   const close = useCallback(() => setSurface(null), []);
-  const download = useCallback((format: Format = "umrf") => {
+  const download = useCallback((format: ExportFormat = "umrf") => {
     if (latest.current) void takeAway(latest.current, format);
   }, []);
   const closeFind = useCallback(() => setFinding(false), []);
 
-  const bench = useMemo<Bench>(
+  const context = useMemo<EditorContext>(
     () => ({
       id,
       doc,
@@ -129,21 +133,21 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
       setSnap,
       setPanel,
       openAdd,
-      open: setSurface,
+      openOverlay: setSurface,
       openFind: () => setFinding(true),
       view: {
-        fit: () => sight.current.view.fit(),
-        zoomIn: () => sight.current.view.zoomIn(),
-        zoomOut: () => sight.current.view.zoomOut(),
-        show: (keys, goal) => sight.current.view.show(keys, goal),
-        reveal: (at) => sight.current.view.reveal(at),
-        middle: () => sight.current.view.middle(),
-        screenOf: (at) => sight.current.view.screenOf(at),
-        pointer: () => sight.current.view.pointer(),
-        focus: (key) => sight.current.view.focus(key),
+        fit: () => canvasHandle.current.view.fit(),
+        zoomIn: () => canvasHandle.current.view.zoomIn(),
+        zoomOut: () => canvasHandle.current.view.zoomOut(),
+        show: (keys, goal) => canvasHandle.current.view.show(keys, goal),
+        reveal: (at) => canvasHandle.current.view.reveal(at),
+        middle: () => canvasHandle.current.view.middle(),
+        screenOf: (at) => canvasHandle.current.view.screenOf(at),
+        pointer: () => canvasHandle.current.view.pointer(),
+        focus: (key) => canvasHandle.current.view.focus(key),
       },
-      places: () => sight.current.places(),
-      sizes: () => sight.current.sizes(),
+      positions: () => canvasHandle.current.positions(),
+      sizes: () => canvasHandle.current.sizes(),
       download,
     }),
     [
@@ -166,6 +170,16 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
       download,
     ],
   );
-  latest.current = bench;
-  return { bench, panel, adding, finding, surface, sight, closeAdd, closeFind, close };
+  latest.current = context;
+  return {
+    context,
+    panel,
+    adding,
+    finding,
+    overlay,
+    canvasHandle,
+    closeAdd,
+    closeFind,
+    closeOverlay: close,
+  };
 }

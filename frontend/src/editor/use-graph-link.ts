@@ -2,16 +2,16 @@
 import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
 import { useSearch } from "wouter";
-import type { Bench } from "../edit-actions/editor-context";
+import type { EditorContext } from "../edit-actions/editor-context";
 import { present, targetOf } from "../edit-actions/graph-links";
 import { shownKeys } from "../edit-actions/view";
 
 const SETTLED = 160; // ms after which the canvas has measured its cards and shown the whole
 
-export function useDeepLink(bench: Bench, begun: boolean): void {
+export function useDeepLink(context: EditorContext, begun: boolean): void {
   const search = useSearch();
-  const now = useRef(bench);
-  now.current = bench;
+  const now = useRef(context);
+  now.current = context;
   useEffect(() => {
     const target = begun ? targetOf(search) : null;
     if (target === null) return;

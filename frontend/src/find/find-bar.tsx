@@ -11,7 +11,7 @@ import {
 import { useDeferredValue, useEffect, useId, useMemo, useRef, useState } from "react";
 import type { Problem } from "../api/graphs";
 import { keysOf } from "../edit-actions/edit-action";
-import { useBench } from "../edit-actions/editor-context";
+import { useEditorContext } from "../edit-actions/editor-context";
 import { find, type Hit } from "./find";
 import style from "./find-bar.module.css";
 
@@ -23,11 +23,14 @@ interface Props {
 }
 
 export function FindBar({ problems, onClose }: Props) {
-  const bench = useBench();
+  const context = useEditorContext();
   const [query, setQuery] = useState("");
   const [at, setAt] = useState(0);
   const asked = useDeferredValue(query);
-  const hits = useMemo(() => find(bench.graph, problems, asked), [bench.graph, problems, asked]);
+  const hits = useMemo(
+    () => find(context.graph, problems, asked),
+    [context.graph, problems, asked],
+  );
   const field = useRef<HTMLInputElement>(null);
   const list = useRef<HTMLDivElement>(null);
   const before = useRef<Element | null>(null);
@@ -44,8 +47,8 @@ export function FindBar({ problems, onClose }: Props) {
     const hit: Hit | undefined = hits[(index + hits.length) % Math.max(1, hits.length)];
     if (hit === undefined) return;
     setAt(hits.indexOf(hit));
-    bench.select([hit.id]);
-    bench.view.show(hit.keys);
+    context.select([hit.id]);
+    context.view.show(hit.keys);
   };
   const close = () => {
     onClose();
@@ -57,7 +60,7 @@ export function FindBar({ problems, onClose }: Props) {
     if (event.key === "Escape") close();
     else if (step !== undefined) {
       // The first Enter goes to the first hit, later ones on.
-      const fresh = !bench.selection.has(hits[current]?.id ?? "");
+      const fresh = !context.selection.has(hits[current]?.id ?? "");
       go(fresh ? current : current + step);
     } else return;
     event.preventDefault();

@@ -1,7 +1,7 @@
 /** The properties of an action. */
 import { Autocomplete, Button, Group } from "@mantine/core";
 import { IconGhost2 } from "@tabler/icons-react";
-import { useBench } from "../edit-actions/editor-context";
+import { useEditorContext } from "../edit-actions/editor-context";
 import { adoptGhost, rename, setField } from "../graph/edit";
 import type { Action, Graph } from "../graph/model";
 import { DraftInput } from "../ui/draft-input";
@@ -23,7 +23,7 @@ function wholeNumber(draft: string): string | null {
 }
 
 export function ActionForm({ action }: { action: Action }) {
-  const { doc, graph } = useBench();
+  const { doc, graph } = useEditorContext();
   if (action.missing) {
     return (
       <div className={style.say} data-tone="error">

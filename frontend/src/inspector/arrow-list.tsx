@@ -4,19 +4,19 @@ import { IconPlus, IconX } from "@tabler/icons-react";
 import { useState } from "react";
 import { answersOf } from "../canvas/elements";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
-import { type Bench, useBench } from "../edit-actions/editor-context";
+import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import { connect, removeRelation, setEntry, unsetEntry } from "../graph/edit";
 import { type Action, ENTRY, EXIT, type Precondition, type Relation } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import style from "./inspector.module.css";
 
-function Line({ relation, bench }: { relation: Relation; bench: Bench }) {
+function Line({ relation, context }: { relation: Relation; context: EditorContext }) {
   const id = relationId(relation);
   const answers = answersOf(relation);
   return (
     <li className={style.arrow}>
-      <button type="button" className={style.arrowText} onClick={() => bench.select([id])}>
+      <button type="button" className={style.arrowText} onClick={() => context.select([id])}>
         {answers.map((answer) => (
           <span key={answer.response}>
             {answer.outcomes.map((outcome) => (
@@ -32,13 +32,13 @@ function Line({ relation, bench }: { relation: Relation; bench: Bench }) {
           </span>
         ))}
         {answers.length === 0 && <span className={style.quiet}>ignored → </span>}
-        <b>{endName(bench.graph, relation.child)}</b>
+        <b>{endName(context.graph, relation.child)}</b>
       </button>
       <Tooltip label="Delete this arrow">
         <ActionIcon
           size="sm"
-          aria-label={`Delete the arrow to ${endName(bench.graph, relation.child)}`}
-          onClick={() => removeRelation(bench.doc, id)}
+          aria-label={`Delete the arrow to ${endName(context.graph, relation.child)}`}
+          onClick={() => removeRelation(context.doc, id)}
         >
           <IconX size={13} />
         </ActionIcon>
@@ -48,11 +48,11 @@ function Line({ relation, bench }: { relation: Relation; bench: Bench }) {
 }
 
 function Connect({ action, onDone }: { action: Action; onDone: () => void }) {
-  const bench = useBench();
+  const context = useEditorContext();
   const [outcome, setOutcome] = useState<Precondition>("on_true");
   const targets = [
     { value: EXIT, label: "Exit: the graph ends" },
-    ...bench.graph.actions
+    ...context.graph.actions
       .filter((other) => other.key !== action.key)
       .map((other) => ({ value: other.key, label: `${other.name} ${other.instanceId}` })),
   ];
@@ -78,7 +78,7 @@ function Connect({ action, onDone }: { action: Action; onDone: () => void }) {
         data={targets}
         value={null}
         onChange={(next) => {
-          if (next !== null) connect(bench.doc, action.key, next, outcome);
+          if (next !== null) connect(context.doc, action.key, next, outcome);
           onDone();
         }}
         flex={1}
@@ -88,12 +88,12 @@ function Connect({ action, onDone }: { action: Action; onDone: () => void }) {
 }
 
 export function Arrows({ action }: { action: Action }) {
-  const bench = useBench();
+  const context = useEditorContext();
   const [connecting, setConnecting] = useState(false);
-  const out = bench.graph.relations
+  const out = context.graph.relations
     .filter((relation) => relation.parent === action.key)
     .sort((a, b) => a.parentOrder - b.parentOrder);
-  const first = bench.graph.relations.some(
+  const first = context.graph.relations.some(
     (relation) => relation.parent === ENTRY && relation.child === action.key,
   );
   return (
@@ -111,7 +111,7 @@ export function Arrows({ action }: { action: Action }) {
       </div>
       <ul className={style.arrows}>
         {out.map((relation) => (
-          <Line key={relationId(relation)} relation={relation} bench={bench} />
+          <Line key={relationId(relation)} relation={relation} context={context} />
         ))}
       </ul>
       {out.length === 0 && !connecting && (
@@ -124,9 +124,9 @@ export function Arrows({ action }: { action: Action }) {
         <input
           type="checkbox"
           checked={first}
-          disabled={!bench.mayEdit}
+          disabled={!context.mayEdit}
           onChange={() =>
-            first ? unsetEntry(bench.doc, action.key) : setEntry(bench.doc, action.key)
+            first ? unsetEntry(context.doc, action.key) : setEntry(context.doc, action.key)
           }
         />
         The graph starts with this action

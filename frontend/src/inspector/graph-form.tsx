@@ -1,7 +1,7 @@
 /** The properties of the graph itself, and how to begin. */
 import { Kbd, TagsInput } from "@mantine/core";
 import { keysOf } from "../edit-actions/edit-action";
-import { useBench } from "../edit-actions/editor-context";
+import { useEditorContext } from "../edit-actions/editor-context";
 import { setGraphDescription, setGraphName } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";
 import { FieldOf } from "./fields/shared-field";
@@ -9,7 +9,7 @@ import style from "./inspector.module.css";
 import { labelsOf, setLabels } from "./labels";
 
 export function GraphForm() {
-  const { doc, graph } = useBench();
+  const { doc, graph } = useEditorContext();
   const arrows = graph.relations.length;
   return (
     <div className={style.form}>

@@ -4,11 +4,11 @@ import { IconMessageCircle } from "@tabler/icons-react";
 import type { Problem, Problems } from "../api/graphs";
 import { Comments } from "../comments/comments";
 import {
-  type Bench,
+  type EditorContext,
   type Panel,
   selectedActions,
   selectedRelations,
-  useBench,
+  useEditorContext,
 } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import type { Thread } from "../graph/edit/comments";
@@ -39,13 +39,13 @@ interface Props {
 const counted = (count: number, what: string): string | null =>
   count === 0 ? null : `${count} ${what}${count === 1 ? "" : "s"}`;
 
-const chosenNotes = ({ graph, selection }: Bench) =>
+const chosenNotes = ({ graph, selection }: EditorContext) =>
   notesOf(graph).filter(({ key }) => selection.has(key));
 
-function title(bench: Bench): string {
-  const actions = selectedActions(bench);
-  const relations = selectedRelations(bench);
-  const notes = chosenNotes(bench);
+function title(context: EditorContext): string {
+  const actions = selectedActions(context);
+  const relations = selectedRelations(context);
+  const notes = chosenNotes(context);
   const [action] = actions;
   const [note] = notes;
   const count = actions.length + relations.length + notes.length;
@@ -53,14 +53,14 @@ function title(bench: Bench): string {
   if (note) return note.kind === "frame" ? "Frame" : "Note";
   if (action) return `${action.name} ${action.instanceId}`;
   if (relations.length === 1) return "Arrow";
-  return bench.selection.has(EXIT) ? "Exit" : "Graph";
+  return context.selection.has(EXIT) ? "Exit" : "Graph";
 }
 
 function Properties() {
-  const bench = useBench();
-  const actions = selectedActions(bench);
-  const relations = selectedRelations(bench);
-  const notes = chosenNotes(bench);
+  const context = useEditorContext();
+  const actions = selectedActions(context);
+  const relations = selectedRelations(context);
+  const notes = chosenNotes(context);
   const [action] = actions;
   const [relation] = relations;
   const [note] = notes;
@@ -80,25 +80,25 @@ function Properties() {
   if (note) return <NoteForm key={note.key} note={note} />;
   if (action) return <ActionForm key={action.key} action={action} />;
   if (relation) return <RelationForm key={relationId(relation)} relation={relation} />;
-  if (bench.selection.has(EXIT)) return <RunsWhen of={EXIT} title="The graph ends" />;
+  if (context.selection.has(EXIT)) return <RunsWhen of={EXIT} title="The graph ends" />;
   return <GraphForm />;
 }
 
 export function Details({ id, seq, panel, problems, threads }: Props) {
-  const bench = useBench();
+  const context = useEditorContext();
   const open = threads.filter((thread) => !thread.resolved).length;
   const count = problems?.problems.length ?? 0;
   const errors = problems?.problems.some((problem) => problem.severity === "error") ?? false;
   return (
     <Tabs
       value={panel}
-      onChange={(next) => bench.setPanel((next ?? "details") as Panel)}
+      onChange={(next) => context.setPanel((next ?? "details") as Panel)}
       className={style.tabs ?? ""}
       keepMounted={false}
     >
       <Tabs.List>
         <Tabs.Tab value="details" className={style.first ?? ""}>
-          {title(bench)}
+          {title(context)}
         </Tabs.Tab>
         <Tabs.Tab value="json">JSON</Tabs.Tab>
         <Tabs.Tab value="comments" aria-label={open === 0 ? "Comments" : `Comments, ${open} open`}>

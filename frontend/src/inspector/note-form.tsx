@@ -2,7 +2,7 @@
 import { Button } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { noteColor } from "../canvas/note-colors";
-import { useBench } from "../edit-actions/editor-context";
+import { useEditorContext } from "../edit-actions/editor-context";
 import { removeNotes } from "../graph/edit";
 import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../graph/edit/notes";
 import { DraftInput } from "../ui/draft-input";
@@ -20,7 +20,7 @@ function fits(least: number) {
 }
 
 function Colors({ note, onPick }: { note: Note; onPick: (color: NoteColor) => void }) {
-  const { mayEdit } = useBench();
+  const { mayEdit } = useEditorContext();
   return (
     <fieldset className={style.colors}>
       <legend>Colour</legend>
@@ -41,7 +41,7 @@ function Colors({ note, onPick }: { note: Note; onPick: (color: NoteColor) => vo
 }
 
 export function NoteForm({ note }: { note: Note }) {
-  const { doc, select } = useBench();
+  const { doc, select } = useEditorContext();
   const frame = note.kind === "frame";
   const change = (part: Parameters<typeof changeNote>[2]) => void changeNote(doc, note.key, part);
   const [width, height] = note.size;

@@ -5,7 +5,7 @@ import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
 import type { Problem, Problems } from "../api/graphs";
 import { bySeverity, placeOf } from "../canvas/problem-marks";
 import { copyLinkTo } from "../edit-actions/clipboard";
-import { type Bench, useBench } from "../edit-actions/editor-context";
+import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { linkToProblem } from "../edit-actions/graph-links";
 import { relationId } from "../graph/document-keys";
 import {
@@ -31,9 +31,9 @@ function placeWords(graph: Graph, place: string | null): string {
 }
 
 /** Shows the place of a problem on the canvas and selects it. */
-function jump(bench: Bench, place: string): void {
-  bench.select([place]);
-  bench.view.show(place.split(">").map((end) => end.split(";")[0] ?? end));
+function jump(context: EditorContext, place: string): void {
+  context.select([place]);
+  context.view.show(place.split(">").map((end) => end.split(";")[0] ?? end));
 }
 
 function tellNothing(): void {
@@ -41,9 +41,9 @@ function tellNothing(): void {
 }
 
 function ProblemItem({ problem, jumps }: { problem: Problem; jumps: boolean }) {
-  const bench = useBench();
+  const context = useEditorContext();
   const place = placeOf(problem);
-  const words = placeWords(bench.graph, place);
+  const words = placeWords(context.graph, place);
   const fix = fixOf(problem);
   const severity = problem.severity === "error" ? "Error" : "Warning";
   return (
@@ -55,7 +55,7 @@ function ProblemItem({ problem, jumps }: { problem: Problem; jumps: boolean }) {
           <button
             type="button"
             className={style.jump}
-            onClick={() => jump(bench, place)}
+            onClick={() => jump(context, place)}
             aria-label={`Show ${words}`}
           >
             {words}
@@ -67,21 +67,21 @@ function ProblemItem({ problem, jumps }: { problem: Problem; jumps: boolean }) {
             ml="auto"
             disabled={false}
             aria-label={`Copy a link to ${problem.code}`}
-            onClick={() => void copyLinkTo(linkToProblem(bench.id, problem))}
+            onClick={() => void copyLinkTo(linkToProblem(context.id, problem))}
           >
             <IconLink size={14} aria-hidden />
           </ActionIcon>
         </Tooltip>
       </div>
       <p>{problem.message}</p>
-      {fix !== null && bench.mayEdit && (
+      {fix !== null && context.mayEdit && (
         <Button
           size="compact-sm"
           mt={6}
           leftSection={<IconTool size={14} aria-hidden />}
           aria-label={`Fix ${problem.code}: ${ABOUT[fix].words}`}
           onClick={() => {
-            if (!applyFix(bench.doc, problem)) tellNothing();
+            if (!applyFix(context.doc, problem)) tellNothing();
           }}
         >
           {ABOUT[fix].words}
@@ -107,7 +107,7 @@ function Items({ problems, jumps }: { problems: readonly Problem[]; jumps: boole
 
 /** The problems of what is selected, with it. */
 export function ProblemsHere({ problems }: { problems: Problems | undefined }) {
-  const { selection } = useBench();
+  const { selection } = useEditorContext();
   const here = bySeverity(problems?.problems ?? []).filter((problem) => {
     const place = placeOf(problem);
     return place !== null && selection.has(place);
@@ -126,7 +126,7 @@ interface Props {
 }
 
 export function ProblemList({ problems, seq }: Props) {
-  const bench = useBench();
+  const context = useEditorContext();
   if (!problems) return <p className={style.checked}>Checking …</p>;
   const order = bySeverity(problems.problems);
   const safe = safeOnes(order).length;
@@ -138,27 +138,27 @@ export function ProblemList({ problems, seq }: Props) {
           <IconCircleCheck size={18} aria-hidden /> No problem found.
         </p>
       )}
-      {safe > 1 && bench.mayEdit && (
+      {safe > 1 && context.mayEdit && (
         <Button
           fullWidth
           mb="sm"
           leftSection={<IconTool size={15} aria-hidden />}
           title="Everything that can be mended without losing what was drawn. One undo takes it back."
           onClick={() => {
-            if (applySafe(bench.doc, order) === 0) tellNothing();
+            if (applySafe(context.doc, order) === 0) tellNothing();
           }}
         >
           Fix all {safe} safe ones
         </Button>
       )}
-      {examples > 1 && bench.mayEdit && (
+      {examples > 1 && context.mayEdit && (
         <Button
           fullWidth
           mb="sm"
           leftSection={<IconTool size={15} aria-hidden />}
           title="The examples of old files become the values that a robot acts on. Look at them afterwards; one undo takes it back."
           onClick={() => {
-            if (applyExamples(bench.doc, order) === 0) tellNothing();
+            if (applyExamples(context.doc, order) === 0) tellNothing();
           }}
         >
           Take all {examples} examples as values

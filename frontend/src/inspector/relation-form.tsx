@@ -2,7 +2,7 @@
 import { Button, Select, Switch } from "@mantine/core";
 import { IconArrowDown, IconTrash } from "@tabler/icons-react";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
-import { useBench } from "../edit-actions/editor-context";
+import { useEditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import { removeRelation, setRequired, setResponse } from "../graph/edit";
 import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../graph/model";
@@ -23,8 +23,8 @@ const meaning: Record<Response, string> = {
 const responses = RESPONSES.map((value) => ({ value, label: `${value} · ${meaning[value]}` }));
 
 export function RelationForm({ relation }: { relation: Relation }) {
-  const bench = useBench();
-  const { doc, graph } = bench;
+  const context = useEditorContext();
+  const { doc, graph } = context;
   const id = relationId(relation);
   const parent = endName(graph, relation.parent);
   const child = endName(graph, relation.child);
@@ -33,11 +33,19 @@ export function RelationForm({ relation }: { relation: Relation }) {
   return (
     <div className={style.form}>
       <div className={style.ends}>
-        <button type="button" className={style.end} onClick={() => bench.select([relation.parent])}>
+        <button
+          type="button"
+          className={style.end}
+          onClick={() => context.select([relation.parent])}
+        >
           {parent}
         </button>
         <IconArrowDown size={15} aria-label="leads to" />
-        <button type="button" className={style.end} onClick={() => bench.select([relation.child])}>
+        <button
+          type="button"
+          className={style.end}
+          onClick={() => context.select([relation.child])}
+        >
           {child}
         </button>
       </div>
@@ -98,7 +106,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
         variant="subtle"
         onClick={() => {
           removeRelation(doc, id);
-          bench.select([]);
+          context.select([]);
         }}
       >
         Delete this arrow

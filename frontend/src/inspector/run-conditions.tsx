@@ -1,12 +1,12 @@
 /** When something runs, as sentences: what the engine would really do. */
 
-import { useBench } from "../edit-actions/editor-context";
+import { useEditorContext } from "../edit-actions/editor-context";
 import type { Key } from "../graph/model";
 import { startWords } from "../graph/relation-words";
 import style from "./inspector.module.css";
 
 export function RunsWhen({ of, title }: { of: Key; title: string }) {
-  const { graph } = useBench();
+  const { graph } = useEditorContext();
   return (
     <section className={style.section}>
       <div className={style.heading}>

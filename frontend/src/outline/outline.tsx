@@ -8,7 +8,7 @@ import { Button, Kbd } from "@mantine/core";
 import { IconListTree, IconPlus } from "@tabler/icons-react";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import { useRobotInLight } from "../canvas/card-highlights";
-import { useBench } from "../edit-actions/editor-context";
+import { useEditorContext } from "../edit-actions/editor-context";
 import { ENTRY, type Key } from "../graph/model";
 import type { Progress } from "../status/progress";
 import { announcer } from "../ui/announcer";
@@ -67,8 +67,8 @@ function stepFrom(rows: readonly Row[], at: number, key: string): number | null 
 }
 
 export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) {
-  const bench = useBench();
-  const { graph, selection, select, setPanel, mayEdit } = bench;
+  const context = useEditorContext();
+  const { graph, selection, select, setPanel, mayEdit } = context;
   const phone = useIsPhone();
   const robot = useRobotInLight();
   const { isOpen, flip } = useOpen(graph.actions.length);
@@ -99,7 +99,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     setActive(row.id);
     const subject = subjectOf(row);
     select([subject]);
-    if (!phone) bench.view.show(subject.split(">").map((end) => end.split(";")[0] ?? end));
+    if (!phone) context.view.show(subject.split(">").map((end) => end.split(";")[0] ?? end));
   };
   // What is selected elsewhere is found here too.
   const [only] = selection.size === 1 ? selection : [];
@@ -124,12 +124,12 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
         setPanel("comments");
         break;
       case "delete":
-        announcer.say(remove(bench, row));
+        announcer.say(remove(context, row));
         focus(Math.max(0, at - 1));
         break;
       case "up":
       case "down":
-        announcer.say(move(bench, row, deed.name === "up" ? -1 : 1));
+        announcer.say(move(context, row, deed.name === "up" ? -1 : 1));
         break;
       default:
         setActive(row.id);
@@ -178,8 +178,8 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   }, []);
   const add = () => {
     const middle: [number, number] = [window.innerWidth / 2, 120];
-    if (!phone) return bench.openAdd();
-    bench.openAdd({ screen: middle, at: [0, 140 * graph.actions.length], from: null });
+    if (!phone) return context.openAdd();
+    context.openAdd({ screen: middle, at: [0, 140 * graph.actions.length], from: null });
   };
   return (
     <div className={style.outline}>

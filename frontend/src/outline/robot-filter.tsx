@@ -1,7 +1,7 @@
 /** The robots of a graph: what each is called, its colour, and putting one in the light. */
 import { memo, useMemo } from "react";
 import { spotlight, useRobotInLight } from "../canvas/card-highlights";
-import { useBench } from "../edit-actions/editor-context";
+import { useEditorContext } from "../edit-actions/editor-context";
 import { robotColor } from "../ui/name-colors";
 import style from "./robot-filter.module.css";
 
@@ -14,7 +14,7 @@ export function robotsOf(actors: readonly string[]): [name: string, actions: num
 
 /** Nothing where there is only one robot. */
 export const Robots = memo(function Robots() {
-  const { graph } = useBench();
+  const { graph } = useEditorContext();
   const robots = useMemo(() => robotsOf(graph.actions.map(({ actor }) => actor)), [graph.actions]);
   const lit = useRobotInLight();
   if (robots.length < 2 && lit === null) return null;

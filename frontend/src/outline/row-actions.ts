@@ -1,6 +1,6 @@
 /** What can be done to a row of the outline, with its key. */
 
-import type { Bench } from "../edit-actions/editor-context";
+import type { EditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import { removeActions, removeNotes, removeRelation, setResponse, swapOrder } from "../graph/edit";
 import { ENTRY, type Key, spoken } from "../graph/model";
@@ -56,44 +56,44 @@ export function deedFor(row: Row, event: { key: string; altKey: boolean }): RowD
 }
 
 /** Takes a row away: an action with its arrows, or what one outcome says to one target. */
-export function remove(bench: Bench, row: Row): string {
+export function remove(context: EditorContext, row: Row): string {
   if (row.kind === "action") {
-    const name = endName(bench.graph, row.action.key);
-    removeActions(bench.doc, [row.action.key]);
+    const name = endName(context.graph, row.action.key);
+    removeActions(context.doc, [row.action.key]);
     return `${name} is deleted`;
   }
   if (row.kind === "note") {
-    removeNotes(bench.doc, [row.note.key.slice(2)]);
+    removeNotes(context.doc, [row.note.key.slice(2)]);
     return row.note.kind === "frame" ? "The frame is deleted" : "The note is deleted";
   }
   if (row.kind !== "target") return "";
   const id = relationId(row.relation);
   const others = spoken(row.relation.conditions).filter((outcome) => outcome !== row.outcome);
   if (others.length > 0 && row.relation.parent !== ENTRY) {
-    setResponse(bench.doc, id, row.outcome, "ignore");
-  } else removeRelation(bench.doc, id);
-  return `The arrow to ${endName(bench.graph, row.relation.child)} is deleted`;
+    setResponse(context.doc, id, row.outcome, "ignore");
+  } else removeRelation(context.doc, id);
+  return `The arrow to ${endName(context.graph, row.relation.child)} is deleted`;
 }
 
 /** The relation through which a row stands where it stands. */
-function way(bench: Bench, row: Row): { parent: Key; child: Key } | null {
+function way(context: EditorContext, row: Row): { parent: Key; child: Key } | null {
   if (row.kind === "target") return row.relation;
   if (row.kind !== "action") return null;
-  const into = bench.graph.relations.filter(({ child }) => child === row.action.key);
+  const into = context.graph.relations.filter(({ child }) => child === row.action.key);
   return into.find(({ parent }) => parent === ENTRY) ?? into[0] ?? null;
 }
 
 /** Changes places with the sibling before or after it, in the order in which they are started. */
-export function move(bench: Bench, row: Row, step: -1 | 1): string {
-  const here = way(bench, row);
-  const siblings = bench.graph.relations
+export function move(context: EditorContext, row: Row, step: -1 | 1): string {
+  const here = way(context, row);
+  const siblings = context.graph.relations
     .filter(({ parent }) => parent === here?.parent)
     .sort((a, b) => a.parentOrder - b.parentOrder);
   const at = siblings.findIndex(({ child }) => child === here?.child);
   const one = siblings[at];
   const other = siblings[at + step];
   if (one === undefined || other === undefined) return "There is nothing to change places with";
-  swapOrder(bench.doc, siblings.map(relationId), at, at + step);
+  swapOrder(context.doc, siblings.map(relationId), at, at + step);
   const before = step < 0 ? "before" : "after";
-  return `${endName(bench.graph, one.child)} stands ${before} ${endName(bench.graph, other.child)}`;
+  return `${endName(context.graph, one.child)} stands ${before} ${endName(context.graph, other.child)}`;
 }

@@ -2,7 +2,7 @@
 import { Select, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { OUTCOMES, outcomeWord } from "../canvas/outcome";
-import { type Bench, useBench } from "../edit-actions/editor-context";
+import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import { connect, rename, retarget, setEntry, setResponse } from "../graph/edit";
 import { changeNote } from "../graph/edit/notes";
@@ -20,15 +20,15 @@ interface Props {
   onDone: (said: string | null) => void;
 }
 
-function ends(bench: Bench, exit: boolean) {
+function ends(context: EditorContext, exit: boolean) {
   return [
     ...(exit ? [{ value: EXIT, label: "Exit: the graph ends" }] : []),
-    ...bench.graph.actions.map(({ key }) => ({ value: key, label: endName(bench.graph, key) })),
+    ...context.graph.actions.map(({ key }) => ({ value: key, label: endName(context.graph, key) })),
   ];
 }
 
 function Rename({ row, onDone }: Props) {
-  const { doc } = useBench();
+  const { doc } = useEditorContext();
   const old = row.kind === "action" ? row.action.name : "";
   const [name, setName] = useState(old);
   const save = () => {
@@ -55,17 +55,17 @@ function Rename({ row, onDone }: Props) {
 }
 
 function Connect({ row, onDone }: Props) {
-  const bench = useBench();
+  const context = useEditorContext();
   const fixed = row.kind === "outcome" ? row.outcome : null;
   const [outcome, setOutcome] = useState<Precondition>(fixed ?? "on_true");
   const entry = row.kind === "entry";
   const from = entry ? ENTRY : "action" in row ? row.action.key : null;
   const to = (target: string | null) => {
     if (target === null || from === null) return onDone(null);
-    if (entry) setEntry(bench.doc, target);
-    else connect(bench.doc, from, target, outcome);
+    if (entry) setEntry(context.doc, target);
+    else connect(context.doc, from, target, outcome);
     const when = entry ? "" : ` when ${outcomeWord[outcome]}`;
-    onDone(`Connected ${endName(bench.graph, from)} to ${endName(bench.graph, target)}${when}`);
+    onDone(`Connected ${endName(context.graph, from)} to ${endName(context.graph, target)}${when}`);
   };
   return (
     <div className={style.pair}>
@@ -83,7 +83,7 @@ function Connect({ row, onDone }: Props) {
         placeholder="run …"
         searchable
         autoFocus
-        data={ends(bench, !entry)}
+        data={ends(context, !entry)}
         value={null}
         onChange={to}
         onKeyDown={(event) => {
@@ -96,21 +96,21 @@ function Connect({ row, onDone }: Props) {
 }
 
 function Pick({ row, change, onDone }: Props) {
-  const bench = useBench();
+  const context = useEditorContext();
   if (row.kind !== "target") return null;
   const id = relationId(row.relation);
-  const name = endName(bench.graph, row.relation.child);
+  const name = endName(context.graph, row.relation.child);
   const response = change === "response";
   const pick = (next: string | null) => {
     if (next === null) return onDone(null);
     if (response) {
-      setResponse(bench.doc, id, row.outcome, next as Response);
+      setResponse(context.doc, id, row.outcome, next as Response);
       return onDone(`When ${outcomeWord[row.outcome]}: ${next} ${name}`);
     }
-    if (retarget(bench.doc, id, row.outcome, { child: next }) === null) {
+    if (retarget(context.doc, id, row.outcome, { child: next }) === null) {
       return onDone("It cannot lead there");
     }
-    onDone(`The arrow leads to ${endName(bench.graph, next)}`);
+    onDone(`The arrow leads to ${endName(context.graph, next)}`);
   };
   return (
     <Select
@@ -118,7 +118,7 @@ function Pick({ row, change, onDone }: Props) {
       searchable={!response}
       autoFocus
       defaultDropdownOpened
-      data={response ? [...RESPONSES] : ends(bench, row.relation.parent !== ENTRY)}
+      data={response ? [...RESPONSES] : ends(context, row.relation.parent !== ENTRY)}
       value={response ? row.response : row.relation.child}
       onChange={pick}
       onKeyDown={(event) => {
@@ -129,7 +129,7 @@ function Pick({ row, change, onDone }: Props) {
 }
 
 function Write({ row, onDone }: Props) {
-  const { doc } = useBench();
+  const { doc } = useEditorContext();
   const old = row.kind === "note" ? row.note.text : "";
   const [text, setText] = useState(old);
   const save = () => {

@@ -2,7 +2,7 @@
 import { type ReactFlowInstance, useOnViewportChange, type Viewport } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useSyncExternalStore } from "react";
 import type { Arrow, CanvasNode } from "../canvas/elements";
-import type { View as BenchView } from "../edit-actions/editor-context";
+import type { CanvasView as BenchView } from "../edit-actions/editor-context";
 import type { View } from "../sync/presence/presence";
 import { useFollowing, useRoom } from "../sync/use-room";
 

@@ -21,7 +21,7 @@ import { type NoteDesk, NoteDeskContext } from "../../canvas/note-card";
 import { noteColor } from "../../canvas/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { ArrowTips } from "../../canvas/outcome-arrow";
-import { type Bench, GRID, placeAction } from "../../edit-actions/editor-context";
+import { addActionAt, type EditorContext, GRID } from "../../edit-actions/editor-context";
 import { insertInto, removeNotes, together } from "../../graph/edit";
 import { changeNote } from "../../graph/edit/notes";
 import type { Position } from "../../graph/model";
@@ -45,7 +45,7 @@ const PLAIN = { hideAttribution: true };
 const MAP_SIZE = { width: 132, height: 92 };
 
 interface Props {
-  bench: Bench;
+  context: EditorContext;
   canvas: ReturnType<typeof useCanvas>;
   me: string;
   /** There is room for a map. */
@@ -60,18 +60,18 @@ interface Props {
 
 /** What to do next after an outcome was tapped. */
 function PendingHint({
-  bench,
+  context,
   pending,
   onCancel,
 }: {
-  bench: Bench;
+  context: EditorContext;
   pending: Pending;
   onCancel: () => void;
 }) {
   return (
     <div className={style.hint} role="status">
       <span>
-        When {endName(bench.graph, pending.key)} is{" "}
+        When {endName(context.graph, pending.key)} is{" "}
         <b style={{ color: outcomeColor[pending.outcome] }}>
           <OutcomeSign outcome={pending.outcome} /> {outcomeWord[pending.outcome]}
         </b>
@@ -94,10 +94,14 @@ function mapColor(node: CanvasNode): string {
 }
 
 /** How notes are changed from the canvas itself. */
-function useNoteDesk(bench: Bench, writing: string | null, setResized: NoteDesk["resizing"]) {
-  const [only, ...others] = bench.selection;
+function useNoteDesk(
+  context: EditorContext,
+  writing: string | null,
+  setResized: NoteDesk["resizing"],
+) {
+  const [only, ...others] = context.selection;
   const alone = only !== undefined && others.length === 0 ? only : null;
-  const { doc, open, select, mayEdit } = bench;
+  const { doc, openOverlay: open, select, mayEdit } = context;
   const change = useSteady<Parameters<NoteDesk["change"]>, void>((key, change) => {
     changeNote(doc, key, change);
   });
@@ -119,7 +123,7 @@ function useNoteDesk(bench: Bench, writing: string | null, setResized: NoteDesk[
 
 /** What hands do on the canvas: functions that stay the same, since each card and arrow has them. */
 function useHands(
-  { bench, canvas, onPanned }: Pick<Props, "bench" | "canvas" | "onPanned">,
+  { context, canvas, onPanned }: Pick<Props, "context" | "canvas" | "onPanned">,
   connecting: ReturnType<typeof useConnecting>,
 ) {
   return {
@@ -140,15 +144,15 @@ function useHands(
     onReconnectEnd: useSteady(connecting.onReconnectEnd),
     onEdgeClick: useSteady((event: MouseEvent, edge: Arrow) => {
       const id = edge.data?.relation;
-      if (id) bench.select(event.shiftKey ? [...bench.selection, id] : [id]);
+      if (id) context.select(event.shiftKey ? [...context.selection, id] : [id]);
     }),
     onNodeClick: useSteady((event: MouseEvent) => {
       if (connecting.onClick(event)) return;
       const onNote = (event.target as Element).closest(".react-flow__node-note") !== null;
-      if (!onNote && bench.tool === "pan") bench.setPanel("details");
+      if (!onNote && context.tool === "pan") context.setPanel("details");
     }),
     onPaneClick: useSteady((event: MouseEvent) => {
-      if (!connecting.onClick(event)) bench.select([]);
+      if (!connecting.onClick(event)) context.select([]);
     }),
     // A move without an event is the page's own.
     onMoveStart: useSteady((event: Event | null) => {
@@ -157,7 +161,7 @@ function useHands(
   };
 }
 
-export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: Props) {
+export function Canvas({ context, canvas, me, map, onPanned, pointer, writing }: Props) {
   const { presence } = useRoom();
   const { flow, setOver } = canvas;
   const frame = useRef<HTMLDivElement>(null);
@@ -170,18 +174,18 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
       actionCarrier.onDrop(({ load, x, y }) => {
         const box = frame.current?.getBoundingClientRect();
         if (!box || x < box.left || x > box.right || y < box.top || y > box.bottom) return;
-        if (!bench.mayEdit) return;
+        if (!context.mayEdit) return;
         const at = flow.screenToFlowPosition({ x, y });
         const position: Position = [Math.round(at.x - CARD.width / 2), Math.round(at.y - 24)];
         const arrow = arrowAt([x, y]);
-        const key = together(bench.doc, () => {
-          const added = placeAction(bench, load, position);
-          if (arrow !== null) insertInto(bench.doc, arrow, added);
+        const key = together(context.doc, () => {
+          const added = addActionAt(context, load, position);
+          if (arrow !== null) insertInto(context.doc, arrow, added);
           return added;
         });
-        bench.select([key]);
+        context.select([key]);
       }),
-    [flow, bench],
+    [flow, context],
   );
   // What is carried over an arrow goes into it.
   useEffect(
@@ -195,13 +199,13 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
 
   const openAddAt = (screen: Position, from: Pending | null) => {
     const at = flow.screenToFlowPosition({ x: screen[0], y: screen[1] });
-    bench.openAdd({ screen, at: [Math.round(at.x), Math.round(at.y)], from });
+    context.openAdd({ screen, at: [Math.round(at.x), Math.round(at.y)], from });
   };
-  const connecting = useConnecting(bench, openAddAt);
-  const hands = useHands({ bench, canvas, onPanned }, connecting);
-  const press = usePress(bench);
-  const pinch = usePinch(bench, onPanned);
-  const desk = useNoteDesk(bench, writing, canvas.setResized);
+  const connecting = useConnecting(context, openAddAt);
+  const hands = useHands({ context, canvas, onPanned }, connecting);
+  const press = usePress(context);
+  const pinch = usePinch(context, onPanned);
+  const desk = useNoteDesk(context, writing, canvas.setResized);
   const onDoubleClick = (event: MouseEvent) => {
     if (!(event.target as Element).classList.contains("react-flow__pane")) return;
     openAddAt([event.clientX, event.clientY], null);
@@ -218,7 +222,7 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
         press.onPointerDownCapture(event);
         pinch.down(event);
         // Under fingers there is no Shift: in the select mode each tap adds or takes away.
-        if (event.pointerType !== "mouse" && bench.tool === "select")
+        if (event.pointerType !== "mouse" && context.tool === "select")
           store.setState({ multiSelectionActive: true });
       }}
       onPointerMoveCapture={(event) => {
@@ -254,15 +258,15 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
           onEdgesChange={canvas.onEdgesChange}
           {...hands}
           connectOnClick={false}
-          edgesReconnectable={bench.mayEdit}
+          edgesReconnectable={context.mayEdit}
           reconnectRadius={12}
-          nodesDraggable={bench.mayEdit}
-          nodesConnectable={bench.mayEdit}
-          snapToGrid={bench.snap}
+          nodesDraggable={context.mayEdit}
+          nodesConnectable={context.mayEdit}
+          snapToGrid={context.snap}
           snapGrid={SNAP_GRID}
           elevateNodesOnSelect={false}
-          selectionOnDrag={bench.tool === "select"}
-          panOnDrag={bench.tool === "pan" ? true : coarse ? false : OTHER_BUTTONS}
+          selectionOnDrag={context.tool === "select"}
+          panOnDrag={context.tool === "pan" ? true : coarse ? false : OTHER_BUTTONS}
           panOnScroll={false}
           panOnScrollMode={PanOnScrollMode.Free}
           selectionMode={SelectionMode.Partial}
@@ -297,7 +301,7 @@ export function Canvas({ bench, canvas, me, map, onPanned, pointer, writing }: P
       </NoteDeskContext>
       {connecting.pending && (
         <PendingHint
-          bench={bench}
+          context={context}
           pending={connecting.pending}
           onCancel={() => connecting.setPending(null)}
         />

@@ -4,7 +4,7 @@ import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
-import type { Bench } from "../../edit-actions/editor-context";
+import type { EditorContext } from "../../edit-actions/editor-context";
 import { graphOf } from "../../graph/edit/document-writes";
 import { EMPTY_GRAPH } from "../../graph/model";
 import { QuickAdd } from "./quick-add";
@@ -21,19 +21,19 @@ let doc: Y.Doc;
 
 beforeEach(() => {
   doc = new Y.Doc();
-  const bench = {
+  const context = {
     doc,
     graph: EMPTY_GRAPH,
-    places: () => new Map(),
+    positions: () => new Map(),
     select: () => {},
     view: { reveal: () => {}, focus: () => {} },
-  } as unknown as Bench;
+  } as unknown as EditorContext;
   root = createRoot(document.body.appendChild(document.createElement("div")));
   act(() =>
     root.render(
       <MantineProvider>
         <QuickAdd
-          bench={bench}
+          context={context}
           request={{ screen: [0, 0], at: [0, 0], from: null }}
           known={[{ name: "Drive" }, { name: "Look" }, { name: "Say" }]}
           onClose={() => {}}

@@ -4,14 +4,18 @@ import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useEffect, useId, useMemo, useRef, useState } from "react";
 import { CARD } from "../../canvas/geometry/arrange";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
-import { type AddRequest, type Bench, placeAction } from "../../edit-actions/editor-context";
+import {
+  type AddRequest,
+  addActionAt,
+  type EditorContext,
+} from "../../edit-actions/editor-context";
 import { connect, insertInto, type NewAction, together } from "../../graph/edit";
 import type { Position } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import style from "./quick-add.module.css";
 
 interface Props {
-  bench: Bench;
+  context: EditorContext;
   request: AddRequest;
   known: readonly NewAction[];
   onClose: () => void;
@@ -39,18 +43,18 @@ export function candidates(known: readonly NewAction[], search: string): NewActi
   return [...named, ...fresh, ...described];
 }
 
-function placed(bench: Bench, request: AddRequest, template: NewAction): string {
+function placed(context: EditorContext, request: AddRequest, template: NewAction): string {
   const [x, y] = request.at;
   const position: Position = [x - Math.round(CARD.width / 2), y];
-  return together(bench.doc, () => {
-    const key = placeAction(bench, template, position);
-    if (request.from) connect(bench.doc, request.from.key, key, request.from.outcome);
-    if (request.into) insertInto(bench.doc, request.into, key);
+  return together(context.doc, () => {
+    const key = addActionAt(context, template, position);
+    if (request.from) connect(context.doc, request.from.key, key, request.from.outcome);
+    if (request.into) insertInto(context.doc, request.into, key);
     return key;
   });
 }
 
-export function QuickAdd({ bench, request, known, onClose }: Props) {
+export function QuickAdd({ context, request, known, onClose }: Props) {
   const [search, setSearch] = useState("");
   const [at, setAt] = useState(0);
   const list = useMemo(() => candidates(known, search), [known, search]);
@@ -66,10 +70,10 @@ export function QuickAdd({ bench, request, known, onClose }: Props) {
 
   const choose = (template: NewAction | undefined, byKey = false) => {
     if (!template) return;
-    const key = placed(bench, request, template);
-    bench.select([key]);
-    if (byKey) bench.view.focus(key);
-    bench.view.reveal([request.at[0] - CARD.width / 2, request.at[1]]);
+    const key = placed(context, request, template);
+    context.select([key]);
+    if (byKey) context.view.focus(key);
+    context.view.reveal([request.at[0] - CARD.width / 2, request.at[1]]);
     onClose();
   };
   const onKeyDown = (event: React.KeyboardEvent) => {
@@ -94,7 +98,7 @@ export function QuickAdd({ bench, request, known, onClose }: Props) {
     >
       {from && (
         <p className={style.from}>
-          when {endName(bench.graph, from.key)} is{" "}
+          when {endName(context.graph, from.key)} is{" "}
           <span style={{ color: outcomeColor[from.outcome] }}>
             <OutcomeSign outcome={from.outcome} /> {outcomeWord[from.outcome]}
           </span>

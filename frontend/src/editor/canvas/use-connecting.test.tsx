@@ -3,7 +3,7 @@ import { act, type MouseEvent } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
-import type { Bench } from "../../edit-actions/editor-context";
+import type { EditorContext } from "../../edit-actions/editor-context";
 import { addAction } from "../../graph/edit";
 import { graphOf } from "../../graph/edit/document-writes";
 import { useConnecting } from "./use-connecting";
@@ -11,18 +11,18 @@ import { useConnecting } from "./use-connecting";
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
 
 let root: Root;
-let bench: Bench;
+let context: EditorContext;
 let hands: ReturnType<typeof useConnecting>;
 const openAddAt = vi.fn();
 
 function Page() {
-  hands = useConnecting(bench, openAddAt);
+  hands = useConnecting(context, openAddAt);
   return null;
 }
 
 beforeEach(() => {
   openAddAt.mockReset();
-  bench = { doc: new Y.Doc(), select: () => {}, mayEdit: true } as unknown as Bench;
+  context = { doc: new Y.Doc(), select: () => {}, mayEdit: true } as unknown as EditorContext;
   root = createRoot(document.body.appendChild(document.createElement("div")));
   act(() => root.render(<Page />));
 });
@@ -49,7 +49,7 @@ const click = (target: Element) =>
   act(() => void hands.onClick({ target, clientX: 0, clientY: 0 } as unknown as MouseEvent));
 
 test("who taps an outcome and then draws an arrow by dragging is not asked what follows any more", () => {
-  const [a, b, c] = ["A", "B", "C"].map((name) => addAction(bench.doc, { name }));
+  const [a, b, c] = ["A", "B", "C"].map((name) => addAction(context.doc, { name }));
   if (!a || !b || !c) throw new Error("no actions");
   click(underPointer(a));
   expect(hands.pending).toEqual({ key: a, outcome: "on_error" });
@@ -57,7 +57,7 @@ test("who taps an outcome and then draws an arrow by dragging is not asked what 
   expect(hands.pending).toBeNull();
   const card = underPointer(c).parentElement;
   if (card) click(card);
-  expect(graphOf(bench.doc).relations.map(({ parent, child }) => [parent, child])).toEqual([
+  expect(graphOf(context.doc).relations.map(({ parent, child }) => [parent, child])).toEqual([
     [b, c],
   ]);
 });

@@ -2,7 +2,7 @@
 import type { Connection, FinalConnectionState, OnConnectEnd } from "@xyflow/react";
 import { type MouseEvent, useCallback, useEffect, useRef, useState } from "react";
 import type { Arrow } from "../../canvas/elements";
-import type { Bench } from "../../edit-actions/editor-context";
+import type { EditorContext } from "../../edit-actions/editor-context";
 import { connect, moveRelation, retarget } from "../../graph/edit";
 import type { Key, Position, Precondition } from "../../graph/model";
 import { ENTRY } from "../../graph/model";
@@ -29,8 +29,8 @@ function outcomeHit(target: EventTarget): Pending | null {
 
 type AddAt = (screen: Position, from: Pending | null) => void;
 
-export function useConnecting(bench: Bench, openAddAt: AddAt) {
-  const { doc, select, mayEdit } = bench;
+export function useConnecting(context: EditorContext, openAddAt: AddAt) {
+  const { doc, select, mayEdit } = context;
   const [pending, setPending] = useState<Pending | null>(null);
   const draw = useCallback(
     (parent: Key, child: Key, outcome: Precondition) => {

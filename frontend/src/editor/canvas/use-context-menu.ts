@@ -1,6 +1,6 @@
 /** Menus where one presses: the right button of a mouse, or a finger that rests. */
 import { type PointerEvent, useEffect, useMemo, useRef } from "react";
-import type { Bench } from "../../edit-actions/editor-context";
+import type { EditorContext } from "../../edit-actions/editor-context";
 import type { Position } from "../../graph/model";
 import { arrowAt, nodeAt } from "./hit-test";
 
@@ -8,16 +8,16 @@ const REST = 500; // ms
 const STILL = 8; // px that a resting finger may move
 
 /** Opens the menu for what lies under a point, which becomes the selection if it is not in it. */
-export function openMenuAt(bench: Bench, screen: Position): void {
+export function openMenuAt(context: EditorContext, screen: Position): void {
   const target = nodeAt(screen) ?? arrowAt(screen);
-  if (target === null) bench.select([]);
-  else if (!bench.selection.has(target)) bench.select([target]);
-  bench.open({ kind: "menu", screen });
+  if (target === null) context.select([]);
+  else if (!context.selection.has(target)) context.select([target]);
+  context.openOverlay({ kind: "menu", screen });
 }
 
-export function usePress(bench: Bench) {
-  const now = useRef(bench);
-  now.current = bench;
+export function usePress(context: EditorContext) {
+  const now = useRef(context);
+  now.current = context;
   const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
   const start = useRef<Position>([0, 0]);
   const fingers = useRef(new Set<number>());

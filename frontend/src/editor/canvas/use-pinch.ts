@@ -1,7 +1,7 @@
 /** Two fingers move and zoom the view also while one finger selects. */
 import { useReactFlow, useStoreApi } from "@xyflow/react";
 import { type PointerEvent, useMemo, useRef } from "react";
-import type { Bench } from "../../edit-actions/editor-context";
+import type { EditorContext } from "../../edit-actions/editor-context";
 import type { Position } from "../../graph/model";
 
 export const ZOOM = { least: 0.08, most: 2.2 } as const;
@@ -36,11 +36,11 @@ function pairOf(fingers: ReadonlyMap<number, Position>): Pair {
   return { middle: [(x0 + x1) / 2, (y0 + y1) / 2], apart: Math.hypot(x1 - x0, y1 - y0) };
 }
 
-export function usePinch(bench: Bench, onPanned: () => void) {
+export function usePinch(context: EditorContext, onPanned: () => void) {
   const flow = useReactFlow();
   const store = useStoreApi();
-  const now = useRef({ bench, onPanned });
-  now.current = { bench, onPanned };
+  const now = useRef({ bench: context, onPanned });
+  now.current = { bench: context, onPanned };
   const fingers = useRef(new Map<number, Position>());
   const chosen = useRef<ReadonlySet<string>>(new Set());
   const begun = useRef<{ pair: Pair; view: Looking; corner: Position } | null>(null);

@@ -13,7 +13,7 @@ import {
   readable,
   whole,
 } from "../../canvas/geometry/viewport";
-import type { View } from "../../edit-actions/editor-context";
+import type { CanvasView } from "../../edit-actions/editor-context";
 import { ENTRY, type Key, type Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 
@@ -133,7 +133,7 @@ export function useView(given: Given) {
     [flow, frame, least],
   );
 
-  const view = useMemo<View>(
+  const view = useMemo<CanvasView>(
     () => ({
       fit: () => showAll(200),
       zoomIn: () => void flow.zoomIn({ duration: glide(120) }),

@@ -4,7 +4,7 @@ import { notifications } from "@mantine/notifications";
 import { IconFlag, IconPlayerPlay, IconPlus, IconSquareRounded } from "@tabler/icons-react";
 import { useEffect, useRef, useState } from "react";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
-import { type Bench, freePlace, placeAction } from "../../edit-actions/editor-context";
+import { addActionAt, type EditorContext, freePosition } from "../../edit-actions/editor-context";
 import { endsOf } from "../../graph/document-keys";
 import { connect, moveRelation, together } from "../../graph/edit";
 import { ENTRY, EXIT, type Key, type Precondition } from "../../graph/model";
@@ -14,14 +14,14 @@ import { matching, type Option, PickList } from "../../ui/pick-list";
 import style from "./arrow-dialog.module.css";
 
 /** Everything an arrow can lead from or to, those that are near first. */
-function ends(bench: Bench, end: typeof ENTRY | typeof EXIT, near: Key | null): Option[] {
-  const places = bench.places();
-  const [x0, y0] = (near === null ? null : places.get(near)) ?? bench.view.middle();
+function ends(context: EditorContext, end: typeof ENTRY | typeof EXIT, near: Key | null): Option[] {
+  const places = context.positions();
+  const [x0, y0] = (near === null ? null : places.get(near)) ?? context.view.middle();
   const far = (key: Key) => {
     const [x, y] = places.get(key) ?? [0, 0];
     return Math.hypot(x - x0, y - y0);
   };
-  const actions = [...bench.graph.actions].sort((a, b) => far(a.key) - far(b.key));
+  const actions = [...context.graph.actions].sort((a, b) => far(a.key) - far(b.key));
   return [
     ...actions.map(
       ({ key, name, instanceId, actor }): Option => ({
@@ -99,7 +99,7 @@ function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) 
 }
 
 interface Props {
-  bench: Bench;
+  context: EditorContext;
   from: Key | null;
   to: Key | null;
   onClose: () => void;
@@ -107,18 +107,18 @@ interface Props {
 
 const FRESH = "new ";
 
-export function ArrowDialog({ bench, from: given, to, onClose }: Props) {
+export function ArrowDialog({ context, from: given, to, onClose }: Props) {
   const [from, setFrom] = useState(given);
   const [outcome, setOutcome] = useState<Precondition | null>(given === ENTRY ? "on_true" : null);
   const draw = (parent: Key, child: Key, when: Precondition) => {
     const target = child.startsWith(FRESH) ? null : child;
-    const relation = together(bench.doc, () => {
+    const relation = together(context.doc, () => {
       const key =
-        target ?? placeAction(bench, { name: child.slice(FRESH.length) }, freePlace(bench));
-      return connect(bench.doc, parent, key, when);
+        target ?? addActionAt(context, { name: child.slice(FRESH.length) }, freePosition(context));
+      return connect(context.doc, parent, key, when);
     });
     onClose();
-    if (relation !== null) bench.select([relation]);
+    if (relation !== null) context.select([relation]);
     else notifications.show({ color: "red", message: "No arrow can lead there." });
   };
   const chooseFrom = (key: Key) => {
@@ -131,9 +131,9 @@ export function ArrowDialog({ bench, from: given, to, onClose }: Props) {
     else setOutcome(when);
   };
   const step = from === null ? "from" : outcome === null ? "outcome" : "to";
-  const name = from === null ? "…" : endName(bench.graph, from);
+  const name = from === null ? "…" : endName(context.graph, from);
   const targets = (search: string): readonly Option[] => {
-    const all = ends(bench, EXIT, from).filter(({ id }) => from !== ENTRY || id !== EXIT);
+    const all = ends(context, EXIT, from).filter(({ id }) => from !== ENTRY || id !== EXIT);
     const found = matching(all, search);
     const wanted = search.trim();
     const fresh: Option = {
@@ -166,7 +166,7 @@ export function ArrowDialog({ bench, from: given, to, onClose }: Props) {
                 <OutcomeSign outcome={outcome} /> {outcomeWord[outcome]}
               </b>
             )}
-            , run {to === null ? "…" : <b>{endName(bench.graph, to)}</b>}
+            , run {to === null ? "…" : <b>{endName(context.graph, to)}</b>}
           </>
         )}
       </p>
@@ -175,7 +175,7 @@ export function ArrowDialog({ bench, from: given, to, onClose }: Props) {
           key="from"
           label="From"
           placeholder="From which action?"
-          find={(search) => matching(ends(bench, ENTRY, null), search)}
+          find={(search) => matching(ends(context, ENTRY, null), search)}
           onPick={chooseFrom}
           none="No action is called so."
         />
@@ -198,11 +198,11 @@ export function ArrowDialog({ bench, from: given, to, onClose }: Props) {
 
 /** Leads an arrow, with all that it says, from or to another action. */
 export function RetargetDialog({
-  bench,
+  context,
   relation,
   onClose,
 }: {
-  bench: Bench;
+  context: EditorContext;
   relation: string;
   onClose: () => void;
 }) {
@@ -210,9 +210,9 @@ export function RetargetDialog({
   const now = endsOf(relation);
   if (now === null) return null;
   const lead = (key: Key) => {
-    const moved = moveRelation(bench.doc, relation, { [end]: key });
+    const moved = moveRelation(context.doc, relation, { [end]: key });
     onClose();
-    if (moved !== null) bench.select([moved]);
+    if (moved !== null) context.select([moved]);
     else {
       notifications.show({
         color: "red",
@@ -221,7 +221,7 @@ export function RetargetDialog({
       });
     }
   };
-  const options = ends(bench, end === "child" ? EXIT : ENTRY, now[end]).filter(
+  const options = ends(context, end === "child" ? EXIT : ENTRY, now[end]).filter(
     ({ id }) => id !== now[end] && (id === EXIT || id !== ENTRY || now.parent === ENTRY),
   );
   return (
@@ -240,7 +240,7 @@ export function RetargetDialog({
           aria-pressed={end === "child"}
           onClick={() => setEnd("child")}
         >
-          to another than {endName(bench.graph, now.child)}
+          to another than {endName(context.graph, now.child)}
         </Button>
         {now.parent !== ENTRY && (
           <Button
@@ -248,7 +248,7 @@ export function RetargetDialog({
             aria-pressed={end === "parent"}
             onClick={() => setEnd("parent")}
           >
-            from another than {endName(bench.graph, now.parent)}
+            from another than {endName(context.graph, now.parent)}
           </Button>
         )}
       </div>

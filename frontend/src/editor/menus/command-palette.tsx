@@ -6,7 +6,7 @@ import { useLocation } from "wouter";
 import { useGraphs } from "../../api/graphs";
 import { DEEDS } from "../../edit-actions/all";
 import { isEnabled, labelOf } from "../../edit-actions/edit-action";
-import type { Bench } from "../../edit-actions/editor-context";
+import type { EditorContext } from "../../edit-actions/editor-context";
 import { Shortcut } from "../../edit-actions/shortcut-keys";
 import { robotColor } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
@@ -15,7 +15,7 @@ const MOST = 60;
 /** Names of deeds that were done from here, the last first. */
 let recent: readonly string[] = [];
 
-function deedOptions(bench: Bench): Option[] {
+function deedOptions(context: EditorContext): Option[] {
   const rank = (name: string) => {
     const at = recent.indexOf(name);
     return at < 0 ? recent.length : at;
@@ -25,19 +25,19 @@ function deedOptions(bench: Bench): Option[] {
       const Sign = deed.icon;
       return {
         id: `deed ${deed.name}`,
-        label: labelOf(deed, bench),
+        label: labelOf(deed, context),
         also: `${deed.also ?? ""} ${deed.group}`,
         group: "Commands",
         icon: <Sign size={16} aria-hidden />,
         right: <Shortcut deed={deed} />,
-        disabled: !isEnabled(deed, bench),
+        disabled: !isEnabled(deed, context),
         rank: rank(deed.name),
       };
     })
     .sort((a, b) => Number(a.disabled) - Number(b.disabled) || a.rank - b.rank);
 }
 
-function actionOptions({ graph }: Bench): Option[] {
+function actionOptions({ graph }: EditorContext): Option[] {
   return graph.actions.map(({ key, name, instanceId, actor, description }) => ({
     id: `action ${key}`,
     label: `${name} ${instanceId}`,
@@ -48,11 +48,11 @@ function actionOptions({ graph }: Bench): Option[] {
   }));
 }
 
-export function Palette({ bench, onClose }: { bench: Bench; onClose: () => void }) {
+export function Palette({ context, onClose }: { context: EditorContext; onClose: () => void }) {
   const [, go] = useLocation();
   const graphs = useGraphs().data;
   // Counted once: the order shall not change under the person's hands.
-  const first = useRef(bench);
+  const first = useRef(context);
   const options = useMemo<Option[]>(
     () => [
       ...deedOptions(first.current),
@@ -75,13 +75,13 @@ export function Palette({ bench, onClose }: { bench: Bench; onClose: () => void 
     onClose();
     if (kind === "graph") go(`/graphs/${encodeURIComponent(key)}`);
     else if (kind === "action") {
-      bench.select([key]);
-      bench.view.show([key]);
-      bench.view.focus(key);
+      context.select([key]);
+      context.view.show([key]);
+      context.view.focus(key);
     } else {
       recent = [key, ...recent.filter((name) => name !== key)].slice(0, 5);
       // After the palette has given the focus back.
-      setTimeout(() => DEEDS.find(({ name }) => name === key)?.run(bench), 0);
+      setTimeout(() => DEEDS.find(({ name }) => name === key)?.run(context), 0);
     }
   };
   return (

@@ -4,7 +4,7 @@ import { Fragment, useEffect, useRef } from "react";
 import * as deeds from "../../edit-actions/all";
 import { type Deed, isEnabled, labelOf } from "../../edit-actions/edit-action";
 import {
-  type Bench,
+  type EditorContext,
   selectedActions,
   selectedNotes,
   selectedRelations,
@@ -13,10 +13,10 @@ import { Shortcut } from "../../edit-actions/shortcut-keys";
 import style from "./context-menu.module.css";
 
 /** What can be done with the selection, in groups. */
-export function offered(bench: Bench): readonly (readonly Deed[])[] {
-  const actions = selectedActions(bench).length;
-  const notes = selectedNotes(bench).length;
-  const arrows = selectedRelations(bench).length;
+export function offered(context: EditorContext): readonly (readonly Deed[])[] {
+  const actions = selectedActions(context).length;
+  const notes = selectedNotes(context).length;
+  const arrows = selectedRelations(context).length;
   const { copy, cut, pasteHere, duplicate, remove, heal } = deeds;
   if (actions + notes > 1) {
     return [
@@ -42,7 +42,7 @@ export function offered(bench: Bench): readonly (readonly Deed[])[] {
       [remove],
     ];
   }
-  const end = bench.selection.size > 0 ? [deeds.connectTo] : [];
+  const end = context.selection.size > 0 ? [deeds.connectTo] : [];
   return [
     [...end, deeds.add, deeds.note, pasteHere],
     [deeds.selectAll, deeds.tidy, deeds.fit, deeds.snap],
@@ -51,14 +51,14 @@ export function offered(bench: Bench): readonly (readonly Deed[])[] {
 }
 
 interface Props {
-  bench: Bench;
+  context: EditorContext;
   screen: readonly [number, number];
   onClose: () => void;
 }
 
-export function ContextMenu({ bench, screen, onClose }: Props) {
-  const groups = offered(bench)
-    .map((group) => group.filter((deed) => isEnabled(deed, bench)))
+export function ContextMenu({ context, screen, onClose }: Props) {
+  const groups = offered(context)
+    .map((group) => group.filter((deed) => isEnabled(deed, context)))
     .filter((group) => group.length > 0);
   const box = useRef<HTMLDivElement>(null);
   useEffect(() => {
@@ -99,10 +99,10 @@ export function ContextMenu({ bench, screen, onClose }: Props) {
                   rightSection={<Shortcut deed={deed} />}
                   onClick={() => {
                     onClose();
-                    deed.run(bench);
+                    deed.run(context);
                   }}
                 >
-                  {labelOf(deed, bench)}
+                  {labelOf(deed, context)}
                 </Menu.Item>
               );
             })}

@@ -1,28 +1,30 @@
 /** What opens over the editor, one at a time: menus, the palette, dialogs of single deeds. */
 
-import type { Bench, Surface } from "../../edit-actions/editor-context";
+import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import { ArrowDialog, RetargetDialog } from "./arrow-dialog";
 import { Palette } from "./command-palette";
 import { ContextMenu } from "./context-menu";
 import { KeysSheet } from "./shortcut-sheet";
 
 interface Props {
-  bench: Bench;
-  surface: Surface | null;
+  context: EditorContext;
+  overlay: Overlay | null;
   onClose: () => void;
 }
 
-export function Surfaces({ bench, surface, onClose }: Props) {
-  if (surface === null) return null;
-  switch (surface.kind) {
+export function Overlays({ context, overlay, onClose }: Props) {
+  if (overlay === null) return null;
+  switch (overlay.kind) {
     case "arrow":
-      return <ArrowDialog bench={bench} from={surface.from} to={surface.to} onClose={onClose} />;
+      return (
+        <ArrowDialog context={context} from={overlay.from} to={overlay.to} onClose={onClose} />
+      );
     case "retarget":
-      return <RetargetDialog bench={bench} relation={surface.relation} onClose={onClose} />;
+      return <RetargetDialog context={context} relation={overlay.relation} onClose={onClose} />;
     case "menu":
-      return <ContextMenu bench={bench} screen={surface.screen} onClose={onClose} />;
+      return <ContextMenu context={context} screen={overlay.screen} onClose={onClose} />;
     case "palette":
-      return <Palette bench={bench} onClose={onClose} />;
+      return <Palette context={context} onClose={onClose} />;
     case "keys":
       return <KeysSheet onClose={onClose} />;
     case "note":

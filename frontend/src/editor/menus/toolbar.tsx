@@ -19,15 +19,15 @@ import {
   zoomOut,
 } from "../../edit-actions/all";
 import { type Deed, type Group, isEnabled, labelOf } from "../../edit-actions/edit-action";
-import { useBench } from "../../edit-actions/editor-context";
+import { useEditorContext } from "../../edit-actions/editor-context";
 import { Shortcut } from "../../edit-actions/shortcut-keys";
 import { useSteady } from "../../ui/use-stable-callback";
 import style from "./toolbar.module.css";
 
 function Tool({ deed, pressed }: { deed: Deed; pressed?: boolean }) {
-  const bench = useBench();
-  const run = useSteady(() => deed.run(bench));
-  const parts = { label: labelOf(deed, bench), disabled: !isEnabled(deed, bench), run };
+  const context = useEditorContext();
+  const run = useSteady(() => deed.run(context));
+  const parts = { label: labelOf(deed, context), disabled: !isEnabled(deed, context), run };
   return <ToolButton deed={deed} {...parts} {...(pressed === undefined ? {} : { pressed })} />;
 }
 
@@ -73,7 +73,7 @@ const KEYS_ONLY = /^(nudge|walk)-/;
 
 /** Rendered while the menu is open only: what is enabled depends on everything. */
 function DeedItems() {
-  const bench = useBench();
+  const context = useEditorContext();
   return GROUPS.map((group) => (
     <Fragment key={group}>
       <Menu.Label>{group}</Menu.Label>
@@ -84,10 +84,10 @@ function DeedItems() {
             key={deed.name}
             leftSection={<Sign size={16} aria-hidden />}
             rightSection={<Shortcut deed={deed} />}
-            disabled={!isEnabled(deed, bench)}
-            onClick={() => deed.run(bench)}
+            disabled={!isEnabled(deed, context)}
+            onClick={() => deed.run(context)}
           >
-            {labelOf(deed, bench)}
+            {labelOf(deed, context)}
           </Menu.Item>
         );
       })}
@@ -116,7 +116,7 @@ export function DeedMenu() {
 }
 
 export const Toolbar = memo(function Toolbar({ compact }: { compact: boolean }) {
-  const { tool, selection, snap: snapping, dryRun: dry } = useBench();
+  const { tool, selection, snap: snapping, dryRun: dry } = useEditorContext();
   return (
     <div className={style.bar} role="toolbar" aria-label="Canvas tools">
       <Tool deed={add} />

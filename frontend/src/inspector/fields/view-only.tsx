@@ -1,7 +1,7 @@
 /** For people who may only look: what changes the graph is off, what shows it is not. */
 import { MantineThemeProvider } from "@mantine/core";
 import type { ReactNode } from "react";
-import { useBench } from "../../edit-actions/editor-context";
+import { useEditorContext } from "../../edit-actions/editor-context";
 import style from "../inspector.module.css";
 
 const OFF = { defaultProps: { disabled: true } };
@@ -24,7 +24,7 @@ const LOOKING = {
 };
 
 export function LookOnly({ children }: { children: ReactNode }) {
-  const { mayEdit } = useBench();
+  const { mayEdit } = useEditorContext();
   return (
     <MantineThemeProvider theme={mayEdit ? {} : LOOKING}>
       <div className={style.fields} data-looking={!mayEdit || undefined}>

@@ -5,7 +5,11 @@ import { lazy, type ReactNode, Suspense, useMemo, useState } from "react";
 import type { KeyChange } from "../../api/graphs";
 import { sentence } from "../../api/http";
 import { keysOf } from "../../edit-actions/edit-action";
-import { selectedActions, selectedRelations, useBench } from "../../edit-actions/editor-context";
+import {
+  selectedActions,
+  selectedRelations,
+  useEditorContext,
+} from "../../edit-actions/editor-context";
 import type { Fault } from "./json-editor";
 import { actionAt, rangeOf, rangeOfArrow } from "./json-positions";
 import { collisions, places, rewrite } from "./json-rewrite";
@@ -91,35 +95,35 @@ function Meanwhile({ names, onRest, onAll, onBack }: MeanwhileProps) {
 }
 
 export function JsonView({ graph, seq }: { graph: string; seq: number }) {
-  const bench = useBench();
+  const context = useEditorContext();
   const json = useJson(graph, seq);
   const { text, draft, verdict } = json;
   const [asking, setAsking] = useState<readonly KeyChange[] | null>(null);
   const lines = useMemo(() => (text ?? "").split("\n"), [text]);
-  const [selected] = selectedActions(bench);
+  const [selected] = selectedActions(context);
   const name = selected?.name;
   const instanceId = selected?.instanceId;
-  const [arrow] = selectedRelations(bench);
+  const [arrow] = selectedRelations(context);
   const marked = useMemo(() => {
     if (name !== undefined && instanceId !== undefined) return rangeOf(lines, { name, instanceId });
-    return arrow && text !== undefined ? rangeOfArrow(bench.graph, text, arrow) : null;
-  }, [lines, text, name, instanceId, arrow, bench.graph]);
+    return arrow && text !== undefined ? rangeOfArrow(context.graph, text, arrow) : null;
+  }, [lines, text, name, instanceId, arrow, context.graph]);
   const faults = useMemo(() => (draft ? faultsOf(verdict) : NO_FAULTS), [draft, verdict]);
   const changes = verdict.kind === "fits" && draft ? verdict.rewriting.changes : [];
   const write = (some: readonly KeyChange[]) => {
-    rewrite(bench.doc, some);
+    rewrite(context.doc, some);
     setAsking(null);
     json.done();
   };
   const apply = () => {
     if (changes.length === 0) return;
-    const taken = collisions(bench.doc, changes);
+    const taken = collisions(context.doc, changes);
     if (taken.length === 0) write(changes);
     else setAsking(taken);
   };
   const follow = (line: number) => {
-    const action = actionAt(bench.graph, lines, line);
-    if (action && !bench.selection.has(action.key)) bench.select([action.key]);
+    const action = actionAt(context.graph, lines, line);
+    if (action && !context.selection.has(action.key)) context.select([action.key]);
   };
   if (json.error && text === undefined) return <p>{sentence(json.error)}</p>;
   if (text === undefined) return <Skeleton height={200} />;
@@ -128,7 +132,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
     const rest = changes.filter((change) => !asking.includes(change));
     foot = (
       <Meanwhile
-        names={places(bench.graph, asking)}
+        names={places(context.graph, asking)}
         onRest={rest.length > 0 ? () => write(rest) : null}
         onAll={() => write(changes)}
         onBack={() => setAsking(null)}
@@ -138,7 +142,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
     foot = (
       <section className={style.foot} aria-label="Your edit of the JSON">
         <div className={style.words} role="status">
-          <VerdictWords verdict={verdict} onShow={places(bench.graph, changes)} />
+          <VerdictWords verdict={verdict} onShow={places(context.graph, changes)} />
         </div>
         <div className={style.buttons}>
           <Button
@@ -173,7 +177,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
       <Suspense fallback={<Skeleton height="100%" />}>
         <JsonEditor
           text={text}
-          readOnly={!bench.mayEdit}
+          readOnly={!context.mayEdit}
           faults={faults}
           marked={marked}
           onChange={json.edit}

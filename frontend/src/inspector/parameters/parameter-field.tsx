@@ -2,7 +2,7 @@
 import { ActionIcon, SegmentedControl, Select, Tooltip } from "@mantine/core";
 import { IconAdjustments, IconBackspace, IconLock } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";
-import { useBench } from "../../edit-actions/editor-context";
+import { useEditorContext } from "../../edit-actions/editor-context";
 import type { Side } from "../../graph/document-keys";
 import { setParameter } from "../../graph/edit";
 import type { Key, Parameter } from "../../graph/model";
@@ -72,7 +72,7 @@ function Label({ name, fullName, field, open, onOpen }: LabelProps) {
 }
 
 export function ParameterField({ owner, side, parameter, name, others }: Props) {
-  const { doc } = useBench();
+  const { doc } = useEditorContext();
   const [open, setOpen] = useState(false);
   const field = fieldOf(parameter.text);
   const label: ReactNode = (

@@ -3,7 +3,7 @@ import { MantineProvider } from "@mantine/core";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { type Bench, BenchContext } from "../../edit-actions/editor-context";
+import { type EditorContext, EditorReactContext } from "../../edit-actions/editor-context";
 import { addAction } from "../../graph/edit";
 import { graphOf } from "../../graph/edit/document-writes";
 import { RoomProvider, useGraph, useRoom } from "../../sync/use-room";
@@ -35,9 +35,9 @@ function Page() {
   const graph = useGraph();
   const [action] = graph.actions;
   return (
-    <BenchContext value={{ doc, graph } as unknown as Bench}>
+    <EditorReactContext value={{ doc, graph } as unknown as EditorContext}>
       {action && <Parameters action={action} side="in" />}
-    </BenchContext>
+    </EditorReactContext>
   );
 }
 

@@ -2,7 +2,7 @@
 import { Button, Group, Select, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
-import { useBench } from "../../edit-actions/editor-context";
+import { useEditorContext } from "../../edit-actions/editor-context";
 import type { Side } from "../../graph/document-keys";
 import { addParameter, together } from "../../graph/edit";
 import type { Action } from "../../graph/model";
@@ -20,7 +20,7 @@ interface AddProps {
 }
 
 function AddParameter({ action, side, onDone }: AddProps) {
-  const { doc } = useBench();
+  const { doc } = useEditorContext();
   const [name, setName] = useState("");
   const [type, setType] = useState<string>("string");
   const path = pathFrom(name);

@@ -1,7 +1,7 @@
 /** What a parameter is, apart from its value: name, type, allowed values, required, locked. */
 import { Autocomplete, Button, Group, Switch } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
-import { useBench } from "../../edit-actions/editor-context";
+import { useEditorContext } from "../../edit-actions/editor-context";
 import type { Side } from "../../graph/document-keys";
 import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
 import type { Key, Parameter } from "../../graph/model";
@@ -28,7 +28,7 @@ interface Props {
 }
 
 export function ParameterSettings({ owner, side, parameter, others, onClose }: Props) {
-  const { doc } = useBench();
+  const { doc } = useEditorContext();
   const field = fieldOf(parameter.text);
   const name = pathWords(parameter.path);
   const write = (change: (now: string) => string) =>

@@ -2,7 +2,7 @@
 import { ActionIcon, Button, Select } from "@mantine/core";
 import { IconArrowDown, IconX } from "@tabler/icons-react";
 import { useState } from "react";
-import { useBench } from "../../edit-actions/editor-context";
+import { useEditorContext } from "../../edit-actions/editor-context";
 import { relationId } from "../../graph/document-keys";
 import { setRemap } from "../../graph/edit";
 import type { Relation } from "../../graph/model";
@@ -53,7 +53,7 @@ function Pick({ label, choices, value, onPick }: PickProps) {
 }
 
 function AddRemap({ relation, onDone }: { relation: Relation; onDone: () => void }) {
-  const { doc, graph } = useBench();
+  const { doc, graph } = useEditorContext();
   const [source, setSource] = useState<string | null>(null);
   const [target, setTarget] = useState<string | null>(null);
   const parent = graph.actions.find((action) => action.key === relation.parent);
@@ -99,7 +99,7 @@ function AddRemap({ relation, onDone }: { relation: Relation; onDone: () => void
 }
 
 export function Remaps({ relation }: { relation: Relation }) {
-  const { doc, graph } = useBench();
+  const { doc, graph } = useEditorContext();
   const [adding, setAdding] = useState(false);
   const parent = graph.actions.find((action) => action.key === relation.parent);
   const child = graph.actions.find((action) => action.key === relation.child);
