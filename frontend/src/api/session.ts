@@ -2,7 +2,7 @@
 import { ask } from "./http";
 import type { Role } from "./roles";
 
-export { type Deed, may, ROLE_WORDS, ROLES, type Role } from "./roles";
+export { may, type Permission, ROLE_WORDS, ROLES, type Role } from "./roles";
 
 export interface Person {
   id: string;

@@ -1,6 +1,6 @@
 /** Who is signed in, for every feature. */
 import { createContext, use } from "react";
-import { type Deed, may, type Person } from "./session";
+import { may, type Permission, type Person } from "./session";
 
 export interface PersonHold {
   person: Person;
@@ -18,6 +18,6 @@ export function usePerson(): PersonHold {
 }
 
 /** Whether the one who is signed in may do this. */
-export function useMay(deed: Deed): boolean {
-  return may(usePerson().person.role, deed);
+export function useMay(permission: Permission): boolean {
+  return may(usePerson().person.role, permission);
 }

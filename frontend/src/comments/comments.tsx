@@ -3,7 +3,7 @@ import { Button, Textarea, Tooltip } from "@mantine/core";
 import { IconCheck, IconMessageCircle, IconRotate2 } from "@tabler/icons-react";
 import { useState } from "react";
 import { usePerson } from "../api/use-person";
-import { keysOf } from "../edit-actions/edit-action";
+import { printedKeys } from "../edit-actions/edit-action";
 import { selectedActions, useEditorContext } from "../edit-actions/editor-context";
 import { beginThread, reply, resolve, type Thread, unsay } from "../graph/edit/comments";
 import type { Key } from "../graph/model";
@@ -58,7 +58,7 @@ function Write({ label, button, onSay, autoFocus = false, onCancel }: WriteProps
             size="compact-sm"
             variant="filled"
             disabled={text.trim() === ""}
-            title={keysOf("Mod+Enter").join(" ")}
+            title={printedKeys("Mod+Enter").join(" ")}
           >
             {button}
           </Button>

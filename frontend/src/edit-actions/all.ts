@@ -2,7 +2,7 @@
 import { ALIGN, DISTRIBUTE, NUDGE, snap, tidy, tidySelection } from "./arrange";
 import * as draw from "./draw";
 import { DRY_RUN } from "./dry-run-actions";
-import type { Deed } from "./edit-action";
+import type { EditAction } from "./edit-action";
 import * as notes from "./notes";
 import { PANELS } from "./panels";
 import * as graph from "./share";
@@ -15,10 +15,10 @@ export * from "./notes";
 export * from "./share";
 export * from "./view";
 
-export const DEEDS: readonly Deed[] = [
+export const EDIT_ACTIONS: readonly EditAction[] = [
   draw.add,
   draw.connectTo,
-  draw.retarget,
+  draw.retargetArrow,
   notes.insert,
   draw.entry,
   draw.exit,
@@ -29,8 +29,8 @@ export const DEEDS: readonly Deed[] = [
   draw.cut,
   draw.pasteHere,
   draw.duplicate,
-  draw.remove,
-  draw.heal,
+  draw.removeSelection,
+  draw.removeAndReconnect,
   draw.undo,
   draw.redo,
   draw.selectAll,
@@ -54,7 +54,7 @@ export const DEEDS: readonly Deed[] = [
   look.menu,
   look.showJson,
   ...PANELS,
-  look.keys,
+  look.showShortcuts,
   ...DRY_RUN,
   graph.exportUmrf,
   graph.exportSvg,

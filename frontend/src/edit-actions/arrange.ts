@@ -18,7 +18,7 @@ import {
 import { type Align, align, type Block, distribute, tidied } from "../canvas/geometry/align";
 import { arrange, CARD } from "../canvas/geometry/arrange";
 import { moveActions } from "../graph/edit";
-import type { Deed } from "./edit-action";
+import type { EditAction } from "./edit-action";
 import {
   type EditorContext,
   GRID,
@@ -38,7 +38,12 @@ function blocks(context: EditorContext): Block[] {
 
 const several = (least: number) => (context: EditorContext) => blocks(context).length >= least;
 
-function aligned(name: Align, label: string, icon: Deed["icon"], shortcut?: string): Deed {
+function aligned(
+  name: Align,
+  label: string,
+  icon: EditAction["icon"],
+  shortcut?: string,
+): EditAction {
   return {
     name: `align-${name}`,
     label,
@@ -52,7 +57,7 @@ function aligned(name: Align, label: string, icon: Deed["icon"], shortcut?: stri
   };
 }
 
-export const ALIGN: readonly Deed[] = [
+export const ALIGN: readonly EditAction[] = [
   aligned("left", "Align left", IconLayoutAlignLeft, "Alt+Shift+ArrowLeft"),
   aligned("center", "Align centres", IconLayoutAlignCenter),
   aligned("right", "Align right", IconLayoutAlignRight, "Alt+Shift+ArrowRight"),
@@ -61,7 +66,7 @@ export const ALIGN: readonly Deed[] = [
   aligned("bottom", "Align bottom", IconLayoutAlignBottom, "Alt+Shift+ArrowDown"),
 ];
 
-const spread = (axis: "x" | "y", label: string, icon: Deed["icon"]): Deed => ({
+const spread = (axis: "x" | "y", label: string, icon: EditAction["icon"]): EditAction => ({
   name: `distribute-${axis}`,
   label,
   group: "Arrange",
@@ -73,12 +78,12 @@ const spread = (axis: "x" | "y", label: string, icon: Deed["icon"]): Deed => ({
   run: (context) => writePositions(context, distribute(blocks(context), axis)),
 });
 
-export const DISTRIBUTE: readonly Deed[] = [
+export const DISTRIBUTE: readonly EditAction[] = [
   spread("x", "Distribute across", IconLayoutDistributeHorizontal),
   spread("y", "Distribute down", IconLayoutDistributeVertical),
 ];
 
-export const tidy: Deed = {
+export const tidy: EditAction = {
   name: "tidy",
   label: "Tidy",
   group: "Arrange",
@@ -93,7 +98,7 @@ export const tidy: Deed = {
   },
 };
 
-export const tidySelection: Deed = {
+export const tidySelection: EditAction = {
   name: "tidy-selection",
   label: "Tidy the selection",
   group: "Arrange",
@@ -108,7 +113,7 @@ export const tidySelection: Deed = {
   },
 };
 
-export const snap: Deed = {
+export const snap: EditAction = {
   name: "snap",
   label: "Snap to the grid",
   group: "Arrange",
@@ -142,18 +147,19 @@ function nudge(context: EditorContext, dx: number, dy: number): void {
 }
 const NUDGED = "nudged";
 
-export const NUDGE: readonly Deed[] = Object.entries(WAYS).flatMap(([key, [dx, dy, word, icon]]) =>
-  ([1, 4] as const).map(
-    (far): Deed => ({
-      name: `nudge-${word}-${far}`,
-      label: far === 1 ? `Move ${word}` : `Move far ${word}`,
-      group: "Arrange",
-      shortcuts: [far === 1 ? key : `Shift+${key}`],
-      icon,
-      changes: true,
-      also: "nudge",
-      enabled: (context) => selectedActions(context).length + selectedNotes(context).length > 0,
-      run: (context) => nudge(context, dx * far, dy * far),
-    }),
-  ),
+export const NUDGE: readonly EditAction[] = Object.entries(WAYS).flatMap(
+  ([key, [dx, dy, word, icon]]) =>
+    ([1, 4] as const).map(
+      (far): EditAction => ({
+        name: `nudge-${word}-${far}`,
+        label: far === 1 ? `Move ${word}` : `Move far ${word}`,
+        group: "Arrange",
+        shortcuts: [far === 1 ? key : `Shift+${key}`],
+        icon,
+        changes: true,
+        also: "nudge",
+        enabled: (context) => selectedActions(context).length + selectedNotes(context).length > 0,
+        run: (context) => nudge(context, dx * far, dy * far),
+      }),
+    ),
 );

@@ -15,7 +15,7 @@ import { umrfText } from "../graph/umrf-text";
 import { copyText } from "../ui/copy-text";
 import { type EditorContext, selectedActions } from "./editor-context";
 
-export interface Held {
+export interface CopiedContent {
   /** What the system's clipboard got. */
   readonly text: string;
   readonly clip: Clip;
@@ -23,10 +23,10 @@ export interface Held {
 
 const SHELF = "aa.clipboard";
 const MOST = 2_000_000; // characters that are kept for other tabs
-let latest: Held | null = null;
+let latest: CopiedContent | null = null;
 
 /** What is chosen, as it goes to the clipboard. Notes alone are their own text. */
-export function copied(context: EditorContext): Held {
+export function copiedSelection(context: EditorContext): CopiedContent {
   const places = context.positions();
   const clip = clipOf(context.doc, context.selection, places);
   const actions = selectedActions(context).filter(({ missing }) => !missing);
@@ -36,7 +36,7 @@ export function copied(context: EditorContext): Held {
 }
 
 /** Remembers it for this browser's pages. */
-export function hold(held: Held): void {
+export function rememberCopied(held: CopiedContent): void {
   latest = held;
   try {
     const text = JSON.stringify(held);
@@ -48,7 +48,7 @@ export function hold(held: Held): void {
 }
 
 /** Another version of this page may have left something else. */
-function isHeld(value: unknown): value is Held {
+function isHeld(value: unknown): value is CopiedContent {
   if (typeof value !== "object" || value === null) return false;
   const { text, clip } = value as { text?: unknown; clip?: Partial<Record<keyof Clip, unknown>> };
   const maps = [clip?.actions, clip?.relations, clip?.positions];
@@ -56,7 +56,7 @@ function isHeld(value: unknown): value is Held {
 }
 
 /** What was copied last in this browser. */
-export function held(): Held | null {
+export function lastCopied(): CopiedContent | null {
   try {
     const kept: unknown = JSON.parse(localStorage.getItem(SHELF) ?? "null");
     if (isHeld(kept)) return kept;
@@ -82,7 +82,7 @@ export async function readText(): Promise<string> {
   } catch {
     // no permission
   }
-  return held()?.text ?? "";
+  return lastCopied()?.text ?? "";
 }
 
 function failed(message: string): void {
@@ -114,7 +114,7 @@ function land(context: EditorContext, clip: Clip, own: boolean): void {
 
 /** Adds what a text holds: our own pieces exactly, any UMRF as the server reads it. */
 export async function pasteText(context: EditorContext, text: string): Promise<void> {
-  const ours = held();
+  const ours = lastCopied();
   if (ours !== null && ours.text === text && !isEmpty(ours.clip)) {
     // Where it came from it would lie on itself.
     const same = Object.keys(ours.clip.actions).some((key) =>

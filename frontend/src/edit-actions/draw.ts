@@ -30,8 +30,8 @@ import {
 import { clipOf, paste } from "../graph/edit/clip";
 import { type Action, ENTRY, EXIT } from "../graph/model";
 import { copyText } from "../ui/copy-text";
-import { copied, hold, pasteText, readText } from "./clipboard";
-import type { Deed } from "./edit-action";
+import { copiedSelection, pasteText, readText, rememberCopied } from "./clipboard";
+import type { EditAction } from "./edit-action";
 import {
   type EditorContext,
   selectedActions,
@@ -45,7 +45,7 @@ const someAction = (context: EditorContext) => selectedActions(context).length >
 const something = (context: EditorContext) =>
   selectedActions(context).length + selectedNotes(context).length > 0;
 
-export const add: Deed = {
+export const add: EditAction = {
   name: "add",
   label: "Add an action",
   group: "Draw",
@@ -57,7 +57,7 @@ export const add: Deed = {
   run: (context) => context.openAdd(),
 };
 
-export const copy: Deed = {
+export const copy: EditAction = {
   name: "copy",
   label: "Copy",
   group: "Draw",
@@ -68,13 +68,13 @@ export const copy: Deed = {
   also: "UMRF text clipboard",
   enabled: something,
   run: (context) => {
-    const held = copied(context);
-    hold(held);
+    const held = copiedSelection(context);
+    rememberCopied(held);
     void copyText(held.text);
   },
 };
 
-export const cut: Deed = {
+export const cut: EditAction = {
   name: "cut",
   label: "Cut",
   group: "Draw",
@@ -85,11 +85,11 @@ export const cut: Deed = {
   enabled: something,
   run: (context) => {
     copy.run(context);
-    remove.run(context);
+    removeSelection.run(context);
   },
 };
 
-export const pasteHere: Deed = {
+export const pasteHere: EditAction = {
   name: "paste",
   label: "Paste",
   group: "Draw",
@@ -102,7 +102,7 @@ export const pasteHere: Deed = {
   run: (context) => void readText().then((text) => pasteText(context, text)),
 };
 
-export const duplicate: Deed = {
+export const duplicate: EditAction = {
   name: "duplicate",
   label: "Duplicate",
   group: "Draw",
@@ -118,7 +118,7 @@ export const duplicate: Deed = {
   },
 };
 
-export const remove: Deed = {
+export const removeSelection: EditAction = {
   name: "remove",
   label: "Delete",
   group: "Draw",
@@ -138,7 +138,7 @@ export const remove: Deed = {
   },
 };
 
-export const heal: Deed = {
+export const removeAndReconnect: EditAction = {
   name: "heal",
   label: "Delete and heal",
   group: "Draw",
@@ -154,7 +154,7 @@ export const heal: Deed = {
   },
 };
 
-export const undo: Deed = {
+export const undo: EditAction = {
   name: "undo",
   label: "Undo",
   group: "Draw",
@@ -165,7 +165,7 @@ export const undo: Deed = {
   run: (context) => context.undo.undo(),
 };
 
-export const redo: Deed = {
+export const redo: EditAction = {
   name: "redo",
   label: "Redo",
   group: "Draw",
@@ -176,7 +176,7 @@ export const redo: Deed = {
   run: (context) => context.undo.redo(),
 };
 
-export const selectAll: Deed = {
+export const selectAll: EditAction = {
   name: "select-all",
   label: "Select all",
   group: "Draw",
@@ -190,7 +190,7 @@ export const selectAll: Deed = {
   },
 };
 
-export const selectNone: Deed = {
+export const selectNone: EditAction = {
   name: "select-none",
   label: "Select nothing",
   group: "Draw",
@@ -201,7 +201,7 @@ export const selectNone: Deed = {
   run: (context) => context.select([]),
 };
 
-export const connectTo: Deed = {
+export const connectTo: EditAction = {
   name: "connect",
   label: "Draw an arrow …",
   group: "Draw",
@@ -218,7 +218,7 @@ export const connectTo: Deed = {
   },
 };
 
-export const retarget: Deed = {
+export const retargetArrow: EditAction = {
   name: "retarget",
   label: "Lead the arrow elsewhere …",
   group: "Draw",
@@ -252,7 +252,7 @@ function toggleEnd(context: EditorContext, end: typeof ENTRY | typeof EXIT): voi
   });
 }
 
-export const entry: Deed = {
+export const entry: EditAction = {
   name: "entry",
   label: "Start with this",
   group: "Draw",
@@ -264,7 +264,7 @@ export const entry: Deed = {
   run: (context) => toggleEnd(context, ENTRY),
 };
 
-export const exit: Deed = {
+export const exit: EditAction = {
   name: "exit",
   label: "End with this",
   group: "Draw",

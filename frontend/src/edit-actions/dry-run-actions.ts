@@ -10,14 +10,14 @@ import {
   IconX,
 } from "@tabler/icons-react";
 import type { Choice } from "../dry-run/script";
-import type { Deed } from "./edit-action";
+import type { EditAction } from "./edit-action";
 import type { EditorContext } from "./editor-context";
 
 const part = { group: "Dry-run", changes: false, also: "simulate rehearse play test" } as const;
 const playing = (context: EditorContext) =>
   context.dryRun !== null && context.dryRun.moments.length > 0;
 
-export const dryRun: Deed = {
+export const dryRun: EditAction = {
   ...part,
   name: "dry-run",
   label: "Dry-run",
@@ -27,7 +27,7 @@ export const dryRun: Deed = {
   run: (context) => (context.dryRun === null ? context.beginDryRun() : context.dryRun.close()),
 };
 
-export const play: Deed = {
+export const play: EditAction = {
   ...part,
   name: "dry-run-play",
   label: "Play and pause",
@@ -41,7 +41,12 @@ export const play: Deed = {
   },
 };
 
-const step = (by: 1 | -1, label: string, shortcut: string, icon: Deed["icon"]): Deed => ({
+const step = (
+  by: 1 | -1,
+  label: string,
+  shortcut: string,
+  icon: EditAction["icon"],
+): EditAction => ({
   ...part,
   name: `dry-run-${by === 1 ? "next" : "back"}`,
   label,
@@ -61,7 +66,7 @@ const step = (by: 1 | -1, label: string, shortcut: string, icon: Deed["icon"]): 
 export const next = step(1, "Next moment", ".", IconPlayerTrackNext);
 export const back = step(-1, "Moment before", ",", IconPlayerTrackPrev);
 
-export const restart: Deed = {
+export const restart: EditAction = {
   ...part,
   name: "dry-run-restart",
   label: "From the start, undecided",
@@ -71,7 +76,12 @@ export const restart: Deed = {
   run: (context) => context.dryRun?.restart(),
 };
 
-const choice = (outcome: Choice, label: string, shortcut: string, icon: Deed["icon"]): Deed => ({
+const choice = (
+  outcome: Choice,
+  label: string,
+  shortcut: string,
+  icon: EditAction["icon"],
+): EditAction => ({
   ...part,
   name: `dry-run-${outcome}`,
   label,
@@ -84,10 +94,10 @@ const choice = (outcome: Choice, label: string, shortcut: string, icon: Deed["ic
   },
 });
 
-export const CHOICES: readonly Deed[] = [
+export const CHOICES: readonly EditAction[] = [
   choice("on_true", "It ends true", "1", IconCheck),
   choice("on_false", "It ends false", "2", IconX),
   choice("on_error", "It ends with an error", "3", IconExclamationMark),
 ];
 
-export const DRY_RUN: readonly Deed[] = [dryRun, play, next, back, restart, ...CHOICES];
+export const DRY_RUN: readonly EditAction[] = [dryRun, play, next, back, restart, ...CHOICES];

@@ -3,12 +3,12 @@ import type { Icon } from "@tabler/icons-react";
 import type { EditorContext } from "./editor-context";
 
 /** Under which heading help and menus list it. */
-export type Group = "Draw" | "Arrange" | "Look" | "Graph" | "Dry-run";
+export type EditActionGroup = "Draw" | "Arrange" | "Look" | "Graph" | "Dry-run";
 
-export interface Deed {
+export interface EditAction {
   readonly name: string;
   readonly label: string;
-  readonly group: Group;
+  readonly group: EditActionGroup;
   /** `Mod` is Ctrl, and ⌘ on a Mac. The first is shown; all work. */
   readonly shortcuts: readonly string[];
   readonly icon: Icon;
@@ -23,13 +23,15 @@ export interface Deed {
 }
 
 /** Whether it can be done now, by this person. */
-export function isEnabled(deed: Deed, context: EditorContext): boolean {
-  return (!deed.changes || context.mayEdit) && deed.enabled(context);
+export function isEnabled(editAction: EditAction, context: EditorContext): boolean {
+  return (!editAction.changes || context.mayEdit) && editAction.enabled(context);
 }
 
 /** What it is called, and why it is off when that is not to be seen on the canvas. */
-export function labelOf(deed: Deed, context: EditorContext): string {
-  return deed.changes && !context.mayEdit ? `${deed.label} (view only)` : deed.label;
+export function labelOf(editAction: EditAction, context: EditorContext): string {
+  return editAction.changes && !context.mayEdit
+    ? `${editAction.label} (view only)`
+    : editAction.label;
 }
 
 const onMac = typeof navigator !== "undefined" && /Mac|iP(hone|ad)/.test(navigator.platform);
@@ -59,7 +61,7 @@ export function isPressed(shortcut: string, event: Pressed, mac = onMac): boolea
 }
 
 /** Whether a shortcut is one printed character without Mod or Alt: such keys can be switched off. */
-export function isSingle(shortcut: string): boolean {
+export function isSingleKey(shortcut: string): boolean {
   const parts = shortcut.split("+");
   const last = parts.at(-1) ?? "";
   return (last.length === 1 || last === "Plus") && !parts.includes("Mod") && !parts.includes("Alt");
@@ -78,7 +80,7 @@ const signs: Record<string, string> = {
 };
 
 /** The shortcut as it is printed on keys. */
-export function keysOf(shortcut: string, mac = onMac): string[] {
+export function printedKeys(shortcut: string, mac = onMac): string[] {
   const parts = shortcut.split("+");
   const last = parts.at(-1) ?? "";
   const sign = last.length === 1 && !/[a-z0-9]/i.test(last);
@@ -91,10 +93,14 @@ export function keysOf(shortcut: string, mac = onMac): string[] {
 }
 
 /** The deed that a key press asks for. */
-export function deedFor(deeds: readonly Deed[], event: Pressed, singles = true): Deed | null {
+export function editActionFor(
+  editActions: readonly EditAction[],
+  event: Pressed,
+  singles = true,
+): EditAction | null {
   return (
-    deeds.find((deed) =>
-      deed.shortcuts.some((key) => (singles || !isSingle(key)) && isPressed(key, event)),
+    editActions.find((editAction) =>
+      editAction.shortcuts.some((key) => (singles || !isSingleKey(key)) && isPressed(key, event)),
     ) ?? null
   );
 }

@@ -29,14 +29,14 @@ export function linkToProblem(
   return url.href;
 }
 
-export interface Target {
+export interface LinkTarget {
   readonly selection: readonly string[];
   /** The panel of problems shall be open. */
   readonly problem: string | null;
 }
 
 /** What an address points at; null when it names a graph only. */
-export function targetOf(search: string): Target | null {
+export function targetOf(search: string): LinkTarget | null {
   const query = new URLSearchParams(search);
   const selection = [...query.getAll("action"), ...query.getAll("arrow")].slice(0, 20);
   const problem = query.get("problem");

@@ -9,13 +9,13 @@ import {
 import { CARD } from "../canvas/geometry/arrange";
 import { relationId } from "../graph/document-keys";
 import { writeNote } from "../graph/edit/notes";
-import type { Deed } from "./edit-action";
+import type { EditAction } from "./edit-action";
 import { type EditorContext, selectedNotes, selectedRelations } from "./editor-context";
 
 const SIZE = [200, 84] as const; // px of a new note
 const AIR = 28; // px between a frame and what lies in it
 
-export const note: Deed = {
+export const note: EditAction = {
   name: "note",
   label: "Write a note",
   group: "Draw",
@@ -55,7 +55,7 @@ function boxOf(context: EditorContext): {
   return { at: [left, top], size: [right - left, bottom - top] };
 }
 
-export const frame: Deed = {
+export const frame: EditAction = {
   name: "frame",
   label: "Draw a frame",
   group: "Draw",
@@ -72,7 +72,7 @@ export const frame: Deed = {
   },
 };
 
-export const write: Deed = {
+export const write: EditAction = {
   name: "write",
   label: "Write the text",
   group: "Draw",
@@ -87,7 +87,7 @@ export const write: Deed = {
   },
 };
 
-export const details: Deed = {
+export const details: EditAction = {
   name: "details",
   label: "Open the details",
   group: "Look",
@@ -109,7 +109,7 @@ export const details: Deed = {
   },
 };
 
-export const insert: Deed = {
+export const insert: EditAction = {
   name: "insert",
   label: "Insert an action into the arrow",
   group: "Draw",

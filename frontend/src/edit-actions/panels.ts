@@ -1,10 +1,10 @@
 /** Deeds that look for something in the graph, or at another side of it. */
 import { IconListTree, IconMessageCircle, IconSearch } from "@tabler/icons-react";
-import type { Deed } from "./edit-action";
+import type { EditAction } from "./edit-action";
 
 const look = { group: "Look", changes: false, enabled: () => true } as const;
 
-export const PANELS: readonly Deed[] = [
+export const PANELS: readonly EditAction[] = [
   {
     ...look,
     name: "find",

@@ -2,12 +2,12 @@
 
 import { IconDownload, IconLink, IconPhoto, IconVectorTriangle } from "@tabler/icons-react";
 import { copyLinkTo } from "./clipboard";
-import type { Deed } from "./edit-action";
+import type { EditAction } from "./edit-action";
 import { linkTo } from "./graph-links";
 
 const graph = { group: "Graph", changes: false, enabled: () => true } as const;
 
-export const exportUmrf: Deed = {
+export const exportUmrf: EditAction = {
   ...graph,
   name: "export",
   label: "Export as UMRF",
@@ -17,7 +17,7 @@ export const exportUmrf: Deed = {
   run: (context) => context.download("umrf"),
 };
 
-export const exportSvg: Deed = {
+export const exportSvg: EditAction = {
   ...graph,
   name: "export-svg",
   label: "Export as SVG",
@@ -27,7 +27,7 @@ export const exportSvg: Deed = {
   run: (context) => context.download("svg"),
 };
 
-export const exportPng: Deed = {
+export const exportPng: EditAction = {
   ...graph,
   name: "export-png",
   label: "Export as PNG",
@@ -37,7 +37,7 @@ export const exportPng: Deed = {
   run: (context) => context.download("png"),
 };
 
-export const copyLink: Deed = {
+export const copyLink: EditAction = {
   ...graph,
   name: "copy-link",
   label: "Copy link",

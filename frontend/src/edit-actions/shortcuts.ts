@@ -1,9 +1,9 @@
 /** Shortcuts of deeds, where nobody is typing; and the clipboard's own events. */
 import { useLocalStorage } from "@mantine/hooks";
 import { useEffect, useRef } from "react";
-import { DEEDS } from "./all";
-import { copied, hold, pasteText } from "./clipboard";
-import { deedFor, isEnabled } from "./edit-action";
+import { EDIT_ACTIONS } from "./all";
+import { copiedSelection, pasteText, rememberCopied } from "./clipboard";
+import { editActionFor, isEnabled } from "./edit-action";
 import type { EditorContext } from "./editor-context";
 
 /** Whether single letters are shortcuts: speech input types letters by itself. */
@@ -25,8 +25,8 @@ function isTaken(target: EventTarget | null): boolean {
 
 /** The way out of a form works in the form, and so does what no field has a use for. */
 function worksInForms(event: KeyboardEvent): boolean {
-  const deed = deedFor(DEEDS, event, false);
-  const free = ["to-canvas", "palette", "find", "export"].includes(deed?.name ?? "");
+  const editAction = editActionFor(EDIT_ACTIONS, event, false);
+  const free = ["to-canvas", "palette", "find", "export"].includes(editAction?.name ?? "");
   return free && document.querySelector("[role=dialog]") === null;
 }
 
@@ -70,13 +70,13 @@ export function useShortcuts(context: EditorContext): void {
         addAtPointer(now.current);
         return;
       }
-      const deed = deedFor(DEEDS, event, singles);
-      if (deed === null || deed.event !== undefined) return;
+      const editAction = editActionFor(EDIT_ACTIONS, event, singles);
+      if (editAction === null || editAction.event !== undefined) return;
       // A button does what Enter does to it.
       if (event.key === "Enter" && event.target instanceof HTMLButtonElement) return;
       // What a deed takes is also kept from the browser while the deed has nothing to do.
       event.preventDefault();
-      if (isEnabled(deed, now.current)) deed.run(now.current);
+      if (isEnabled(editAction, now.current)) editAction.run(now.current);
     };
     // Cards move by arrow keys of their own, which know neither undo nor frames, and take Shift with
     // Enter for one more to choose: ours come first.
@@ -106,18 +106,19 @@ function addAtPointer(context: EditorContext): void {
 function useClipboard(now: { readonly current: EditorContext }): void {
   useEffect(() => {
     const deedOf = (event: ClipboardEvent) => {
-      const deed = DEEDS.find((each) => each.event === event.type);
+      const editAction = EDIT_ACTIONS.find((each) => each.event === event.type);
       const free = !event.defaultPrevented && !isTaken(event.target);
-      return deed && free && isEnabled(deed, now.current) ? deed : null;
+      return editAction && free && isEnabled(editAction, now.current) ? editAction : null;
     };
     const onTake = (event: ClipboardEvent) => {
       // Text that a person has marked is what they want to copy.
       if (window.getSelection()?.isCollapsed === false || deedOf(event) === null) return;
-      const piece = copied(now.current);
-      hold(piece);
+      const piece = copiedSelection(now.current);
+      rememberCopied(piece);
       event.clipboardData?.setData("text/plain", piece.text);
       event.preventDefault();
-      if (event.type === "cut") DEEDS.find(({ name }) => name === "remove")?.run(now.current);
+      if (event.type === "cut")
+        EDIT_ACTIONS.find(({ name }) => name === "remove")?.run(now.current);
     };
     const onPaste = (event: ClipboardEvent) => {
       if (deedOf(event) === null) return;

@@ -13,13 +13,13 @@ import {
   IconZoomOut,
 } from "@tabler/icons-react";
 import { ENTRY, type Key } from "../graph/model";
-import type { Deed } from "./edit-action";
+import type { EditAction } from "./edit-action";
 import { type EditorContext, selectedRelations } from "./editor-context";
 
 const always = () => true;
 const look = { group: "Look", changes: false, enabled: always } as const;
 
-export const palette: Deed = {
+export const palette: EditAction = {
   ...look,
   name: "palette",
   label: "Find a command",
@@ -29,7 +29,7 @@ export const palette: Deed = {
   run: (context) => context.openOverlay({ kind: "palette" }),
 };
 
-export const keys: Deed = {
+export const showShortcuts: EditAction = {
   ...look,
   name: "keys",
   label: "Keyboard shortcuts",
@@ -39,7 +39,7 @@ export const keys: Deed = {
   run: (context) => context.openOverlay({ kind: "keys" }),
 };
 
-export const menu: Deed = {
+export const menu: EditAction = {
   ...look,
   name: "menu",
   label: "Menu for the selection",
@@ -56,7 +56,7 @@ function spotOf(context: EditorContext): readonly [number, number] {
   return [x + 24, y + 24];
 }
 
-export const toCanvas: Deed = {
+export const toCanvas: EditAction = {
   ...look,
   name: "to-canvas",
   label: "Back to the canvas",
@@ -70,7 +70,7 @@ export const toCanvas: Deed = {
   },
 };
 
-export const fit: Deed = {
+export const fit: EditAction = {
   ...look,
   name: "fit",
   label: "Fit",
@@ -80,7 +80,7 @@ export const fit: Deed = {
   run: (context) => context.view.fit(),
 };
 
-export const zoomSelection: Deed = {
+export const zoomSelection: EditAction = {
   ...look,
   name: "zoom-selection",
   label: "Show the selection",
@@ -97,7 +97,7 @@ export function shownKeys(context: EditorContext): Key[] {
   return [...context.selection, ...ends].filter((key) => context.positions().has(key));
 }
 
-export const zoomIn: Deed = {
+export const zoomIn: EditAction = {
   ...look,
   name: "zoom-in",
   label: "Zoom in",
@@ -106,7 +106,7 @@ export const zoomIn: Deed = {
   run: (context) => context.view.zoomIn(),
 };
 
-export const zoomOut: Deed = {
+export const zoomOut: EditAction = {
   ...look,
   name: "zoom-out",
   label: "Zoom out",
@@ -115,7 +115,7 @@ export const zoomOut: Deed = {
   run: (context) => context.view.zoomOut(),
 };
 
-export const pan: Deed = {
+export const pan: EditAction = {
   ...look,
   name: "pan",
   label: "Pan",
@@ -124,7 +124,7 @@ export const pan: Deed = {
   run: (context) => context.setTool("pan"),
 };
 
-export const marquee: Deed = {
+export const marquee: EditAction = {
   ...look,
   name: "marquee",
   label: "Select",
@@ -135,7 +135,7 @@ export const marquee: Deed = {
   run: (context) => context.setTool(context.tool === "select" ? "pan" : "select"),
 };
 
-export const showJson: Deed = {
+export const showJson: EditAction = {
   ...look,
   name: "json",
   label: "Show the JSON",
@@ -175,24 +175,26 @@ export function neighbour(
   return found.filter(fits).sort((a, b) => far(a) - far(b))[0] ?? null;
 }
 
-export const WALK: readonly Deed[] = (["up", "down", "left", "right"] as const).map((way) => ({
-  ...look,
-  name: `walk-${way}`,
-  label: {
-    up: "Go to what comes before",
-    down: "Go to what follows",
-    left: "Go to the left",
-    right: "Go to the right",
-  }[way],
-  shortcuts: [`Alt+Arrow${way.charAt(0).toUpperCase()}${way.slice(1)}`],
-  icon: IconArrowGuide,
-  also: "walk neighbour",
-  enabled: (context: EditorContext) => context.graph.actions.length > 0,
-  run: (context: EditorContext) => {
-    const key = neighbour(context, way);
-    if (key === null) return;
-    context.select([key]);
-    context.view.reveal(context.positions().get(key) ?? [0, 0]);
-    context.view.focus(key);
-  },
-}));
+export const WALK: readonly EditAction[] = (["up", "down", "left", "right"] as const).map(
+  (way) => ({
+    ...look,
+    name: `walk-${way}`,
+    label: {
+      up: "Go to what comes before",
+      down: "Go to what follows",
+      left: "Go to the left",
+      right: "Go to the right",
+    }[way],
+    shortcuts: [`Alt+Arrow${way.charAt(0).toUpperCase()}${way.slice(1)}`],
+    icon: IconArrowGuide,
+    also: "walk neighbour",
+    enabled: (context: EditorContext) => context.graph.actions.length > 0,
+    run: (context: EditorContext) => {
+      const key = neighbour(context, way);
+      if (key === null) return;
+      context.select([key]);
+      context.view.reveal(context.positions().get(key) ?? [0, 0]);
+      context.view.focus(key);
+    },
+  }),
+);

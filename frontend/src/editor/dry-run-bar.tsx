@@ -15,11 +15,11 @@ import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import type { Going } from "../dry-run/playback";
 import { type FaultKind, faultWords } from "../dry-run/script";
 import { type DryRun, SPEEDS } from "../dry-run/use-dry-run";
-import * as deeds from "../edit-actions/dry-run-actions";
-import type { Deed } from "../edit-actions/edit-action";
+import * as editActions from "../edit-actions/dry-run-actions";
+import type { EditAction } from "../edit-actions/edit-action";
 import { labelOf } from "../edit-actions/edit-action";
 import { type EditorContext, selectedActions } from "../edit-actions/editor-context";
-import { Shortcut } from "../edit-actions/shortcut-keys";
+import { FirstShortcut } from "../edit-actions/shortcut-keys";
 import { fullName } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import style from "./dry-run-bar.module.css";
@@ -28,27 +28,27 @@ const CHOICES = ["on_true", "on_false", "on_error"] as const;
 
 function Step({
   context,
-  deed,
+  editAction,
   children,
 }: {
   context: EditorContext;
-  deed: Deed;
+  editAction: EditAction;
   children?: ReactNode;
 }) {
-  const Sign = deed.icon;
+  const Sign = editAction.icon;
   return (
     <Tooltip
       label={
         <>
-          {labelOf(deed, context)} <Shortcut deed={deed} />
+          {labelOf(editAction, context)} <FirstShortcut editAction={editAction} />
         </>
       }
     >
       <ActionIcon
         size={34}
-        aria-label={deed.label}
-        disabled={!deed.enabled(context)}
-        onClick={() => deed.run(context)}
+        aria-label={editAction.label}
+        disabled={!editAction.enabled(context)}
+        onClick={() => editAction.run(context)}
       >
         {children ?? <Sign size={17} aria-hidden />}
       </ActionIcon>
@@ -191,20 +191,20 @@ export function DryRunBar({
     <section className={style.bar} aria-label="Dry-run">
       <div className={style.row}>
         <span className={style.title}>Dry-run</span>
-        <Step context={context} deed={deeds.restart}>
+        <Step context={context} editAction={editActions.restart}>
           <IconPlayerSkipBack size={17} aria-hidden />
         </Step>
-        <Step context={context} deed={deeds.back}>
+        <Step context={context} editAction={editActions.back}>
           <IconPlayerTrackPrev size={17} aria-hidden />
         </Step>
-        <Step context={context} deed={deeds.play}>
+        <Step context={context} editAction={editActions.play}>
           {run.playing ? (
             <IconPlayerPauseFilled size={17} aria-hidden />
           ) : (
             <IconPlayerPlayFilled size={17} aria-hidden />
           )}
         </Step>
-        <Step context={context} deed={deeds.next}>
+        <Step context={context} editAction={editActions.next}>
           <IconPlayerTrackNext size={17} aria-hidden />
         </Step>
         <input
@@ -235,7 +235,7 @@ export function DryRunBar({
         <Tooltip
           label={
             <>
-              Close <Shortcut deed={deeds.dryRun} />
+              Close <FirstShortcut editAction={editActions.dryRun} />
             </>
           }
         >

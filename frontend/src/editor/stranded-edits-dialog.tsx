@@ -183,11 +183,11 @@ function Answers({ choice, taken, some, onLater, onSave }: AnswersProps) {
 function useWork() {
   const [busy, setBusy] = useState(false);
   const [trouble, setTrouble] = useState<string | null>(null);
-  const work = async (deed: () => Promise<unknown>) => {
+  const work = async (editAction: () => Promise<unknown>) => {
     setBusy(true);
     setTrouble(null);
     try {
-      await deed();
+      await editAction();
     } catch (error) {
       setBusy(false);
       setTrouble(error instanceof Error ? error.message : String(error));

@@ -10,7 +10,7 @@ import {
 } from "@tabler/icons-react";
 import { useDeferredValue, useEffect, useId, useMemo, useRef, useState } from "react";
 import type { Problem } from "../api/graphs";
-import { keysOf } from "../edit-actions/edit-action";
+import { printedKeys } from "../edit-actions/edit-action";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { find, type Hit } from "./find";
 import style from "./find-bar.module.css";
@@ -151,7 +151,7 @@ export function FindBar({ problems, onClose }: Props) {
       )}
       {query === "" && (
         <p className={style.none}>
-          <Kbd>Enter</Kbd> next, <Kbd>{keysOf("Shift+Enter").join(" ")}</Kbd> previous,{" "}
+          <Kbd>Enter</Kbd> next, <Kbd>{printedKeys("Shift+Enter").join(" ")}</Kbd> previous,{" "}
           <Kbd>Esc</Kbd> closes
         </p>
       )}

@@ -1,6 +1,6 @@
 /** The properties of the graph itself, and how to begin. */
 import { Kbd, TagsInput } from "@mantine/core";
-import { keysOf } from "../edit-actions/edit-action";
+import { printedKeys } from "../edit-actions/edit-action";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { setGraphDescription, setGraphName } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";
@@ -60,8 +60,8 @@ export function GraphForm() {
           </li>
           <li>Select a card or an arrow to see what it says</li>
           <li>
-            <Kbd>{keysOf("Mod+k")[0]}</Kbd> <Kbd>K</Kbd> finds every command, <Kbd>?</Kbd> shows the
-            keys
+            <Kbd>{printedKeys("Mod+k")[0]}</Kbd> <Kbd>K</Kbd> finds every command, <Kbd>?</Kbd>{" "}
+            shows the keys
           </li>
         </ul>
       </section>

@@ -19,7 +19,7 @@ import type { Progress } from "../status/progress";
 import { StateWord } from "../status/state-label";
 import { robotColor } from "../ui/name-colors";
 import style from "./outline.module.css";
-import { deedsOf, type RowDeed } from "./row-actions";
+import { type RowAction, rowActionsOf } from "./row-actions";
 import { type Change, RowEdit } from "./row-edit";
 import type { Row } from "./rows";
 
@@ -33,7 +33,7 @@ interface Props {
   name: string;
   mayEdit: boolean;
   /** Always the same object, so that a row draws again only when something of it changes. */
-  hands: Hands;
+  handlers: Hands;
 }
 
 /** What a row can ask for. */
@@ -41,7 +41,7 @@ export interface Hands {
   flip(id: string): void;
   focus(id: string): void;
   choose(row: Row): void;
-  run(deed: RowDeed, row: Row): void;
+  run(rowAction: RowAction, row: Row): void;
   done(said: string | null): void;
 }
 
@@ -112,16 +112,16 @@ function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">
   }
 }
 
-interface DeedsProps {
+interface RowActionsProps {
   row: Row;
   active: boolean;
   label: string;
   mayEdit: boolean;
-  hands: Hands;
+  handlers: Hands;
 }
 
 /** The menu itself is made when it is first opened: there may be thousands of rows. */
-function Deeds({ row, active, label, mayEdit, hands }: DeedsProps) {
+function RowActions({ row, active, label, mayEdit, handlers }: RowActionsProps) {
   const [opened, setOpened] = useState<boolean | null>(null);
   const button = (
     <ActionIcon
@@ -139,14 +139,14 @@ function Deeds({ row, active, label, mayEdit, hands }: DeedsProps) {
     <Menu opened={opened} onChange={setOpened} trapFocus returnFocus={false}>
       <Menu.Target>{button}</Menu.Target>
       <Menu.Dropdown>
-        {deedsOf(row).map((deed) => (
+        {rowActionsOf(row).map((rowAction) => (
           <Menu.Item
-            key={deed.name}
-            disabled={deed.changes && !mayEdit}
-            rightSection={<kbd className={style.key}>{keyWords(deed.key)}</kbd>}
-            onClick={() => hands.run(deed, row)}
+            key={rowAction.name}
+            disabled={rowAction.changes && !mayEdit}
+            rightSection={<kbd className={style.key}>{keyWords(rowAction.key)}</kbd>}
+            onClick={() => handlers.run(rowAction, row)}
           >
-            {deed.label}
+            {rowAction.label}
           </Menu.Item>
         ))}
       </Menu.Dropdown>
@@ -180,7 +180,7 @@ function labelOf(row: Row, name: string): string {
 }
 
 export const OutlineRow = memo(function OutlineRow(props: Props) {
-  const { row, active, selected, progress, change, name, mayEdit, hands } = props;
+  const { row, active, selected, progress, change, name, mayEdit, handlers } = props;
   const label = labelOf(row, name);
   const words = useId();
   return (
@@ -197,7 +197,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
       tabIndex={active ? 0 : -1}
       style={{ "--c": colorOf(row) } as React.CSSProperties}
       onFocus={(event) => {
-        if (event.target === event.currentTarget) hands.focus(row.id);
+        if (event.target === event.currentTarget) handlers.focus(row.id);
       }}
     >
       <td className={style.words}>
@@ -209,22 +209,22 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
               size={32}
               tabIndex={-1}
               aria-label={row.open ? "Close" : "Open"}
-              onClick={() => hands.flip(row.id)}
+              onClick={() => handlers.flip(row.id)}
             >
               <IconChevronRight size={15} aria-hidden />
             </ActionIcon>
           </span>
         )}
-        <button type="button" id={words} tabIndex={-1} onClick={() => hands.choose(row)}>
+        <button type="button" id={words} tabIndex={-1} onClick={() => handlers.choose(row)}>
           <Words row={row} progress={progress} name={name} />
         </button>
       </td>
       <td className={style.deeds}>
-        <Deeds row={row} active={active} label={label} mayEdit={mayEdit} hands={hands} />
+        <RowActions row={row} active={active} label={label} mayEdit={mayEdit} handlers={handlers} />
       </td>
       {change !== null && (
         <td className={style.edit}>
-          <RowEdit row={row} change={change} onDone={hands.done} />
+          <RowEdit row={row} change={change} onDone={handlers.done} />
         </td>
       )}
     </tr>

@@ -17,7 +17,7 @@ import { useIsPhone } from "../ui/use-screen-size";
 import style from "./outline.module.css";
 import { type Hands, OutlineRow } from "./outline-row";
 import { Robots } from "./robot-filter";
-import { deedFor, move, type RowDeed, remove } from "./row-actions";
+import { moveRow, type RowAction, removeRow, rowActionFor } from "./row-actions";
 import type { Change } from "./row-edit";
 import { namesOf, type Row, rowsOf, subjectOf } from "./rows";
 
@@ -112,9 +112,9 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     found?.scrollIntoView({ block: "nearest" });
   }, [only, rows, active]);
 
-  const run = (deed: RowDeed, row: Row) => {
-    if (deed.changes && !mayEdit) return;
-    switch (deed.name) {
+  const run = (rowAction: RowAction, row: Row) => {
+    if (rowAction.changes && !mayEdit) return;
+    switch (rowAction.name) {
       case "details":
         choose(row);
         setPanel("details");
@@ -124,16 +124,16 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
         setPanel("comments");
         break;
       case "delete":
-        announcer.say(remove(context, row));
+        announcer.say(removeRow(context, row));
         focus(Math.max(0, at - 1));
         break;
       case "up":
       case "down":
-        announcer.say(move(context, row, deed.name === "up" ? -1 : 1));
+        announcer.say(moveRow(context, row, rowAction.name === "up" ? -1 : 1));
         break;
       default:
         setActive(row.id);
-        setEdited({ id: row.id, change: deed.name });
+        setEdited({ id: row.id, change: rowAction.name });
     }
   };
   const onKey = (event: React.KeyboardEvent) => {
@@ -141,14 +141,14 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     const target = event.target as HTMLElement;
     if (row === undefined || target.dataset.row === undefined || event.ctrlKey || event.metaKey)
       return;
-    const deed = deedFor(row, event);
+    const rowAction = rowActionFor(row, event);
     const next = event.altKey ? null : stepFrom(rows, at, event.key);
     const opens = event.key === "ArrowRight" && row.open === false;
     const closes = event.key === "ArrowLeft" && row.open === true;
     if (opens || closes) flip(row.id);
     else if (next !== null && next >= 0) focus(next);
     else if (event.key === " ") choose(row);
-    else if (deed) run(deed, row);
+    else if (rowAction) run(rowAction, row);
     else return;
     event.preventDefault();
     event.stopPropagation();
@@ -166,13 +166,13 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     run,
     done,
   };
-  const hands = useMemo((): Hands => {
+  const handlers = useMemo((): Hands => {
     const now = () => latest.current as Hands;
     return {
       flip: (id) => now().flip(id),
       focus: (id) => now().focus(id),
       choose: (row) => now().choose(row),
-      run: (deed, row) => now().run(deed, row),
+      run: (rowAction, row) => now().run(rowAction, row),
       done: (said) => now().done(said),
     };
   }, []);
@@ -213,7 +213,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
                 change={edited?.id === row.id ? edited.change : null}
                 name={names.get(nameKey(row)) ?? ""}
                 mayEdit={mayEdit}
-                hands={hands}
+                handlers={handlers}
               />
             ))}
           </tbody>
@@ -235,7 +235,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   );
 }
 
-const DETAILS: RowDeed = { name: "details", label: "Details", key: "Enter", changes: false };
+const DETAILS: RowAction = { name: "details", label: "Details", key: "Enter", changes: false };
 
 /** By whose name a row is called. */
 const nameKey = (row: Row): Key => (row.kind === "target" ? row.relation.child : ownerOf(row));

@@ -8,7 +8,7 @@ import { endName } from "../graph/relation-words";
 import type { Change } from "./row-edit";
 import type { Row } from "./rows";
 
-export interface RowDeed {
+export interface RowAction {
   readonly name: Change | "delete" | "up" | "down" | "details" | "comments";
   readonly label: string;
   /** As in `KeyboardEvent.key`, with `Alt+` before it where needed. */
@@ -16,23 +16,23 @@ export interface RowDeed {
   readonly changes: boolean;
 }
 
-const RENAME: RowDeed = { name: "rename", label: "Rename", key: "F2", changes: true };
-const CONNECT: RowDeed = { name: "connect", label: "Connect …", key: "c", changes: true };
-const DETAILS: RowDeed = { name: "details", label: "Details", key: "Enter", changes: false };
-const TALK: RowDeed = { name: "comments", label: "Comment", key: "m", changes: false };
-const UP: RowDeed = { name: "up", label: "Move up", key: "Alt+ArrowUp", changes: true };
-const DOWN: RowDeed = { name: "down", label: "Move down", key: "Alt+ArrowDown", changes: true };
-const DELETE: RowDeed = { name: "delete", label: "Delete", key: "Delete", changes: true };
-const WRITE: RowDeed = { name: "rename", label: "Write the text", key: "F2", changes: true };
-const RESPONSE: RowDeed = {
+const RENAME: RowAction = { name: "rename", label: "Rename", key: "F2", changes: true };
+const CONNECT: RowAction = { name: "connect", label: "Connect …", key: "c", changes: true };
+const DETAILS: RowAction = { name: "details", label: "Details", key: "Enter", changes: false };
+const TALK: RowAction = { name: "comments", label: "Comment", key: "m", changes: false };
+const UP: RowAction = { name: "up", label: "Move up", key: "Alt+ArrowUp", changes: true };
+const DOWN: RowAction = { name: "down", label: "Move down", key: "Alt+ArrowDown", changes: true };
+const DELETE: RowAction = { name: "delete", label: "Delete", key: "Delete", changes: true };
+const WRITE: RowAction = { name: "rename", label: "Write the text", key: "F2", changes: true };
+const RESPONSE: RowAction = {
   name: "response",
   label: "Another response …",
   key: "r",
   changes: true,
 };
-const TARGET: RowDeed = { name: "target", label: "Lead it elsewhere …", key: "t", changes: true };
+const TARGET: RowAction = { name: "target", label: "Lead it elsewhere …", key: "t", changes: true };
 
-export function deedsOf(row: Row): readonly RowDeed[] {
+export function rowActionsOf(row: Row): readonly RowAction[] {
   switch (row.kind) {
     case "entry":
       return [{ ...CONNECT, label: "Start with …" }];
@@ -49,14 +49,14 @@ export function deedsOf(row: Row): readonly RowDeed[] {
   }
 }
 
-export function deedFor(row: Row, event: { key: string; altKey: boolean }): RowDeed | null {
+export function rowActionFor(row: Row, event: { key: string; altKey: boolean }): RowAction | null {
   const pressed = event.altKey ? `Alt+${event.key}` : event.key;
   const key = pressed === "Backspace" ? "Delete" : pressed;
-  return deedsOf(row).find((deed) => deed.key === key) ?? null;
+  return rowActionsOf(row).find((rowAction) => rowAction.key === key) ?? null;
 }
 
 /** Takes a row away: an action with its arrows, or what one outcome says to one target. */
-export function remove(context: EditorContext, row: Row): string {
+export function removeRow(context: EditorContext, row: Row): string {
   if (row.kind === "action") {
     const name = endName(context.graph, row.action.key);
     removeActions(context.doc, [row.action.key]);
@@ -84,7 +84,7 @@ function way(context: EditorContext, row: Row): { parent: Key; child: Key } | nu
 }
 
 /** Changes places with the sibling before or after it, in the order in which they are started. */
-export function move(context: EditorContext, row: Row, step: -1 | 1): string {
+export function moveRow(context: EditorContext, row: Row, step: -1 | 1): string {
   const here = way(context, row);
   const siblings = context.graph.relations
     .filter(({ parent }) => parent === here?.parent)

@@ -2,10 +2,12 @@
 import { useCallback, useLayoutEffect, useRef } from "react";
 
 /** The same function as long as the component is there. It does what the last one given does. */
-export function useSteady<A extends unknown[], R>(deed: (...given: A) => R): (...given: A) => R {
-  const latest = useRef(deed);
+export function useSteady<A extends unknown[], R>(
+  callback: (...given: A) => R,
+): (...given: A) => R {
+  const latest = useRef(callback);
   useLayoutEffect(() => {
-    latest.current = deed;
+    latest.current = callback;
   });
   return useCallback((...given: A) => latest.current(...given), []);
 }

@@ -12,11 +12,11 @@ vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
 
 let root: Root;
 let context: EditorContext;
-let hands: ReturnType<typeof useConnecting>;
+let connecting: ReturnType<typeof useConnecting>;
 const openAddAt = vi.fn();
 
 function Page() {
-  hands = useConnecting(context, openAddAt);
+  connecting = useConnecting(context, openAddAt);
   return null;
 }
 
@@ -46,15 +46,15 @@ function underPointer(key: string): Element {
 }
 
 const click = (target: Element) =>
-  act(() => void hands.onClick({ target, clientX: 0, clientY: 0 } as unknown as MouseEvent));
+  act(() => void connecting.onClick({ target, clientX: 0, clientY: 0 } as unknown as MouseEvent));
 
 test("who taps an outcome and then draws an arrow by dragging is not asked what follows any more", () => {
   const [a, b, c] = ["A", "B", "C"].map((name) => addAction(context.doc, { name }));
   if (!a || !b || !c) throw new Error("no actions");
   click(underPointer(a));
-  expect(hands.pending).toEqual({ key: a, outcome: "on_error" });
-  act(() => hands.draw(b, c, "on_true"));
-  expect(hands.pending).toBeNull();
+  expect(connecting.pending).toEqual({ key: a, outcome: "on_error" });
+  act(() => connecting.draw(b, c, "on_true"));
+  expect(connecting.pending).toBeNull();
   const card = underPointer(c).parentElement;
   if (card) click(card);
   expect(graphOf(context.doc).relations.map(({ parent, child }) => [parent, child])).toEqual([

@@ -4,10 +4,10 @@ import { IconRouteSquare2, IconSquareRounded } from "@tabler/icons-react";
 import { useMemo, useRef } from "react";
 import { useLocation } from "wouter";
 import { useGraphs } from "../../api/graphs";
-import { DEEDS } from "../../edit-actions/all";
+import { EDIT_ACTIONS } from "../../edit-actions/all";
 import { isEnabled, labelOf } from "../../edit-actions/edit-action";
 import type { EditorContext } from "../../edit-actions/editor-context";
-import { Shortcut } from "../../edit-actions/shortcut-keys";
+import { FirstShortcut } from "../../edit-actions/shortcut-keys";
 import { robotColor } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
 
@@ -20,18 +20,18 @@ function deedOptions(context: EditorContext): Option[] {
     const at = recent.indexOf(name);
     return at < 0 ? recent.length : at;
   };
-  return DEEDS.filter(({ name }) => name !== "palette")
-    .map((deed) => {
-      const Sign = deed.icon;
+  return EDIT_ACTIONS.filter(({ name }) => name !== "palette")
+    .map((editAction) => {
+      const Sign = editAction.icon;
       return {
-        id: `deed ${deed.name}`,
-        label: labelOf(deed, context),
-        also: `${deed.also ?? ""} ${deed.group}`,
+        id: `deed ${editAction.name}`,
+        label: labelOf(editAction, context),
+        also: `${editAction.also ?? ""} ${editAction.group}`,
         group: "Commands",
         icon: <Sign size={16} aria-hidden />,
-        right: <Shortcut deed={deed} />,
-        disabled: !isEnabled(deed, context),
-        rank: rank(deed.name),
+        right: <FirstShortcut editAction={editAction} />,
+        disabled: !isEnabled(editAction, context),
+        rank: rank(editAction.name),
       };
     })
     .sort((a, b) => Number(a.disabled) - Number(b.disabled) || a.rank - b.rank);
@@ -48,7 +48,13 @@ function actionOptions({ graph }: EditorContext): Option[] {
   }));
 }
 
-export function Palette({ context, onClose }: { context: EditorContext; onClose: () => void }) {
+export function CommandPalette({
+  context,
+  onClose,
+}: {
+  context: EditorContext;
+  onClose: () => void;
+}) {
   const [, go] = useLocation();
   const graphs = useGraphs().data;
   // Counted once: the order shall not change under the person's hands.
@@ -81,7 +87,7 @@ export function Palette({ context, onClose }: { context: EditorContext; onClose:
     } else {
       recent = [key, ...recent.filter((name) => name !== key)].slice(0, 5);
       // After the palette has given the focus back.
-      setTimeout(() => DEEDS.find(({ name }) => name === key)?.run(context), 0);
+      setTimeout(() => EDIT_ACTIONS.find(({ name }) => name === key)?.run(context), 0);
     }
   };
   return (

@@ -1,52 +1,71 @@
 /** The menu of what was pressed, at the place where it was pressed. */
 import { Menu } from "@mantine/core";
 import { Fragment, useEffect, useRef } from "react";
-import * as deeds from "../../edit-actions/all";
-import { type Deed, isEnabled, labelOf } from "../../edit-actions/edit-action";
+import * as editActions from "../../edit-actions/all";
+import { type EditAction, isEnabled, labelOf } from "../../edit-actions/edit-action";
 import {
   type EditorContext,
   selectedActions,
   selectedNotes,
   selectedRelations,
 } from "../../edit-actions/editor-context";
-import { Shortcut } from "../../edit-actions/shortcut-keys";
+import { FirstShortcut } from "../../edit-actions/shortcut-keys";
 import style from "./context-menu.module.css";
 
 /** What can be done with the selection, in groups. */
-export function offered(context: EditorContext): readonly (readonly Deed[])[] {
+export function offered(context: EditorContext): readonly (readonly EditAction[])[] {
   const actions = selectedActions(context).length;
   const notes = selectedNotes(context).length;
   const arrows = selectedRelations(context).length;
-  const { copy, cut, pasteHere, duplicate, remove, heal } = deeds;
+  const {
+    copy,
+    cut,
+    pasteHere,
+    duplicate,
+    removeSelection: remove,
+    removeAndReconnect: heal,
+  } = editActions;
   if (actions + notes > 1) {
     return [
       [copy, cut, duplicate, pasteHere],
-      [deeds.tidySelection, ...deeds.ALIGN, ...deeds.DISTRIBUTE, deeds.frame],
-      [deeds.connectTo, deeds.entry, deeds.exit, deeds.zoomSelection, deeds.copyLink],
+      [
+        editActions.tidySelection,
+        ...editActions.ALIGN,
+        ...editActions.DISTRIBUTE,
+        editActions.frame,
+      ],
+      [
+        editActions.connectTo,
+        editActions.entry,
+        editActions.exit,
+        editActions.zoomSelection,
+        editActions.copyLink,
+      ],
       [remove, heal],
     ];
   }
   if (actions === 1) {
     return [
-      [deeds.details, deeds.connectTo, deeds.entry, deeds.exit],
+      [editActions.details, editActions.connectTo, editActions.entry, editActions.exit],
       [copy, cut, duplicate, pasteHere],
-      [deeds.frame, deeds.zoomSelection, deeds.copyLink],
+      [editActions.frame, editActions.zoomSelection, editActions.copyLink],
       [remove, heal],
     ];
   }
-  if (notes === 1) return [[deeds.write], [copy, cut, duplicate, deeds.copyLink], [remove]];
+  if (notes === 1)
+    return [[editActions.write], [copy, cut, duplicate, editActions.copyLink], [remove]];
   if (arrows > 0) {
     return [
-      [deeds.details, deeds.insert, deeds.retarget],
-      [deeds.zoomSelection, deeds.copyLink],
+      [editActions.details, editActions.insert, editActions.retargetArrow],
+      [editActions.zoomSelection, editActions.copyLink],
       [remove],
     ];
   }
-  const end = context.selection.size > 0 ? [deeds.connectTo] : [];
+  const end = context.selection.size > 0 ? [editActions.connectTo] : [];
   return [
-    [...end, deeds.add, deeds.note, pasteHere],
-    [deeds.selectAll, deeds.tidy, deeds.fit, deeds.snap],
-    [deeds.palette, deeds.keys],
+    [...end, editActions.add, editActions.note, pasteHere],
+    [editActions.selectAll, editActions.tidy, editActions.fit, editActions.snap],
+    [editActions.palette, editActions.showShortcuts],
   ];
 }
 
@@ -58,7 +77,7 @@ interface Props {
 
 export function ContextMenu({ context, screen, onClose }: Props) {
   const groups = offered(context)
-    .map((group) => group.filter((deed) => isEnabled(deed, context)))
+    .map((group) => group.filter((editAction) => isEnabled(editAction, context)))
     .filter((group) => group.length > 0);
   const box = useRef<HTMLDivElement>(null);
   useEffect(() => {
@@ -90,19 +109,19 @@ export function ContextMenu({ context, screen, onClose }: Props) {
         {groups.map((group, i) => (
           <Fragment key={group[0]?.name}>
             {i > 0 && <Menu.Divider />}
-            {group.map((deed) => {
-              const Sign = deed.icon;
+            {group.map((editAction) => {
+              const Sign = editAction.icon;
               return (
                 <Menu.Item
-                  key={deed.name}
+                  key={editAction.name}
                   leftSection={<Sign size={16} aria-hidden />}
-                  rightSection={<Shortcut deed={deed} />}
+                  rightSection={<FirstShortcut editAction={editAction} />}
                   onClick={() => {
                     onClose();
-                    deed.run(context);
+                    editAction.run(context);
                   }}
                 >
-                  {labelOf(deed, context)}
+                  {labelOf(editAction, context)}
                 </Menu.Item>
               );
             })}

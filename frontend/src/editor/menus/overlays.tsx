@@ -2,9 +2,9 @@
 
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import { ArrowDialog, RetargetDialog } from "./arrow-dialog";
-import { Palette } from "./command-palette";
+import { CommandPalette } from "./command-palette";
 import { ContextMenu } from "./context-menu";
-import { KeysSheet } from "./shortcut-sheet";
+import { ShortcutSheet } from "./shortcut-sheet";
 
 interface Props {
   context: EditorContext;
@@ -24,9 +24,9 @@ export function Overlays({ context, overlay, onClose }: Props) {
     case "menu":
       return <ContextMenu context={context} screen={overlay.screen} onClose={onClose} />;
     case "palette":
-      return <Palette context={context} onClose={onClose} />;
+      return <CommandPalette context={context} onClose={onClose} />;
     case "keys":
-      return <KeysSheet onClose={onClose} />;
+      return <ShortcutSheet onClose={onClose} />;
     case "note":
       return null; // written on the canvas
   }

@@ -1,14 +1,14 @@
 /** Every shortcut on one sheet, and the switch for single letters. */
 import { Modal, Switch } from "@mantine/core";
-import { DEEDS } from "../../edit-actions/all";
-import type { Group } from "../../edit-actions/edit-action";
-import { Keys } from "../../edit-actions/shortcut-keys";
+import { EDIT_ACTIONS } from "../../edit-actions/all";
+import type { EditActionGroup } from "../../edit-actions/edit-action";
+import { ShortcutKeys } from "../../edit-actions/shortcut-keys";
 import { useSingleKeys } from "../../edit-actions/shortcuts";
 import style from "./shortcut-sheet.module.css";
 
-const GROUPS: readonly Group[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
+const GROUPS: readonly EditActionGroup[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
 
-export function KeysSheet({ onClose }: { onClose: () => void }) {
+export function ShortcutSheet({ onClose }: { onClose: () => void }) {
   const [singles, setSingles] = useSingleKeys();
   return (
     <Modal opened onClose={onClose} title="Keyboard shortcuts" size="xl">
@@ -23,18 +23,18 @@ export function KeysSheet({ onClose }: { onClose: () => void }) {
           <section key={group} className={style.group}>
             <h3>{group}</h3>
             <dl>
-              {DEEDS.filter((deed) => deed.group === group && deed.shortcuts.length > 0).map(
-                (deed) => (
-                  <div key={deed.name} className={style.row}>
-                    <dt>{deed.label}</dt>
-                    <dd>
-                      {deed.shortcuts.slice(0, 2).map((shortcut) => (
-                        <Keys key={shortcut} shortcut={shortcut} />
-                      ))}
-                    </dd>
-                  </div>
-                ),
-              )}
+              {EDIT_ACTIONS.filter(
+                (editAction) => editAction.group === group && editAction.shortcuts.length > 0,
+              ).map((editAction) => (
+                <div key={editAction.name} className={style.row}>
+                  <dt>{editAction.label}</dt>
+                  <dd>
+                    {editAction.shortcuts.slice(0, 2).map((shortcut) => (
+                      <ShortcutKeys key={shortcut} shortcut={shortcut} />
+                    ))}
+                  </dd>
+                </div>
+              ))}
             </dl>
           </section>
         ))}
@@ -44,26 +44,26 @@ export function KeysSheet({ onClose }: { onClose: () => void }) {
             <div className={style.row}>
               <dt>Next and previous action or arrow</dt>
               <dd>
-                <Keys shortcut="Tab" />
-                <Keys shortcut="Shift+Tab" />
+                <ShortcutKeys shortcut="Tab" />
+                <ShortcutKeys shortcut="Shift+Tab" />
               </dd>
             </div>
             <div className={style.row}>
               <dt>Choose what has the focus</dt>
               <dd>
-                <Keys shortcut="Enter" />
+                <ShortcutKeys shortcut="Enter" />
               </dd>
             </div>
             <div className={style.row}>
               <dt>Search for an action, the pointer over the canvas</dt>
               <dd>
-                <Keys shortcut="Tab" />
+                <ShortcutKeys shortcut="Tab" />
               </dd>
             </div>
             <div className={style.row}>
               <dt>Search graphs and actions</dt>
               <dd>
-                <Keys shortcut="/" />
+                <ShortcutKeys shortcut="/" />
               </dd>
             </div>
           </dl>

@@ -4,35 +4,50 @@ import { IconDots } from "@tabler/icons-react";
 import { Fragment, memo } from "react";
 import {
   add,
-  DEEDS,
   dryRun,
+  EDIT_ACTIONS,
   fit,
   marquee,
   note,
   pan,
   redo,
-  remove,
+  removeSelection,
   snap,
   tidy,
   undo,
   zoomIn,
   zoomOut,
 } from "../../edit-actions/all";
-import { type Deed, type Group, isEnabled, labelOf } from "../../edit-actions/edit-action";
+import {
+  type EditAction,
+  type EditActionGroup,
+  isEnabled,
+  labelOf,
+} from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import { Shortcut } from "../../edit-actions/shortcut-keys";
+import { FirstShortcut } from "../../edit-actions/shortcut-keys";
 import { useSteady } from "../../ui/use-stable-callback";
 import style from "./toolbar.module.css";
 
-function Tool({ deed, pressed }: { deed: Deed; pressed?: boolean }) {
+function Tool({ editAction, pressed }: { editAction: EditAction; pressed?: boolean }) {
   const context = useEditorContext();
-  const run = useSteady(() => deed.run(context));
-  const parts = { label: labelOf(deed, context), disabled: !isEnabled(deed, context), run };
-  return <ToolButton deed={deed} {...parts} {...(pressed === undefined ? {} : { pressed })} />;
+  const run = useSteady(() => editAction.run(context));
+  const parts = {
+    label: labelOf(editAction, context),
+    disabled: !isEnabled(editAction, context),
+    run,
+  };
+  return (
+    <ToolButton
+      editAction={editAction}
+      {...parts}
+      {...(pressed === undefined ? {} : { pressed })}
+    />
+  );
 }
 
 interface ToolButtonProps {
-  deed: Deed;
+  editAction: EditAction;
   label: string;
   disabled: boolean;
   pressed?: boolean;
@@ -41,20 +56,20 @@ interface ToolButtonProps {
 
 /** Drawn again only when it looks different, which edits seldom make it. */
 const ToolButton = memo(function ToolButton(props: ToolButtonProps) {
-  const { deed, label, disabled, pressed, run } = props;
-  const Sign = deed.icon;
+  const { editAction, label, disabled, pressed, run } = props;
+  const Sign = editAction.icon;
   return (
     <Tooltip
       label={
         <>
-          {label} <Shortcut deed={deed} />
+          {label} <FirstShortcut editAction={editAction} />
         </>
       }
     >
       <ActionIcon
         size={34}
         radius={0}
-        aria-label={deed.label}
+        aria-label={editAction.label}
         aria-pressed={pressed}
         data-pressed={pressed || undefined}
         className={style.tool ?? ""}
@@ -67,7 +82,7 @@ const ToolButton = memo(function ToolButton(props: ToolButtonProps) {
   );
 });
 
-const GROUPS: readonly Group[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
+const GROUPS: readonly EditActionGroup[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
 /** Walking and nudging would be eight lines that nobody clicks. */
 const KEYS_ONLY = /^(nudge|walk)-/;
 
@@ -77,17 +92,19 @@ function DeedItems() {
   return GROUPS.map((group) => (
     <Fragment key={group}>
       <Menu.Label>{group}</Menu.Label>
-      {DEEDS.filter((deed) => deed.group === group && !KEYS_ONLY.test(deed.name)).map((deed) => {
-        const Sign = deed.icon;
+      {EDIT_ACTIONS.filter(
+        (editAction) => editAction.group === group && !KEYS_ONLY.test(editAction.name),
+      ).map((editAction) => {
+        const Sign = editAction.icon;
         return (
           <Menu.Item
-            key={deed.name}
+            key={editAction.name}
             leftSection={<Sign size={16} aria-hidden />}
-            rightSection={<Shortcut deed={deed} />}
-            disabled={!isEnabled(deed, context)}
-            onClick={() => deed.run(context)}
+            rightSection={<FirstShortcut editAction={editAction} />}
+            disabled={!isEnabled(editAction, context)}
+            onClick={() => editAction.run(context)}
           >
-            {labelOf(deed, context)}
+            {labelOf(editAction, context)}
           </Menu.Item>
         );
       })}
@@ -95,7 +112,7 @@ function DeedItems() {
   ));
 }
 
-export function DeedMenu() {
+export function EditActionMenu() {
   return (
     <Menu position="top-start" width={290}>
       <Menu.Target>
@@ -119,20 +136,20 @@ export const Toolbar = memo(function Toolbar({ compact }: { compact: boolean }) 
   const { tool, selection, snap: snapping, dryRun: dry } = useEditorContext();
   return (
     <div className={style.bar} role="toolbar" aria-label="Canvas tools">
-      <Tool deed={add} />
-      <Tool deed={marquee} pressed={tool === "select"} />
-      {!compact && <Tool deed={pan} pressed={tool === "pan"} />}
-      <Tool deed={undo} />
-      <Tool deed={redo} />
-      {(!compact || selection.size > 0) && <Tool deed={remove} />}
-      {!compact && <Tool deed={note} />}
-      {!compact && <Tool deed={tidy} />}
-      {!compact && <Tool deed={snap} pressed={snapping} />}
-      {!compact && <Tool deed={zoomOut} />}
-      {!compact && <Tool deed={zoomIn} />}
-      <Tool deed={fit} />
-      <Tool deed={dryRun} pressed={dry !== null} />
-      <DeedMenu />
+      <Tool editAction={add} />
+      <Tool editAction={marquee} pressed={tool === "select"} />
+      {!compact && <Tool editAction={pan} pressed={tool === "pan"} />}
+      <Tool editAction={undo} />
+      <Tool editAction={redo} />
+      {(!compact || selection.size > 0) && <Tool editAction={removeSelection} />}
+      {!compact && <Tool editAction={note} />}
+      {!compact && <Tool editAction={tidy} />}
+      {!compact && <Tool editAction={snap} pressed={snapping} />}
+      {!compact && <Tool editAction={zoomOut} />}
+      {!compact && <Tool editAction={zoomIn} />}
+      <Tool editAction={fit} />
+      <Tool editAction={dryRun} pressed={dry !== null} />
+      <EditActionMenu />
     </div>
   );
 });

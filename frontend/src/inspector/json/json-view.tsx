@@ -4,7 +4,7 @@ import { IconAlertTriangle, IconCheck, IconCopy } from "@tabler/icons-react";
 import { lazy, type ReactNode, Suspense, useMemo, useState } from "react";
 import type { KeyChange } from "../../api/graphs";
 import { sentence } from "../../api/http";
-import { keysOf } from "../../edit-actions/edit-action";
+import { printedKeys } from "../../edit-actions/edit-action";
 import {
   selectedActions,
   selectedRelations,
@@ -150,7 +150,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
             variant="filled"
             disabled={changes.length === 0}
             onClick={apply}
-            rightSection={<Kbd>{keysOf("Mod+Enter").join(" ")}</Kbd>}
+            rightSection={<Kbd>{printedKeys("Mod+Enter").join(" ")}</Kbd>}
           >
             {changes.length === 0 ? "Apply" : `Apply ${counted(changes.length, "change")}`}
           </Button>
