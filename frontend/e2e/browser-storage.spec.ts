@@ -6,7 +6,7 @@ import { rolldown } from "rolldown";
 import type * as module from "../src/sync/indexed-db";
 
 type Module = typeof module;
-type Batch = Parameters<module.Device["write"]>[2];
+type Batch = Parameters<module.EditStore["write"]>[2];
 
 const ADDRESS = "http://tablet.test/";
 const ADA = { graph: "g", person: { id: "a", name: "Ada" } };
@@ -29,15 +29,15 @@ test.beforeEach(async ({ page }) => {
 /** A new page over the same storage. */
 async function visit(page: Page): Promise<void> {
   await page.goto(ADDRESS);
-  await page.evaluate(`${code}; window.tested = device; window.device = device.deviceOf()`);
+  await page.evaluate(`${code}; window.tested = device; window.device = device.indexedDbStore()`);
 }
 
 const NOTHING: Batch = { waits: [], known: [], durable: [], copy: null, seq: 1 };
 const edit = (id: string) => ({ id, update: Uint8Array.of(1, 2, 3), at: 5 });
 
 type Call = {
-  [M in keyof module.Device]: [M, ...Parameters<module.Device[M]>];
-}[keyof module.Device];
+  [M in keyof module.EditStore]: [M, ...Parameters<module.EditStore[M]>];
+}[keyof module.EditStore];
 
 /** One call in the page. Bytes travel as arrays of numbers. */
 function call(page: Page, ...given: Call): Promise<unknown> {
@@ -119,7 +119,7 @@ test("the copies are bounded, and edits that wait are never what goes", async ({
 
 test("a browser without storage refuses each call and throws nothing else", async ({ page }) => {
   const said = await page.evaluate(async (shelf) => {
-    const { deviceOf } = Reflect.get(window, "tested") as Module;
+    const { indexedDbStore: deviceOf } = Reflect.get(window, "tested") as Module;
     const refusing = { open: () => indexedDB.open("x", 0 as never) } as unknown as IDBFactory;
     const reading = deviceOf(refusing).read(shelf);
     return reading.then(

@@ -110,7 +110,7 @@ const operations = {
   /** Joins a room as the page does. */
   join({ name, url, token }) {
     const Socket = socketWith(token);
-    const room = page.room.connect({ url, open: (address) => new Socket(address) });
+    const room = page.room.connectRoom({ url, open: (address) => new Socket(address) });
     rooms.set(name, { doc: room.doc, room, leave: () => room.close() });
     return {};
   },

@@ -19,7 +19,7 @@ import style from "./canvas-pane.module.css";
 import { DryRunBar } from "./dry-run-bar";
 import { Toolbar } from "./menus/toolbar";
 import type { EditorState } from "./use-editor";
-import { useDeepLink } from "./use-graph-link";
+import { useGraphLink } from "./use-graph-link";
 
 interface Props {
   me: string;
@@ -84,7 +84,7 @@ function Inside({
   }, [canvasHandle, followed, places, sizes]);
 
   useDryRunInView(context);
-  useDeepLink(context, begun);
+  useGraphLink(context, begun);
 
   return (
     <div className={style.whole}>

@@ -24,8 +24,8 @@ import { Details } from "../inspector/inspector";
 import { Outline } from "../outline/outline";
 import { People } from "../people/people";
 import type { Progress } from "../status/progress";
-import type { Link } from "../sync/room-connection";
-import { useCalmLink } from "../sync/use-room";
+import type { RoomLink } from "../sync/room-connection";
+import { useThrottledLink } from "../sync/use-room";
 import type { Crumb } from "../ui/top-bar";
 import { useIsPhone, useIsWide } from "../ui/use-screen-size";
 import { QuickAdd } from "./canvas/quick-add";
@@ -33,9 +33,9 @@ import { CanvasPane } from "./canvas-pane";
 import style from "./editor.module.css";
 import { Overlays } from "./menus/overlays";
 import { ProblemWord } from "./problem-count";
-import { Notices } from "./room-notices";
-import { SavedWord } from "./save-status";
-import { useRemoteNews, useRunNews } from "./use-announcements";
+import { RoomNotices } from "./room-notices";
+import { SaveStatus } from "./save-status";
+import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
 import { useEditor } from "./use-editor";
 
 /** What the page around the editor may want to know. */
@@ -96,7 +96,7 @@ const PANES = [
   { value: "run", label: "Run" },
 ];
 
-function obstacleOf(context: EditorContext, link: Link, problems: Problems | undefined) {
+function obstacleOf(context: EditorContext, link: RoomLink, problems: Problems | undefined) {
   if (link.state !== "live") return "not connected to the editor";
   if (link.unsaved > 0) return "saving";
   if (context.graph.actions.length === 0) return "nothing to run yet";
@@ -153,13 +153,13 @@ export function Editor(props: Props) {
     closeFind,
     closeOverlay: close,
   } = useEditor(id, onPanel);
-  const link = useCalmLink();
+  const link = useThrottledLink();
   const problems = useProblems(id, link.seq).data;
   const marks = useMemo(() => marksOf(problems?.problems ?? []), [problems]);
   const threads = useThreads();
   useTalkOnCards(threads);
-  useRemoteNews(context.graph, link.seq > 0);
-  useRunNews(context.graph, progress);
+  useRemoteEditAnnouncements(context.graph, link.seq > 0);
+  useRunAnnouncements(context.graph, progress);
   useShortcuts(context);
 
   const place = (template: NewAction) => {
@@ -214,7 +214,7 @@ export function Editor(props: Props) {
         crumbs: crumbsOf(context),
         status: (
           <>
-            <SavedWord />
+            <SaveStatus />
             <ProblemWord problems={problems} />
             {wide && props.status(shown)}
           </>
@@ -311,7 +311,7 @@ export function Editor(props: Props) {
           </aside>
         </main>
       )}
-      <Notices />
+      <RoomNotices />
       <Overlays context={context} overlay={overlay} onClose={close} />
       {adding && <QuickAdd context={context} request={adding} known={known} onClose={closeAdd} />}
     </EditorReactContext>

@@ -2,9 +2,9 @@
 import { Button, CloseButton, Modal, Text } from "@mantine/core";
 import { IconArchive, IconHistory, IconInfoCircle, IconLock, IconUsers } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";
-import type { Notice } from "../sync/graph-connection";
+import type { ConnectionNotice } from "../sync/graph-connection";
 import type { OtherPerson } from "../sync/indexed-db";
-import { othersWait } from "../sync/unsaved-reasons";
+import { otherPeopleWait } from "../sync/unsaved-reasons";
 import {
   useGraphPart,
   useLinkPart,
@@ -13,10 +13,10 @@ import {
   useOthersWaiting,
 } from "../sync/use-room";
 import style from "./room-notices.module.css";
-import { ChoiceDialog, useChoosing } from "./stranded-edits-dialog";
+import { StrandedEditsDialog, useStrandedEditsDialog } from "./stranded-edits-dialog";
 import { saveChanges } from "./stranded-edits-file";
 
-const words: Record<Notice, string> = {
+const words: Record<ConnectionNotice, string> = {
   "went-back":
     "A backup was restored: the graph is as the server has it now. Nothing of yours was waiting.",
   differed:
@@ -60,7 +60,7 @@ function Others() {
   const graph = useGraphPart(({ name }) => name);
   const [shown, setShown] = useState(false);
   const [sure, setSure] = useState<string | null>(null);
-  const said = othersWait(others);
+  const said = otherPeopleWait(others);
   if (said === null) return null;
   const name = (other: OtherPerson) => other.name || "a guest";
   const save = async (other: OtherPerson) => saveChanges(graph, name(other), await read(other.id));
@@ -109,10 +109,10 @@ function Others() {
   );
 }
 
-export function Notices() {
+export function RoomNotices() {
   const by = useMyName();
   const said = useNotice();
-  const choosing = useChoosing();
+  const choosing = useStrandedEditsDialog();
   return (
     <>
       <div className={style.notices} role="status">
@@ -143,7 +143,7 @@ export function Notices() {
         )}
         <Others />
       </div>
-      <ChoiceDialog by={by} open={choosing.open} onLater={choosing.putOff} />
+      <StrandedEditsDialog by={by} open={choosing.open} onLater={choosing.putOff} />
     </>
   );
 }

@@ -8,12 +8,12 @@ import {
   IconRefresh,
 } from "@tabler/icons-react";
 import { useEditorContext } from "../edit-actions/editor-context";
-import type { Link, Why } from "../sync/room-connection";
-import { whyNot } from "../sync/unsaved-reasons";
+import type { RefusalReason, RoomLink } from "../sync/room-connection";
+import { unsavedReason } from "../sync/unsaved-reasons";
 import { useLink, useRoom } from "../sync/use-room";
 import style from "./save-status.module.css";
 
-const whys: Record<Why, string> = {
+const whys: Record<RefusalReason, string> = {
   "session-ended": "Signed out",
   "other-person": "Somebody else signed in here",
   forbidden: "View only",
@@ -28,7 +28,7 @@ const whys: Record<Why, string> = {
   "no-socket": "No connection",
 };
 
-export interface Saved {
+export interface SaveStatusText {
   tone: "good" | "busy" | "off" | "bad" | "view";
   words: string;
 }
@@ -38,7 +38,7 @@ function changes(n: number): string {
 }
 
 /** Who may not edit has nothing to save. */
-export function savedWords(link: Link, mayEdit = true): Saved {
+export function saveStatusText(link: RoomLink, mayEdit = true): SaveStatusText {
   if (link.state === "refused") {
     const why = link.why ? whys[link.why] : "Refused";
     const kept = link.unsaved > 0 ? ` · ${changes(link.unsaved)} not saved` : "";
@@ -67,13 +67,13 @@ const signs = {
   view: IconEye,
 };
 
-export function SavedWord() {
+export function SaveStatus() {
   const link = useLink();
   const { room } = useRoom();
   const { mayEdit } = useEditorContext();
-  const { tone, words } = savedWords(link, mayEdit);
+  const { tone, words } = saveStatusText(link, mayEdit);
   const Sign = signs[tone];
-  const why = whyNot(link);
+  const why = unsavedReason(link);
   return (
     <Tooltip
       label={why ?? ""}

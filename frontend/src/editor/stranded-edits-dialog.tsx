@@ -3,9 +3,15 @@ import { Button, Checkbox, Group, Modal, Text } from "@mantine/core";
 import { useCallback, useEffect, useMemo, useState } from "react";
 import { type Change, changesOf, chosen, type Line } from "../graph/changes";
 import { mapsOf } from "../graph/document-keys";
-import { type Choice, useChoice, useGraph, useLink, useRoom } from "../sync/use-room";
+import {
+  type StrandedEditsChoice,
+  useGraph,
+  useLink,
+  useRoom,
+  useStrandedEdits,
+} from "../sync/use-room";
 import style from "./stranded-edits-dialog.module.css";
-import { saveChanges, sentenceOf } from "./stranded-edits-file";
+import { changeSentence, saveChanges } from "./stranded-edits-file";
 
 const signs = { added: "+", removed: "−", changed: "~" } as const;
 
@@ -57,7 +63,7 @@ function Item({ change, taken, onTake }: ItemProps) {
             <span className={style.sign} aria-hidden>
               {signs[change.kind]}
             </span>
-            <span className="visually-hidden">{sentenceOf(change)}</span>
+            <span className="visually-hidden">{changeSentence(change)}</span>
             <b aria-hidden>{change.title}</b>{" "}
             <span className={style.thing} aria-hidden>
               {change.thing === "graph" ? "" : `${change.thing} `}
@@ -72,7 +78,7 @@ function Item({ change, taken, onTake }: ItemProps) {
 }
 
 interface BodyProps {
-  choice: Choice;
+  choice: StrandedEditsChoice;
   by: string;
   onLater: () => void;
 }
@@ -132,7 +138,7 @@ function Body({ choice, by, onLater }: BodyProps) {
 }
 
 interface AnswersProps {
-  choice: Choice;
+  choice: StrandedEditsChoice;
   taken: readonly Change[];
   /** How many that is, in words. */
   some: string;
@@ -197,7 +203,7 @@ function useWork() {
 }
 
 /** The dialog; `onLater` leaves a word on the page that leads back to it. */
-export function ChoiceDialog({
+export function StrandedEditsDialog({
   by,
   open,
   onLater,
@@ -206,7 +212,7 @@ export function ChoiceDialog({
   open: boolean;
   onLater(): void;
 }) {
-  const choice = useChoice();
+  const choice = useStrandedEdits();
   return (
     <Modal
       opened={choice !== null && open}
@@ -222,8 +228,8 @@ export function ChoiceDialog({
 }
 
 /** Whether the dialog is open: for each choice at first, until the person puts it off. */
-export function useChoosing() {
-  const choice = useChoice();
+export function useStrandedEditsDialog() {
+  const choice = useStrandedEdits();
   const [later, setLater] = useState(false);
   // biome-ignore lint/correctness/useExhaustiveDependencies: another choice is asked about anew
   useEffect(() => setLater(false), [choice?.stranded]);

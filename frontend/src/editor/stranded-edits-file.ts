@@ -2,9 +2,9 @@
 
 import { type Change, changesOf } from "../graph/changes";
 import { type Maps, mapsFrom } from "../graph/document-keys";
-import type { Stranded } from "../sync/replaced-history";
+import type { StrandedEdits } from "../sync/replaced-history";
 
-interface Saved {
+interface ChangesFile {
   readonly graph: string;
   readonly made_by: string;
   /** When the last of them was made. */
@@ -18,13 +18,13 @@ interface Saved {
 }
 
 /** In one line: "changed action Look". */
-export function sentenceOf({ kind, thing, title }: Change): string {
+export function changeSentence({ kind, thing, title }: Change): string {
   return thing === "graph" ? `${kind} the graph` : `${kind} ${thing} ${title}`;
 }
 
-export function fileOf(graph: string, by: string, stranded: Stranded): Saved {
+export function fileOf(graph: string, by: string, stranded: StrandedEdits): ChangesFile {
   const changes = changesOf(stranded, mapsFrom({})).map((change) => ({
-    what: sentenceOf(change),
+    what: changeSentence(change),
     values: change.lines.map(({ field, before, after }) => ({ field, before, after })),
   }));
   const made_at = new Date(stranded.at).toISOString();
@@ -32,7 +32,7 @@ export function fileOf(graph: string, by: string, stranded: Stranded): Saved {
 }
 
 /** Saves them where the browser saves files. */
-export function saveChanges(graph: string, by: string, all: readonly Stranded[]): void {
+export function saveChanges(graph: string, by: string, all: readonly StrandedEdits[]): void {
   const content = all.map((stranded) => fileOf(graph, by, stranded));
   const text = JSON.stringify(content.length === 1 ? content[0] : content, null, 2);
   const link = document.createElement("a");
@@ -42,7 +42,7 @@ export function saveChanges(graph: string, by: string, all: readonly Stranded[])
   setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }
 
-function plain(maps: Maps): Saved["document"] {
+function plain(maps: Maps): ChangesFile["document"] {
   return Object.fromEntries(
     Object.entries(maps).map(([root, map]) => [root, Object.fromEntries(map)]),
   );

@@ -3,7 +3,7 @@ import type { Run } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
 import type { Progress } from "../status/progress";
 import { progressByAid } from "../status/progress";
-import { runNews } from "./use-announcements";
+import { runAnnouncement } from "./use-announcements";
 
 const graph = fromUmrf({
   graph_name: "g",
@@ -21,7 +21,7 @@ test("an action of a run that is not drawn, or not yet, is called by its own nam
     actions: { Wait_0: { aid: "gone", state: "FINISHED", visits: [], older: 0, messages: [] } },
   } as unknown as Run;
   const progress = progressByAid(run, false).get("gone") as Progress;
-  expect(runNews(graph, "gone", progress)).toBe("Wait_0: finished");
-  expect(runNews(empty, "gone", progress)).toBe("Wait_0: finished");
-  expect(runNews(graph, wait?.key ?? "", progress)).toBe("Wait: finished");
+  expect(runAnnouncement(graph, "gone", progress)).toBe("Wait_0: finished");
+  expect(runAnnouncement(empty, "gone", progress)).toBe("Wait_0: finished");
+  expect(runAnnouncement(graph, wait?.key ?? "", progress)).toBe("Wait: finished");
 });

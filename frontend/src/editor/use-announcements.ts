@@ -29,7 +29,7 @@ function touched(graph: Graph, doc: Y.Doc, transaction: Y.Transaction): string[]
 }
 
 /** `begun`: the graph has arrived; what came before is no news. */
-export function useRemoteNews(graph: Graph, begun: boolean): void {
+export function useRemoteEditAnnouncements(graph: Graph, begun: boolean): void {
   const { doc, presence } = useRoom();
   const latest = useRef(graph);
   latest.current = graph;
@@ -51,19 +51,19 @@ export function useRemoteNews(graph: Graph, begun: boolean): void {
 }
 
 /** An action of a run may be in no draft any more, or the draft not here yet: it has its name then. */
-export function runNews(graph: Graph, key: Key, { name, word }: Progress): string {
+export function runAnnouncement(graph: Graph, key: Key, { name, word }: Progress): string {
   const isDrawn = graph.actions.some((action) => action.key === key);
   return `${isDrawn || name === undefined ? endName(graph, key) : name}: ${word}`;
 }
 
-export function useRunNews(graph: Graph, progress: ReadonlyMap<Key, Progress>): void {
+export function useRunAnnouncements(graph: Graph, progress: ReadonlyMap<Key, Progress>): void {
   const before = useRef(progress);
   useEffect(() => {
     const old = before.current;
     before.current = progress;
     if (old === progress) return;
     for (const [key, now] of progress) {
-      if (old.get(key)?.word !== now.word) announcer.say(runNews(graph, key, now));
+      if (old.get(key)?.word !== now.word) announcer.say(runAnnouncement(graph, key, now));
     }
   }, [graph, progress]);
 }

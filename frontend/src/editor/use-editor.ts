@@ -15,7 +15,13 @@ import {
   type Panel,
   type Tool,
 } from "../edit-actions/editor-context";
-import { useCalmGraph, useCalmLink, useLinkPart, useRoom, useUndo } from "../sync/use-room";
+import {
+  useLinkPart,
+  useRoom,
+  useThrottledGraph,
+  useThrottledLink,
+  useUndo,
+} from "../sync/use-room";
 import { takeAway } from "./export-graph";
 
 const NONE: ReadonlySet<string> = new Set();
@@ -54,7 +60,7 @@ export interface EditorState {
 
 export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorState {
   const { doc, undo, presence } = useRoom();
-  const graph = useCalmGraph();
+  const graph = useThrottledGraph();
   const { canUndo, canRedo } = useUndo();
   const [selection, setSelection] = useState(NONE);
   const [tool, setTool] = useState<Tool>("pan");
@@ -67,7 +73,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
     getInitialValueInEffect: false,
   });
   const role = useMay("edit");
-  const { readOnly, seq } = useCalmLink();
+  const { readOnly, seq } = useThrottledLink();
   const { dryRun, begin: beginDryRun } = useDryRun(id, graph, seq);
   // What is typed before the graph is there would be joined to what arrives under it, and an edit
   // would know nothing of what it replaces.

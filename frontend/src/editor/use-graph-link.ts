@@ -8,7 +8,7 @@ import { shownKeys } from "../edit-actions/view";
 
 const SETTLED = 160; // ms after which the canvas has measured its cards and shown the whole
 
-export function useDeepLink(context: EditorContext, begun: boolean): void {
+export function useGraphLink(context: EditorContext, begun: boolean): void {
   const search = useSearch();
   const now = useRef(context);
   now.current = context;

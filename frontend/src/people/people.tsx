@@ -4,7 +4,7 @@ import { ViewportPortal } from "@xyflow/react";
 import type { CSSProperties } from "react";
 import { CARD, type Places, type Sizes } from "../canvas/geometry/arrange";
 import { splitKey } from "../graph/document-keys";
-import type { Person } from "../sync/presence/presence";
+import type { Participant } from "../sync/presence/presence";
 import { useFollowing, usePeople } from "../sync/use-room";
 import { colorsOf, initials } from "../ui/name-colors";
 import style from "./people.module.css";
@@ -135,7 +135,7 @@ interface AtCardsProps {
 /** Small initials at the cards of which somebody has a field under their caret. */
 export function AtCards({ me, places, sizes }: AtCardsProps) {
   const people = usePeople();
-  const at = new Map<string, Person[]>();
+  const at = new Map<string, Participant[]>();
   for (const person of people) {
     const { head } = splitKey(person.presence.editing ?? "");
     if (person.id !== me && places.has(head)) at.set(head, [...(at.get(head) ?? []), person]);

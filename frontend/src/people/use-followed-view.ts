@@ -3,7 +3,7 @@ import { type ReactFlowInstance, useOnViewportChange, type Viewport } from "@xyf
 import { type RefObject, useCallback, useEffect, useMemo, useSyncExternalStore } from "react";
 import type { Arrow, CanvasNode } from "../canvas/elements";
 import type { CanvasView as BenchView } from "../edit-actions/editor-context";
-import type { View } from "../sync/presence/presence";
+import type { SharedView } from "../sync/presence/presence";
 import { useFollowing, useRoom } from "../sync/use-room";
 
 const GLIDE = 120; // ms; views come at most every 50 ms
@@ -17,7 +17,7 @@ interface Size {
 }
 
 /** What is seen through a frame of this size, to tell the others. */
-export function viewOf({ x, y, zoom }: Viewport, { width, height }: Size): View {
+export function viewOf({ x, y, zoom }: Viewport, { width, height }: Size): SharedView {
   return {
     x: Math.round(-x / zoom),
     y: Math.round(-y / zoom),
@@ -28,7 +28,7 @@ export function viewOf({ x, y, zoom }: Viewport, { width, height }: Size): View 
 }
 
 /** How to look so that all they see is seen in a frame of this size, with their middle in its middle. */
-export function lookingAt(view: View, { width, height }: Size): Viewport {
+export function lookingAt(view: SharedView, { width, height }: Size): Viewport {
   const theirs = { width: view.width ?? width, height: view.height ?? height };
   const zoom = view.zoom * Math.min(1, width / theirs.width, height / theirs.height);
   const middle = {

@@ -8,10 +8,13 @@
 
 import { ask, Refusal } from "../api/http";
 import { currentPerson } from "../api/session";
-import type { Why } from "./room-connection";
+import type { RefusalReason } from "./room-connection";
 
 /** For `ConnectOptions.admit`. Throws `Unreachable` when nobody answers. */
-export function doorOf(graph: string, person: string): (again: boolean) => Promise<Why | null> {
+export function admissionCheck(
+  graph: string,
+  person: string,
+): (again: boolean) => Promise<RefusalReason | null> {
   return async (again) => {
     try {
       const here = await currentPerson();
@@ -20,14 +23,14 @@ export function doorOf(graph: string, person: string): (again: boolean) => Promi
       return null;
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
-      const why = WHYS.get(error.details.status);
+      const why = REASONS.get(error.details.status);
       if (why === undefined) throw error;
       return why;
     }
   };
 }
 
-const WHYS: ReadonlyMap<number, Why> = new Map([
+const REASONS: ReadonlyMap<number, RefusalReason> = new Map([
   [401, "session-ended"],
   [403, "forbidden"],
   [404, "no-such-graph"],

@@ -9,7 +9,7 @@
 import * as decoding from "lib0/decoding";
 import type * as Y from "yjs";
 import { type Maps, mapsOf, ROOTS } from "../graph/document-keys";
-import * as frames from "./messages";
+import * as messages from "./messages";
 
 /** How long nothing must have happened. */
 const IDLE_MS = 5_000;
@@ -21,19 +21,19 @@ export interface Fingerprint {
 }
 
 /** What can be compared at the moment: the log up to `seq` and nothing else. */
-export interface AtRest {
+export interface RestingState {
   readonly seq: number;
   send(frame: Uint8Array<ArrayBuffer>): void;
 }
 
 /** Asks the server once after each change that has come to rest. */
-export class Watchman {
+export class FingerprintCheck {
   private readonly doc: Y.Doc;
-  private readonly atRest: () => AtRest | null;
+  private readonly atRest: () => RestingState | null;
   private timer: ReturnType<typeof setTimeout> | undefined;
   private said: (Fingerprint & { readonly seq: number }) | null = null;
 
-  constructor(doc: Y.Doc, atRest: () => AtRest | null) {
+  constructor(doc: Y.Doc, atRest: () => RestingState | null) {
     this.doc = doc;
     this.atRest = atRest;
   }
@@ -68,7 +68,7 @@ export class Watchman {
     const rest = this.atRest();
     if (rest === null || rest.seq === this.said?.seq) return;
     this.said = { seq: rest.seq, ...fingerprint(mapsOf(this.doc)) };
-    rest.send(frames.compare(rest.seq, this.said));
+    rest.send(messages.compareMessage(rest.seq, this.said));
   }
 }
 

@@ -7,32 +7,37 @@
  * Works without React.
  */
 
-import { doorOf } from "./admission";
-import { browser, type Device, epochAnew, epochName, type Kept } from "./indexed-db";
-import { type Opened, type OpenRoom, openRoom } from "./open-room";
-import { applyDifference, type Difference, type Stranded, strandedOf } from "./replaced-history";
-import type { Link, Room, Why } from "./room";
-import type { ConnectOptions, Keep } from "./room-connection";
+import { admissionCheck } from "./admission";
+import { browserStore, type EditStore, epochName, newEpoch, type StoredCopy } from "./indexed-db";
+import { type ClosableRoom, type OpenRoom, openRoom } from "./open-room";
+import {
+  applyDifference,
+  type DocumentDifference,
+  type StrandedEdits,
+  strandedEditsOf,
+} from "./replaced-history";
+import type { RefusalReason, Room, RoomLink } from "./room";
+import type { PersistenceOptions, RoomOptions } from "./room-connection";
 
 /** What the page may say softly about a room that follows another. */
-export type Notice = "went-back" | "differed";
+export type ConnectionNotice = "went-back" | "differed";
 
-export interface Stay {
+export interface GraphConnectionState {
   readonly open: OpenRoom;
   /** Edits on histories that the server has left, the oldest first. */
-  readonly stranded: readonly Stranded[];
-  readonly notice: Notice | null;
+  readonly stranded: readonly StrandedEdits[];
+  readonly notice: ConnectionNotice | null;
 }
 
-export interface VisitOptions {
+export interface GraphConnectionOptions {
   readonly url: string;
-  readonly keep?: Keep;
-  readonly open?: ConnectOptions["open"];
+  readonly keep?: PersistenceOptions;
+  readonly open?: RoomOptions["open"];
 }
 
-interface Aside {
+interface StrandedEpoch {
   readonly epoch: string;
-  readonly stranded: Stranded;
+  readonly stranded: StrandedEdits;
   /** Lets go of what is kept of it on the device. */
   forget(): Promise<void>;
 }
@@ -40,26 +45,26 @@ interface Aside {
 /** A document that differs so often has a fault that opening anew does not mend. */
 const MOST_DIFFERENCES = 3;
 
-export class Visit {
-  private readonly options: VisitOptions;
+export class GraphConnection {
+  private readonly options: GraphConnectionOptions;
   private readonly listeners = new Set<() => void>();
-  private opened: Opened;
-  private asides: readonly Aside[] = [];
-  private notice: Notice | null = null;
-  private current: Stay;
+  private opened: ClosableRoom;
+  private asides: readonly StrandedEpoch[] = [];
+  private notice: ConnectionNotice | null = null;
+  private current: GraphConnectionState;
   private unfollow: () => void = () => undefined;
   private looked = false;
   private differences = 0;
   private left = false;
 
-  constructor(options: VisitOptions) {
+  constructor(options: GraphConnectionOptions) {
     this.options = options;
     this.opened = this.enter(options.keep);
     this.current = { open: this.opened, stranded: [], notice: null };
   }
 
   /** The same object until something of it changes. */
-  readonly now = (): Stay => this.current;
+  readonly now = (): GraphConnectionState => this.current;
 
   readonly onChange = (listener: () => void): (() => void) => {
     this.listeners.add(listener);
@@ -71,7 +76,7 @@ export class Visit {
    * lets go of the old edits once that is stored. Answers how many keys changed. When it fails, the
    * old edits are where they were.
    */
-  async apply(stranded: Stranded, difference: Difference): Promise<number> {
+  async apply(stranded: StrandedEdits, difference: DocumentDifference): Promise<number> {
     const { room, doc } = this.opened;
     await room.settled(untilRefused(room));
     const changed = applyDifference(doc, difference);
@@ -81,7 +86,7 @@ export class Visit {
   }
 
   /** Lets go of these edits. */
-  async drop(stranded: Stranded): Promise<void> {
+  async drop(stranded: StrandedEdits): Promise<void> {
     const aside = this.asides.find((each) => each.stranded === stranded);
     await aside?.forget();
     this.asides = this.asides.filter((each) => each !== aside);
@@ -102,25 +107,25 @@ export class Visit {
     this.listeners.clear();
   }
 
-  private enter(keep: Keep | undefined): Opened {
+  private enter(keep: PersistenceOptions | undefined): ClosableRoom {
     const { url, open } = this.options;
     const opened = openRoom({
       url,
       ...(open && { open }),
-      ...(keep && { keep, admit: doorOf(keep.graph, keep.person.id) }),
+      ...(keep && { keep, admit: admissionCheck(keep.graph, keep.person.id) }),
     });
     this.unfollow();
     this.unfollow = opened.room.onLink(() => this.follow(opened.room.link()));
     return opened;
   }
 
-  private follow({ state, why }: Link): void {
+  private follow({ state, why }: RoomLink): void {
     if (state === "refused" && why !== undefined) this.succeed(why);
     else if (state === "live" && !this.looked) void this.lookAside();
   }
 
   /** Opens the next room, if this one ended for a reason that the next one has not. */
-  private succeed(why: Why): void {
+  private succeed(why: RefusalReason): void {
     const { room } = this.opened;
     const stranded = room.stranded();
     const epoch = room.histories().here;
@@ -132,7 +137,7 @@ export class Visit {
         this.follower(otherEpoch(room));
         break;
       case "other-client":
-        this.follower(epochAnew(room.histories().theirs));
+        this.follower(newEpoch(room.histories().theirs));
         if (stranded === null) void forget();
         else void this.again({ epoch, stranded, forget });
         break;
@@ -140,7 +145,7 @@ export class Visit {
         this.differences += 1;
         if (this.differences > MOST_DIFFERENCES) return;
         this.notice = "differed";
-        this.follower(epochAnew(room.histories().theirs));
+        this.follower(newEpoch(room.histories().theirs));
         void forget();
         break;
       default:
@@ -157,7 +162,7 @@ export class Visit {
   }
 
   /** The same history under another client id: the same changes, without asking. */
-  private async again(aside: Aside): Promise<void> {
+  private async again(aside: StrandedEpoch): Promise<void> {
     this.asides = [...this.asides, aside];
     await this.apply(aside.stranded, aside.stranded.difference).catch((error: unknown) => {
       console.warn("Changes wait for a decision, since they could not be made again:", error);
@@ -169,7 +174,7 @@ export class Visit {
     this.looked = true;
     const { keep } = this.options;
     if (keep === undefined) return;
-    const device = keep.device ?? browser();
+    const device = keep.device ?? browserStore();
     const here = this.opened.room.histories().here;
     const all = await device.read(keep).catch(() => []); // a device that keeps nothing
     if (this.left) return;
@@ -189,15 +194,15 @@ export class Visit {
   }
 }
 
-function asideOf(device: Device, keep: Keep, kept: Kept): Aside {
+function asideOf(device: EditStore, keep: PersistenceOptions, kept: StoredCopy): StrandedEpoch {
   const { epoch } = kept;
-  return { epoch, stranded: strandedOf(kept), forget: () => device.forget(keep, epoch) };
+  return { epoch, stranded: strandedEditsOf(kept), forget: () => device.forget(keep, epoch) };
 }
 
 /** Where to keep what the server has now: under its name, unless that is the name of what was. */
 function otherEpoch(room: Room): string {
   const { here, theirs } = room.histories();
-  return theirs !== "" && theirs !== epochName(here) ? theirs : epochAnew(theirs);
+  return theirs !== "" && theirs !== epochName(here) ? theirs : newEpoch(theirs);
 }
 
 /** Aborts when a room is refused. */

@@ -7,40 +7,40 @@
  * refuses it, each call here rejects, and the room says that nothing is kept.
  */
 
-import type { Before } from "./replaced-history";
+import type { ReplacedEntries } from "./replaced-history";
 
 /** Whose copy of which graph. */
-export interface Shelf {
+export interface CopyOwner {
   readonly graph: string;
   readonly person: { readonly id: string; readonly name: string };
 }
 
 /** An edit that is not durable. Ids sort by the order in which they were made. */
-export interface Waiting {
+export interface UnsavedEdit {
   readonly id: string;
   readonly update: Uint8Array;
   /** Milliseconds since 1970. */
   readonly at: number;
   /** What it replaced; absent where that is not known. */
-  readonly before?: Before;
+  readonly before?: ReplacedEntries;
 }
 
-export interface Kept {
+export interface StoredCopy {
   /** One history of the graph, see `epochName`. */
   readonly epoch: string;
   /** The copy shows the log up to this entry. */
   readonly seq: number;
   /** Updates that are durable; together they are the document. */
   readonly known: readonly Uint8Array[];
-  readonly waiting: readonly Waiting[];
+  readonly waiting: readonly UnsavedEdit[];
 }
 
 /** One write: all of it or nothing. */
-export interface Batch {
-  readonly waits: readonly Waiting[];
+export interface StoreWrite {
+  readonly waits: readonly UnsavedEdit[];
   readonly known: readonly Uint8Array[];
   /** Edits that waited and are durable now. */
-  readonly durable: readonly Waiting[];
+  readonly durable: readonly UnsavedEdit[];
   /** The whole document, which replaces what was known. Only of durable edits. */
   readonly copy: Uint8Array | null;
   readonly seq: number;
@@ -53,28 +53,28 @@ export interface OtherPerson {
   readonly waiting: number;
 }
 
-export interface Device {
+export interface EditStore {
   /** What is kept, of all histories, the last used one at the end. */
-  read(shelf: Shelf): Promise<readonly Kept[]>;
-  write(shelf: Shelf, epoch: string, batch: Batch): Promise<void>;
+  read(owner: CopyOwner): Promise<readonly StoredCopy[]>;
+  write(owner: CopyOwner, epoch: string, batch: StoreWrite): Promise<void>;
   /** Lets go of everything kept of one epoch, edits that wait included. */
-  forget(shelf: Shelf, epoch: string): Promise<void>;
+  forget(owner: CopyOwner, epoch: string): Promise<void>;
   /** The others with edits of this graph that wait here. */
-  others(shelf: Shelf): Promise<readonly OtherPerson[]>;
+  others(owner: CopyOwner): Promise<readonly OtherPerson[]>;
 }
 
 /** Of a graph whose server has not said yet which history it has. */
-export const UNNAMED = "0";
+export const UNNAMED_EPOCH = "0";
 
 /** A place for a document that begins anew although the server calls the history the same. */
-export function epochAnew(name: string): string {
-  return `${name || UNNAMED}~${freshId()}`;
+export function newEpoch(name: string): string {
+  return `${name || UNNAMED_EPOCH}~${freshId()}`;
 }
 
 /** What the server calls the history that is kept under this epoch; empty when it has not said. */
 export function epochName(epoch: string): string {
-  const [name = UNNAMED] = epoch.split("~");
-  return name === UNNAMED ? "" : name;
+  const [name = UNNAMED_EPOCH] = epoch.split("~");
+  return name === UNNAMED_EPOCH ? "" : name;
 }
 
 const NAME = "action-assistant";
@@ -90,10 +90,10 @@ interface Copy {
   usedAt: number;
 }
 
-type Place = readonly [graph: string, person: string, epoch: string];
+type CopyKey = readonly [graph: string, person: string, epoch: string];
 
 /** The browser's storage. Opens it at the first call, once. */
-export function deviceOf(factory: IDBFactory | undefined = globalThis.indexedDB): Device {
+export function indexedDbStore(factory: IDBFactory | undefined = globalThis.indexedDB): EditStore {
   let opened: Promise<IDBDatabase> | null = null;
   const database = () => {
     opened ??= openDatabase(factory, () => {
@@ -105,51 +105,51 @@ export function deviceOf(factory: IDBFactory | undefined = globalThis.indexedDB)
     return opened;
   };
   return {
-    async read(shelf) {
+    async read(owner) {
       const work = (await database()).transaction(["copies", "known", "waiting"]);
-      const range = within(shelf.graph, shelf.person.id);
+      const range = within(owner.graph, owner.person.id);
       const copies = (await answer(work.objectStore("copies").getAll(range))) as Copy[];
       copies.sort((a, b) => a.usedAt - b.usedAt);
       return Promise.all(copies.map((copy) => readOne(work, copy)));
     },
-    async write(shelf, epoch, batch) {
+    async write(owner, epoch, batch) {
       const store = await database();
       try {
-        await writeBatch(store, shelf, epoch, batch);
+        await writeBatch(store, owner, epoch, batch);
       } catch (error) {
         if (!(error instanceof DOMException && error.name === "QuotaExceededError")) throw error;
-        await prune(store, shelf, 0);
-        await writeBatch(store, shelf, epoch, batch);
+        await prune(store, owner, 0);
+        await writeBatch(store, owner, epoch, batch);
       }
-      if (batch.copy !== null) await prune(store, shelf, MOST_COPIES);
+      if (batch.copy !== null) await prune(store, owner, MOST_COPIES);
     },
-    async forget(shelf, epoch) {
+    async forget(owner, epoch) {
       const work = (await database()).transaction(["copies", "known", "waiting"], "readwrite");
-      remove(work, [shelf.graph, shelf.person.id, epoch]);
+      remove(work, [owner.graph, owner.person.id, epoch]);
       await finished(work);
     },
-    async others(shelf) {
+    async others(owner) {
       const work = (await database()).transaction(["copies", "waiting"]);
-      const range = within(shelf.graph);
+      const range = within(owner.graph);
       const keys = (await answer(
         work.objectStore("waiting").getAllKeys(range),
-      )) as unknown as Place[];
+      )) as unknown as CopyKey[];
       const copies = (await answer(work.objectStore("copies").getAll(range))) as Copy[];
       const names = new Map(copies.map((copy) => [copy.person, copy.name]));
       const counts = new Map<string, number>();
       for (const [, person] of keys) {
-        if (person !== shelf.person.id) counts.set(person, (counts.get(person) ?? 0) + 1);
+        if (person !== owner.person.id) counts.set(person, (counts.get(person) ?? 0) + 1);
       }
       return [...counts].map(([id, waiting]) => ({ id, name: names.get(id) ?? "", waiting }));
     },
   };
 }
 
-let ofBrowser: Device | null = null;
+let ofBrowser: EditStore | null = null;
 
 /** The storage of this browser, the same for all rooms. */
-export function browser(): Device {
-  ofBrowser ??= deviceOf();
+export function browserStore(): EditStore {
+  ofBrowser ??= indexedDbStore();
   return ofBrowser;
 }
 
@@ -179,26 +179,26 @@ function within(...parts: readonly string[]): IDBKeyRange {
   return IDBKeyRange.bound([...parts], [...parts, []]);
 }
 
-async function readOne(work: IDBTransaction, copy: Copy): Promise<Kept> {
+async function readOne(work: IDBTransaction, copy: Copy): Promise<StoredCopy> {
   const range = within(copy.graph, copy.person, copy.epoch);
   const [known, waiting] = await Promise.all([
     answer(work.objectStore("known").getAll(range)) as Promise<Uint8Array[]>,
-    answer(work.objectStore("waiting").getAll(range)) as Promise<Waiting[]>,
+    answer(work.objectStore("waiting").getAll(range)) as Promise<UnsavedEdit[]>,
   ]);
   return { epoch: copy.epoch, seq: copy.seq, known, waiting };
 }
 
 async function writeBatch(
   database: IDBDatabase,
-  { graph, person }: Shelf,
+  { graph, person }: CopyOwner,
   epoch: string,
-  { waits, known, durable, copy, seq }: Batch,
+  { waits, known, durable, copy, seq }: StoreWrite,
 ): Promise<void> {
   const work = database.transaction(["copies", "known", "waiting"], "readwrite", {
     durability: "strict",
   });
   const done = finished(work);
-  const place: Place = [graph, person.id, epoch];
+  const place: CopyKey = [graph, person.id, epoch];
   const tail = work.objectStore("known");
   const waiting = work.objectStore("waiting");
   if (copy !== null) {
@@ -225,25 +225,25 @@ async function writeBatch(
 }
 
 /** Lets go of copies in which nothing waits, except the newest and the one in use. */
-async function prune(database: IDBDatabase, shelf: Shelf, most: number): Promise<void> {
+async function prune(database: IDBDatabase, owner: CopyOwner, most: number): Promise<void> {
   const work = database.transaction(["copies", "known", "waiting"], "readwrite");
   const done = finished(work);
   const copies = (await answer(work.objectStore("copies").getAll())) as Copy[];
-  const keys = (await answer(work.objectStore("waiting").getAllKeys())) as unknown as Place[];
+  const keys = (await answer(work.objectStore("waiting").getAllKeys())) as unknown as CopyKey[];
   const busy = new Set(
     keys.map(([graph, person, epoch]) => JSON.stringify([graph, person, epoch])),
   );
   const idle = copies
     .sort((a, b) => b.usedAt - a.usedAt)
     .filter(({ graph, person, epoch }) => {
-      const inUse = graph === shelf.graph && person === shelf.person.id;
+      const inUse = graph === owner.graph && person === owner.person.id;
       return !inUse && !busy.has(JSON.stringify([graph, person, epoch]));
     });
   for (const { graph, person, epoch } of idle.slice(most)) remove(work, [graph, person, epoch]);
   await done;
 }
 
-function remove(work: IDBTransaction, place: Place): void {
+function remove(work: IDBTransaction, place: CopyKey): void {
   work.objectStore("copies").delete([...place]);
   for (const store of ["known", "waiting"]) work.objectStore(store).delete(within(...place));
 }

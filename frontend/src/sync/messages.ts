@@ -5,7 +5,7 @@ import { type Awareness, encodeAwarenessUpdate } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import type * as Y from "yjs";
 import type { Fingerprint } from "./fingerprint";
-import type { Why } from "./room";
+import type { RefusalReason } from "./room";
 
 export const SYNC = 0;
 export const AWARENESS = 1;
@@ -20,7 +20,7 @@ export const READ_ONLY = 102;
 export const EPOCH = 103;
 
 /** Close codes after which coming again by itself is of no use. */
-const REFUSED: ReadonlyMap<number, Why> = new Map([
+const REFUSED: ReadonlyMap<number, RefusalReason> = new Map([
   [1003, "not-accepted"],
   [1007, "not-accepted"],
   [1008, "forbidden"],
@@ -36,45 +36,45 @@ const FORBIDDEN = 4403;
 const OTHER_CLIENT = "client id of another person";
 
 /** Why the server does not let this page in, if that is what a close says. */
-export function refusedBy(code: number, reason: string): Why | undefined {
+export function refusalOf(code: number, reason: string): RefusalReason | undefined {
   return code === FORBIDDEN && reason === OTHER_CLIENT ? "other-client" : REFUSED.get(code);
 }
 
 /** Close codes of what passes. */
-export const PASSING: ReadonlyMap<number, Why> = new Map([
+export const RETRIED_CLOSES: ReadonlyMap<number, RefusalReason> = new Map([
   [1012, "restarting"],
   [1013, "too-slow"],
 ]);
 
 /** An update that brings nothing. */
-export const NOTHING = new Uint8Array([0, 0]);
+export const EMPTY_UPDATE = new Uint8Array([0, 0]);
 
 type Bytes = Uint8Array<ArrayBuffer>;
 
 /** Sync step 1: what we have. */
-export function question(doc: Y.Doc): Bytes {
+export function syncStep1(doc: Y.Doc): Bytes {
   return message(SYNC, (encoder) => sync.writeSyncStep1(encoder, doc));
 }
 
 /** Sync step 2, what the server lacks. */
-export function answer(update: Uint8Array): Bytes {
+export function syncStep2(update: Uint8Array): Bytes {
   return edit(sync.messageYjsSyncStep2, update);
 }
 
 /** One update. */
-export function change(update: Uint8Array): Bytes {
+export function updateMessage(update: Uint8Array): Bytes {
   return edit(sync.messageYjsUpdate, update);
 }
 
 /** What we show after entry `seq` of the log. */
-export function compare(seq: number, { entries, total }: Fingerprint): Bytes {
+export function compareMessage(seq: number, { entries, total }: Fingerprint): Bytes {
   return message(COMPARE, (encoder) => {
     for (const number of [seq, entries, total]) encoding.writeVarUint(encoder, number);
   });
 }
 
 /** What we say about ourselves. */
-export function presence(awareness: Awareness): Bytes {
+export function awarenessMessage(awareness: Awareness): Bytes {
   return message(AWARENESS, (encoder) =>
     encoding.writeVarUint8Array(encoder, encodeAwarenessUpdate(awareness, [awareness.clientID])),
   );

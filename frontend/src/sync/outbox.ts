@@ -6,13 +6,13 @@
  * was not acknowledged on the old one goes again, with the first step 2.
  */
 
-import type { Waiting } from "./indexed-db";
+import type { UnsavedEdit } from "./indexed-db";
 
 const NOT_SENT = Number.POSITIVE_INFINITY;
 
 export class Outbox {
   /** In the order in which they were made. */
-  private waiting: { readonly edit: Waiting; message: number }[] = [];
+  private waiting: { readonly edit: UnsavedEdit; message: number }[] = [];
   private sent = 0;
   private answeredSync = false;
 
@@ -22,7 +22,7 @@ export class Outbox {
   }
 
   /** The edits that are not durable. */
-  get edits(): readonly Waiting[] {
+  get edits(): readonly UnsavedEdit[] {
     return this.waiting.map(({ edit }) => edit);
   }
 
@@ -39,7 +39,7 @@ export class Outbox {
   }
 
   /** The person changed something. */
-  edited(edit: Waiting): void {
+  edited(edit: UnsavedEdit): void {
     this.waiting.push({ edit, message: NOT_SENT });
   }
 
@@ -58,7 +58,7 @@ export class Outbox {
   }
 
   /** The first `count` messages of this socket are durable. Answers the edits that are so since. */
-  durable(count: number): Waiting[] {
+  durable(count: number): UnsavedEdit[] {
     const done = this.waiting.filter(({ message }) => message <= count);
     if (done.length > 0) this.waiting = this.waiting.filter(({ message }) => message > count);
     return done.map(({ edit }) => edit);

@@ -3,22 +3,22 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import { mapsOf } from "../graph/document-keys";
 import { addAction, rename, setGraphName } from "../graph/edit";
-import { FakeDevice } from "../testing/fake-device";
+import { FakeEditStore } from "../testing/fake-device";
 import { FakeServer } from "../testing/fake-server";
 import { applyDifference, differenceOf } from "./replaced-history";
-import { connect, type Room } from "./room-connection";
+import { connectRoom, type Room } from "./room-connection";
 
 const ADA = { id: "a", name: "Ada" };
 const MARI = { id: "m", name: "Mari" };
 
 let server: FakeServer;
-let device: FakeDevice;
+let device: FakeEditStore;
 const rooms: Room[] = [];
 
 beforeEach(() => {
   vi.useFakeTimers();
   server = new FakeServer();
-  device = new FakeDevice();
+  device = new FakeEditStore();
 });
 
 afterEach(() => {
@@ -30,7 +30,7 @@ afterEach(() => {
 const settle = () => vi.advanceTimersByTimeAsync(0);
 
 async function open(person = ADA, more: { epoch?: string; graph?: string } = {}): Promise<Room> {
-  const room = connect({
+  const room = connectRoom({
     url: "ws://host/room",
     open: server.open,
     random: () => 1,
@@ -339,7 +339,7 @@ test("whatever breaks when, and however often the page is closed, no edit that w
   await fc.assert(
     fc.asyncProperty(fc.array(deeds, { maxLength: 40 }), async (script) => {
       server = new FakeServer();
-      device = new FakeDevice();
+      device = new FakeEditStore();
       let room = await open();
       let mine: string[] = [];
       const isOpen = () => server.last.readyState === 1;

@@ -6,12 +6,12 @@
  */
 
 import {
-  type Batch,
-  type Device,
-  type Kept,
-  type Shelf,
-  UNNAMED,
-  type Waiting,
+  type CopyOwner,
+  type EditStore,
+  type StoredCopy,
+  type StoreWrite,
+  UNNAMED_EPOCH,
+  type UnsavedEdit,
 } from "./indexed-db";
 
 /** A device that has not answered by then is not waited for. */
@@ -21,16 +21,16 @@ const AGAIN_MS = 10_000;
 /** After so many updates the copy is written anew as a whole. */
 const TAIL = 200;
 
-export class Keeping {
+export class Persistence {
   /** Under which history all this is kept. */
-  epoch = UNNAMED;
+  epoch = UNNAMED_EPOCH;
   private readonly only: string | null;
-  private readonly device: Device;
-  private readonly shelf: Shelf;
+  private readonly device: EditStore;
+  private readonly owner: CopyOwner;
   private readonly onChange: () => void;
-  private waits: Waiting[] = [];
+  private waits: UnsavedEdit[] = [];
   private known: Uint8Array[] = [];
-  private durable: Waiting[] = [];
+  private durable: UnsavedEdit[] = [];
   private seq = 0;
   private tail = 0;
   private copy: (() => Uint8Array | null) | null = null;
@@ -41,11 +41,11 @@ export class Keeping {
   private closed = false;
 
   /** `only` this history, if it is given; else the one that was used last. */
-  constructor(device: Device, shelf: Shelf, only: string | null, onChange: () => void) {
+  constructor(device: EditStore, owner: CopyOwner, only: string | null, onChange: () => void) {
     this.device = device;
-    this.shelf = shelf;
+    this.owner = owner;
     this.only = only;
-    this.epoch = only ?? UNNAMED;
+    this.epoch = only ?? UNNAMED_EPOCH;
     this.onChange = onChange;
   }
 
@@ -55,11 +55,11 @@ export class Keeping {
   }
 
   /** The server has said which history this is: what was kept without a name moves there. */
-  name(epoch: string, waiting: () => readonly Waiting[]): void {
-    if (this.epoch === UNNAMED) void this.move(epoch, waiting);
+  name(epoch: string, waiting: () => readonly UnsavedEdit[]): void {
+    if (this.epoch === UNNAMED_EPOCH) void this.move(epoch, waiting);
   }
 
-  private async move(epoch: string, waiting: () => readonly Waiting[]): Promise<void> {
+  private async move(epoch: string, waiting: () => readonly UnsavedEdit[]): Promise<void> {
     while (this.writing !== null) await this.writing;
     this.epoch = epoch;
     this.waits = [...waiting()];
@@ -67,14 +67,14 @@ export class Keeping {
     this.flush();
     while (this.writing !== null) await this.writing;
     try {
-      if (this.opened && !this.failed) await this.device.forget(this.shelf, UNNAMED);
+      if (this.opened && !this.failed) await this.device.forget(this.owner, UNNAMED_EPOCH);
     } catch (error) {
       this.fail(error);
     }
   }
 
   /** What is kept; `late` is called when the device answers only after we went on without it. */
-  async load(late: (kept: Kept | null) => void): Promise<Kept | null> {
+  async load(late: (kept: StoredCopy | null) => void): Promise<StoredCopy | null> {
     let given = false;
     let timer: ReturnType<typeof setTimeout> | undefined;
     const reading = this.read();
@@ -90,11 +90,11 @@ export class Keeping {
     return kept;
   }
 
-  private async read(): Promise<Kept | null> {
+  private async read(): Promise<StoredCopy | null> {
     try {
-      const all = await this.device.read(this.shelf);
+      const all = await this.device.read(this.owner);
       // It may have been named meanwhile.
-      const only = this.epoch === UNNAMED ? this.only : this.epoch;
+      const only = this.epoch === UNNAMED_EPOCH ? this.only : this.epoch;
       const kept = (only === null ? all.at(-1) : all.find((each) => each.epoch === only)) ?? null;
       this.opened = true;
       this.epoch = kept?.epoch ?? this.epoch;
@@ -109,7 +109,7 @@ export class Keeping {
   }
 
   /** The person changed something. */
-  edited(edit: Waiting): void {
+  edited(edit: UnsavedEdit): void {
     this.waits.push(edit);
     this.flush();
   }
@@ -121,7 +121,7 @@ export class Keeping {
   }
 
   /** These edits are stored by the server. */
-  stored(edits: readonly Waiting[]): void {
+  stored(edits: readonly UnsavedEdit[]): void {
     this.durable.push(...edits);
     this.flush();
   }
@@ -142,7 +142,7 @@ export class Keeping {
     this.waits = [];
     this.known = [];
     this.durable = [];
-    if (this.opened) await this.device.forget(this.shelf, this.epoch);
+    if (this.opened) await this.device.forget(this.owner, this.epoch);
     this.opened = false;
   }
 
@@ -161,13 +161,13 @@ export class Keeping {
   private flush(): void {
     if (!this.opened || this.writing !== null) return;
     const batch = this.batch();
-    this.writing = this.device.write(this.shelf, this.epoch, batch).then(
+    this.writing = this.device.write(this.owner, this.epoch, batch).then(
       () => this.wrote(batch),
       (error: unknown) => this.lost(batch, error),
     );
   }
 
-  private batch(): Batch {
+  private batch(): StoreWrite {
     const { waits, known, durable, seq } = this;
     this.tail += known.length + durable.length;
     const copy = this.tail > TAIL ? (this.copy?.() ?? null) : null;
@@ -177,7 +177,7 @@ export class Keeping {
     return { waits: [...waits], known: copy === null ? known : [], durable, copy, seq };
   }
 
-  private wrote(batch: Batch): void {
+  private wrote(batch: StoreWrite): void {
     const written = new Set(batch.waits);
     this.writing = null;
     this.failed = false;
@@ -186,7 +186,7 @@ export class Keeping {
     this.onChange();
   }
 
-  private lost(batch: Batch, error: unknown): void {
+  private lost(batch: StoreWrite, error: unknown): void {
     this.writing = null;
     this.known.unshift(...batch.known);
     this.durable.unshift(...batch.durable);

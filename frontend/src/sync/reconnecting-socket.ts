@@ -5,8 +5,8 @@
  * said by close codes.
  */
 
-import * as frames from "./messages";
-import type { Admit, Socket, Why } from "./room";
+import * as messages from "./messages";
+import type { AdmissionCheck, RefusalReason, Socket } from "./room";
 
 /** The server says something at least every 15 s; a socket this silent is dead. */
 const SILENCE_MS = 30_000;
@@ -21,17 +21,17 @@ const OPEN = 1;
 /** The other end is dead, or speaks nonsense. */
 const BROKEN = 1006;
 
-export interface LineOptions {
+export interface ReconnectingSocketOptions {
   /** Where to, as it is at this attempt. */
   readonly url: () => string;
   readonly open: (url: string) => Socket;
   /** 0 … 1. */
   readonly random: () => number;
-  readonly admit: Admit | null;
+  readonly admit: AdmissionCheck | null;
 }
 
 /** Who speaks over the line. */
-export interface Speaker {
+export interface SocketHandler {
   /** Whether something waits to be sent: then a hidden page hurries too. */
   hasWork(): boolean;
   /** A question that any living server answers at once. */
@@ -42,16 +42,16 @@ export interface Speaker {
   /** The socket is gone, whatever comes next. */
   onDrop(): void;
   /** It is tried again by itself. */
-  onAway(why: Why | undefined): void;
+  onAway(why: RefusalReason | undefined): void;
   /** It is not tried again. */
-  onRefused(why: Why): void;
+  onRefused(why: RefusalReason): void;
 }
 
 type Phase = "connecting" | "live" | "away" | "refused" | "closed";
 
-export class Line {
-  private readonly options: LineOptions;
-  private readonly speaker: Speaker;
+export class ReconnectingSocket {
+  private readonly options: ReconnectingSocketOptions;
+  private readonly speaker: SocketHandler;
   private phase: Phase = "connecting";
   private socket: Socket | null = null;
   private heardAt = 0;
@@ -63,7 +63,7 @@ export class Line {
   private retry: ReturnType<typeof setTimeout> | undefined;
   private readonly watch: ReturnType<typeof setInterval>;
 
-  constructor(options: LineOptions, speaker: Speaker) {
+  constructor(options: ReconnectingSocketOptions, speaker: SocketHandler) {
     this.options = options;
     this.speaker = speaker;
     globalThis.addEventListener?.("online", this.onWake);
@@ -102,7 +102,7 @@ export class Line {
   }
 
   /** Ends it for a reason of our own, and does not try again. */
-  refuse(why: Why): void {
+  refuse(why: RefusalReason): void {
     this.drop();
     this.stop(why);
   }
@@ -116,7 +116,7 @@ export class Line {
     this.drop();
   }
 
-  private async knock(admit: Admit, turn: number): Promise<void> {
+  private async knock(admit: AdmissionCheck, turn: number): Promise<void> {
     const why = await admit(this.attempts > 0).catch(() => "nobody" as const);
     if (turn !== this.turn || this.phase === "closed") return;
     if (why === null) this.enter();
@@ -164,17 +164,20 @@ export class Line {
   private onClose(socket: Socket, code: number, reason = ""): void {
     if (socket !== this.socket) return;
     this.drop();
-    const refused = frames.refusedBy(code, reason);
+    const refused = messages.refusalOf(code, reason);
     if (refused !== undefined) this.stop(refused);
-    else this.stayAway(frames.PASSING.get(code) ?? (this.unopened > 1 ? "no-socket" : undefined));
+    else
+      this.stayAway(
+        messages.RETRIED_CLOSES.get(code) ?? (this.unopened > 1 ? "no-socket" : undefined),
+      );
   }
 
-  private stop(why: Why): void {
+  private stop(why: RefusalReason): void {
     this.phase = "refused";
     this.speaker.onRefused(why);
   }
 
-  private stayAway(why: Why | undefined): void {
+  private stayAway(why: RefusalReason | undefined): void {
     this.phase = "away";
     this.speaker.onAway(why);
     const hidden = globalThis.document?.visibilityState === "hidden";

@@ -20,29 +20,29 @@ import {
 import { together } from "../graph/edit/document-writes";
 import { same } from "../graph/equal";
 import { ENTRY, EXIT } from "../graph/model";
-import type { Kept, Waiting } from "./indexed-db";
+import type { StoredCopy, UnsavedEdit } from "./indexed-db";
 
 /** Plain values by key; `undefined` where the key is erased. */
-export type Difference = { readonly [R in Root]: ReadonlyMap<string, unknown> };
+export type DocumentDifference = { readonly [R in Root]: ReadonlyMap<string, unknown> };
 
 /** What an edit replaced: values by key, `undefined` where there was none. */
-export type Before = readonly (readonly [root: Root, key: string, value: unknown])[];
+export type ReplacedEntries = readonly (readonly [root: Root, key: string, value: unknown])[];
 
 /** Edits that wait, on a history that is no more the server's. */
-export interface Stranded {
+export interface StrandedEdits {
   readonly edits: number;
   /** When the last of them was made, in milliseconds since 1970. */
   readonly at: number;
   /** What they changed, by key, with the values that they gave. */
-  readonly difference: Difference;
+  readonly difference: DocumentDifference;
   /** The values that the first of them found there, as far as they are known. */
-  readonly before: Difference;
+  readonly before: DocumentDifference;
   /** The graph as it was here, with these edits. */
   readonly here: Maps;
 }
 
 /** Notes what the person's edits replace, while the document still knows it. */
-export class Replaced {
+export class ReplacedValues {
   private readonly doc: Y.Doc;
   private readonly ignore: unknown;
   private found: [Root, string, unknown][] = [];
@@ -57,7 +57,7 @@ export class Replaced {
   }
 
   /** What was replaced since this was asked last. */
-  take(): Before {
+  take(): ReplacedEntries {
     const found = this.found;
     this.found = [];
     return found;
@@ -73,17 +73,24 @@ export class Replaced {
   }
 }
 
-/** The edits of a copy that was kept on the device, as `strandedIn`. */
-export function strandedOf({ known, waiting }: Pick<Kept, "known" | "waiting">): Stranded {
+/** The edits of a copy that was kept on the device, as `strandedEditsIn`. */
+export function strandedEditsOf({
+  known,
+  waiting,
+}: Pick<StoredCopy, "known" | "waiting">): StrandedEdits {
   const doc = new Y.Doc();
   for (const update of known) Y.applyUpdate(doc, update);
   const before = mapsOf(doc);
   for (const { update } of waiting) Y.applyUpdate(doc, update);
-  return strandedIn(doc, waiting, before);
+  return strandedEditsIn(doc, waiting, before);
 }
 
 /** Whether a server with this state vector lacks something that was durable when we last heard. */
-export function wentBack(doc: Y.Doc, waiting: readonly Waiting[], server: Uint8Array): boolean {
+export function lacksKnownEdits(
+  doc: Y.Doc,
+  waiting: readonly UnsavedEdit[],
+  server: Uint8Array,
+): boolean {
   const known = Y.decodeStateVector(Y.encodeStateVector(doc));
   for (const { update } of waiting) {
     for (const [client, clock] of Y.parseUpdateMeta(update).from) {
@@ -95,7 +102,11 @@ export function wentBack(doc: Y.Doc, waiting: readonly Waiting[], server: Uint8A
 }
 
 /** What the waiting edits changed in the document. `base`: what it was before all of them. */
-export function strandedIn(doc: Y.Doc, waiting: readonly Waiting[], base?: Maps): Stranded {
+export function strandedEditsIn(
+  doc: Y.Doc,
+  waiting: readonly UnsavedEdit[],
+  base?: Maps,
+): StrandedEdits {
   const difference = mutable();
   for (const root of ROOTS) rootOf(doc, root); // makes them maps, also where nobody has looked yet
   for (const { update } of waiting) {
@@ -145,7 +156,7 @@ function note(
 }
 
 /** What has to change so that `before` becomes `after`. */
-export function differenceOf(before: Y.Doc, after: Y.Doc): Difference {
+export function differenceOf(before: Y.Doc, after: Y.Doc): DocumentDifference {
   const [old, now] = [mapsOf(before), mapsOf(after)];
   const difference = mutable();
   for (const root of ROOTS) {
@@ -163,7 +174,7 @@ export function differenceOf(before: Y.Doc, after: Y.Doc): Difference {
  * Makes the same changes here as one fresh edit. What belongs to actions that are not there is left
  * out, since nobody would see it. Answers how many keys changed.
  */
-export function applyDifference(doc: Y.Doc, difference: Difference): number {
+export function applyDifference(doc: Y.Doc, difference: DocumentDifference): number {
   const actions = rootOf(doc, "actions");
   const lives = (aid: string) =>
     difference.actions.has(aid) ? difference.actions.get(aid) !== undefined : actions.has(aid);

@@ -3,7 +3,7 @@ import * as encoding from "lib0/encoding";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import type * as Y from "yjs";
 import { FakeServer, statesSent } from "../testing/fake-server";
-import { connect, type Room, roomUrl, type Why } from "./room-connection";
+import { connectRoom, type RefusalReason, type Room, roomUrl } from "./room-connection";
 
 let server: FakeServer;
 let room: Room;
@@ -11,7 +11,7 @@ let room: Room;
 beforeEach(() => {
   vi.useFakeTimers();
   server = new FakeServer();
-  room = connect({ url: "ws://host/api/graphs/g/room", open: server.open, random: () => 1 });
+  room = connectRoom({ url: "ws://host/api/graphs/g/room", open: server.open, random: () => 1 });
 });
 
 afterEach(() => {
@@ -107,7 +107,7 @@ test("whatever breaks when, nothing is called saved that the server lacks, and i
   fc.assert(
     fc.property(fc.array(deeds, { maxLength: 40 }), (script) => {
       const server = new FakeServer();
-      const room = connect({ url: "ws://host/room", open: server.open, random: () => 1 });
+      const room = connectRoom({ url: "ws://host/room", open: server.open, random: () => 1 });
       const isOpen = () => server.last.readyState === 1;
       const mine: string[] = [];
       script.forEach((deed, n) => {
@@ -205,7 +205,7 @@ function stage() {
   vi.stubGlobal("addEventListener", listen);
   vi.stubGlobal("document", { ...document, removeEventListener: vi.fn() });
   vi.stubGlobal("removeEventListener", vi.fn());
-  const other = connect({ url: "ws://host/room", open: server.open, random: () => 1 });
+  const other = connectRoom({ url: "ws://host/room", open: server.open, random: () => 1 });
   return {
     other,
     happens: (kind: string) => listeners.get(kind)?.(),
@@ -270,7 +270,7 @@ test("reconnects are spread over half of the time, so that a thousand do not com
     [1, 300],
   ] as const) {
     const own = new FakeServer();
-    const other = connect({ url: "ws://host/room", open: own.open, random: () => random });
+    const other = connectRoom({ url: "ws://host/room", open: own.open, random: () => random });
     own.last.end(1006);
     vi.advanceTimersByTime(expected - 1);
     expect(own.sockets.length).toBe(1);
@@ -281,10 +281,14 @@ test("reconnects are spread over half of the time, so that a thousand do not com
 });
 
 test("a room asks at the door before each attempt, and stays away with the reason", async () => {
-  const answers: (Why | null | Error)[] = [new Error("nobody answers"), null, "other-person"];
+  const answers: (RefusalReason | null | Error)[] = [
+    new Error("nobody answers"),
+    null,
+    "other-person",
+  ];
   const asked: boolean[] = [];
   const own = new FakeServer();
-  const other = connect({
+  const other = connectRoom({
     url: "ws://host/room",
     open: own.open,
     random: () => 1,
@@ -451,7 +455,7 @@ test("a server that lets in but opens no socket is told from one that does not a
     if (!answers) throw new Error("nobody answers");
     return null;
   };
-  const other = connect({ url: "ws://h/room", open: server.open, random: () => 1, admit });
+  const other = connectRoom({ url: "ws://h/room", open: server.open, random: () => 1, admit });
   const settle = () => vi.advanceTimersByTimeAsync(20_000);
   await vi.advanceTimersByTimeAsync(0);
   server.last.end(1006);

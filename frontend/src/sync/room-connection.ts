@@ -16,47 +16,60 @@ import * as awarenessProtocol from "y-protocols/awareness";
 import { Awareness, removeAwarenessStates } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
-import { Watchman } from "./fingerprint";
-import { browser, epochName, freshId, type Kept, type Waiting } from "./indexed-db";
-import * as frames from "./messages";
+import { FingerprintCheck } from "./fingerprint";
+import { browserStore, epochName, freshId, type StoredCopy, type UnsavedEdit } from "./indexed-db";
+import * as messages from "./messages";
 import { Outbox } from "./outbox";
-import { Keeping } from "./persistence";
-import { Line, type Speaker } from "./reconnecting-socket";
-import { type Before, Replaced, type Stranded, strandedIn, wentBack } from "./replaced-history";
-import type { ConnectOptions, Keep, Link, Room, Socket, Why } from "./room";
+import { Persistence } from "./persistence";
+import { ReconnectingSocket, type SocketHandler } from "./reconnecting-socket";
+import {
+  lacksKnownEdits,
+  type ReplacedEntries,
+  ReplacedValues,
+  type StrandedEdits,
+  strandedEditsIn,
+} from "./replaced-history";
+import type {
+  PersistenceOptions,
+  RefusalReason,
+  Room,
+  RoomLink,
+  RoomOptions,
+  Socket,
+} from "./room";
 
 export * from "./room";
 
 /** Above this, edits that wait travel one by one; a message may have 1 MiB. */
 const LARGE = 1 << 19;
 
-type Change = Partial<Omit<Link, "why" | "readOnly">> & {
-  why?: Why | undefined;
+type LinkChange = Partial<Omit<RoomLink, "why" | "readOnly">> & {
+  why?: RefusalReason | undefined;
   readOnly?: string | undefined;
 };
 
-const madeNow = (update: Uint8Array, before: Before): Waiting => ({
+const madeNow = (update: Uint8Array, before: ReplacedEntries): UnsavedEdit => ({
   id: freshId(),
   update,
   at: Date.now(),
   before,
 });
 
-export function connect(options: ConnectOptions): Room {
+export function connectRoom(options: RoomOptions): Room {
   return new Connection(options);
 }
 
-class Connection implements Room, Speaker {
+class Connection implements Room, SocketHandler {
   readonly doc: Y.Doc;
   readonly awareness: Awareness;
   private readonly address: string;
   private readonly outbox = new Outbox();
   private readonly listeners = new Set<() => void>();
-  private readonly keeping: Keeping | null;
-  private readonly replaced: Replaced;
-  private readonly watchman: Watchman;
-  private readonly line: Line;
-  private current: Link = { state: "connecting", unsaved: 0, seq: 0 };
+  private readonly persistence: Persistence | null;
+  private readonly replaced: ReplacedValues;
+  private readonly fingerprintCheck: FingerprintCheck;
+  private readonly socket: ReconnectingSocket;
+  private current: RoomLink = { state: "connecting", unsaved: 0, seq: 0 };
   /** The history that this document belongs to; empty while nobody has said. */
   private epoch = "";
   private told = "";
@@ -64,15 +77,15 @@ class Connection implements Room, Speaker {
   /** Whether the page shows more than the entry of the log that the server named last. */
   private isAhead = false;
 
-  constructor(options: ConnectOptions) {
+  constructor(options: RoomOptions) {
     this.doc = options.doc ?? new Y.Doc();
     this.awareness = new Awareness(this.doc);
     this.address = options.url;
-    this.replaced = new Replaced(this.doc, this);
+    this.replaced = new ReplacedValues(this.doc, this);
     this.doc.on("update", this.onUpdate);
     this.awareness.on("update", this.onAwareness);
-    this.watchman = new Watchman(this.doc, this.atRest);
-    this.line = new Line(
+    this.fingerprintCheck = new FingerprintCheck(this.doc, this.atRest);
+    this.socket = new ReconnectingSocket(
       {
         url: () => this.url(),
         open: options.open ?? ((address) => new WebSocket(address) as unknown as Socket),
@@ -81,13 +94,13 @@ class Connection implements Room, Speaker {
       },
       this,
     );
-    this.keeping = options.keep ? this.keepingOf(options.keep) : null;
-    if (this.keeping !== null) void this.recall(this.keeping);
-    else this.line.dial();
+    this.persistence = options.keep ? this.keepingOf(options.keep) : null;
+    if (this.persistence !== null) void this.recall(this.persistence);
+    else this.socket.dial();
   }
 
   // Bound, so that they can be handed to `useSyncExternalStore`.
-  readonly link = (): Link => this.current;
+  readonly link = (): RoomLink => this.current;
 
   readonly onLink = (listener: () => void): (() => void) => {
     this.listeners.add(listener);
@@ -117,7 +130,7 @@ class Connection implements Room, Speaker {
   reconnect(): void {
     if (this.closed) return;
     this.say({ state: "connecting", why: undefined });
-    this.line.redial();
+    this.socket.redial();
   }
 
   close(): void {
@@ -127,32 +140,32 @@ class Connection implements Room, Speaker {
     this.doc.off("update", this.onUpdate);
     this.awareness.off("update", this.onAwareness);
     this.replaced.close();
-    this.watchman.close();
-    this.line.close();
+    this.fingerprintCheck.close();
+    this.socket.close();
     this.awareness.destroy();
-    this.keeping?.close();
+    this.persistence?.close();
     this.say({ state: "offline" });
   }
 
   histories(): { readonly here: string; readonly theirs: string } {
-    return { here: this.keeping?.epoch ?? this.epoch, theirs: this.told };
+    return { here: this.persistence?.epoch ?? this.epoch, theirs: this.told };
   }
 
-  stranded(): Stranded | null {
+  stranded(): StrandedEdits | null {
     const { edits } = this.outbox;
-    return edits.length === 0 ? null : strandedIn(this.doc, edits);
+    return edits.length === 0 ? null : strandedEditsIn(this.doc, edits);
   }
 
   async forget(): Promise<void> {
-    await this.keeping?.forget();
+    await this.persistence?.forget();
     this.outbox.clear();
     this.say({ unsaved: 0 });
   }
 
-  private say(change: Change): void {
+  private say(change: LinkChange): void {
     const { why, readOnly, ...rest } = { ...this.current, ...change };
-    const kept = this.keeping && { kept: this.keeping.kept };
-    const next: Link = { ...rest, ...kept, ...(why && { why }), ...(readOnly && { readOnly }) };
+    const kept = this.persistence && { kept: this.persistence.kept };
+    const next: RoomLink = { ...rest, ...kept, ...(why && { why }), ...(readOnly && { readOnly }) };
     const old = this.current;
     if (
       old.state === next.state &&
@@ -170,23 +183,28 @@ class Connection implements Room, Speaker {
 
   // -- the device -----------------------------------------------------------------------------
 
-  private keepingOf({ device = browser(), graph, person, epoch }: Keep): Keeping {
-    return new Keeping(device, { graph, person }, epoch ?? null, () => this.say({}));
+  private keepingOf({
+    device = browserStore(),
+    graph,
+    person,
+    epoch,
+  }: PersistenceOptions): Persistence {
+    return new Persistence(device, { graph, person }, epoch ?? null, () => this.say({}));
   }
 
-  private async recall(keeping: Keeping): Promise<void> {
-    const kept = await keeping.load((late) => {
+  private async recall(persistence: Persistence): Promise<void> {
+    const kept = await persistence.load((late) => {
       if (this.closed || late === null) return;
       this.adopt(late);
-      if (late.waiting.length > 0) this.line.redial(); // so that they go the usual way
+      if (late.waiting.length > 0) this.socket.redial(); // so that they go the usual way
     });
     if (this.closed) return;
-    this.epoch = epochName(keeping.epoch);
+    this.epoch = epochName(persistence.epoch);
     if (kept !== null) this.adopt(kept);
-    this.line.dial();
+    this.socket.dial();
   }
 
-  private adopt({ known, waiting, seq }: Kept): void {
+  private adopt({ known, waiting, seq }: StoredCopy): void {
     this.doc.transact(() => {
       for (const update of known) Y.applyUpdate(this.doc, update, this);
       for (const { update } of waiting) Y.applyUpdate(this.doc, update, this);
@@ -220,23 +238,23 @@ class Connection implements Room, Speaker {
   }
 
   probe(): Uint8Array<ArrayBuffer> {
-    return frames.question(this.doc);
+    return messages.syncStep1(this.doc);
   }
 
   onOpen(): void {
     this.outbox.fresh();
     this.say({ readOnly: undefined });
-    this.line.send(frames.question(this.doc));
+    this.socket.send(messages.syncStep1(this.doc));
     // The others saw us go: only a newer clock brings us back.
     const state = this.awareness.getLocalState();
     if (state !== null) this.awareness.setLocalState(state);
   }
 
-  onAway(why: Why | undefined): void {
+  onAway(why: RefusalReason | undefined): void {
     this.say({ state: "offline", why });
   }
 
-  onRefused(why: Why): void {
+  onRefused(why: RefusalReason): void {
     this.say({ state: "refused", why });
   }
 
@@ -256,34 +274,34 @@ class Connection implements Room, Speaker {
 
   private take(decoder: decoding.Decoder): void {
     switch (decoding.readVarUint(decoder)) {
-      case frames.SYNC:
+      case messages.SYNC:
         this.takeSync(decoder);
         break;
-      case frames.AWARENESS: {
+      case messages.AWARENESS: {
         const update = decoding.readVarUint8Array(decoder);
         awarenessProtocol.applyAwarenessUpdate(this.awareness, update, this);
         break;
       }
-      case frames.QUERY_AWARENESS:
+      case messages.QUERY_AWARENESS:
         this.sendAwareness();
         break;
-      case frames.ACK: {
+      case messages.ACK: {
         const stored = this.outbox.durable(decoding.readVarUint(decoder));
         const seq = decoding.readVarUint(decoder);
-        if (stored.length > 0) this.keeping?.stored(stored);
-        this.keeping?.shows(seq, this.copy);
+        if (stored.length > 0) this.persistence?.stored(stored);
+        this.persistence?.shows(seq, this.copy);
         this.isAhead = false;
         this.say({ unsaved: this.outbox.unsaved, seq });
-        this.watchman.stir();
+        this.fingerprintCheck.stir();
         break;
       }
-      case frames.COMPARE:
-        if (this.watchman.differs(decoder)) this.line.refuse("differs");
+      case messages.COMPARE:
+        if (this.fingerprintCheck.differs(decoder)) this.socket.refuse("differs");
         break;
-      case frames.READ_ONLY:
+      case messages.READ_ONLY:
         this.say({ readOnly: decoding.readVarString(decoder) });
         break;
-      case frames.EPOCH:
+      case messages.EPOCH:
         this.named(decoding.readVarString(decoder));
         break;
     }
@@ -294,12 +312,13 @@ class Connection implements Room, Speaker {
     const content = decoding.readVarUint8Array(decoder);
     switch (step) {
       case sync.messageYjsSyncStep1:
-        if (wentBack(this.doc, this.outbox.edits, content)) this.line.refuse("other-epoch");
+        if (lacksKnownEdits(this.doc, this.outbox.edits, content))
+          this.socket.refuse("other-epoch");
         else this.give(content);
         break;
       case sync.messageYjsSyncStep2:
         this.learn(content);
-        this.line.arrived();
+        this.socket.arrived();
         this.isAhead = false;
         this.say({ state: "live", why: undefined });
         break;
@@ -315,7 +334,7 @@ class Connection implements Room, Speaker {
     this.told = epoch;
     if (this.epoch !== "") return;
     this.epoch = epoch;
-    this.keeping?.name(epoch, () => this.outbox.edits);
+    this.persistence?.name(epoch, () => this.outbox.edits);
   }
 
   /** What is shown, when everything of it is the log up to `seq` and nothing else. */
@@ -325,12 +344,12 @@ class Connection implements Room, Speaker {
   } | null => {
     const { state, unsaved, seq } = this.current;
     if (state !== "live" || unsaved > 0 || seq === 0) return null;
-    return { seq, send: (frame) => this.line.send(frame) };
+    return { seq, send: (frame) => this.socket.send(frame) };
   };
 
   private learn(update: Uint8Array): void {
     Y.applyUpdate(this.doc, update, this);
-    this.keeping?.learned(update);
+    this.persistence?.learned(update);
   }
 
   // -- what goes out --------------------------------------------------------------------------
@@ -341,14 +360,14 @@ class Connection implements Room, Speaker {
     const edits = this.outbox.edits;
     if (whole.length <= LARGE || edits.length === 0) {
       this.outbox.sentAll();
-      this.line.send(frames.answer(whole));
+      this.socket.send(messages.syncStep2(whole));
       return;
     }
     this.outbox.sentSome(0);
-    this.line.send(frames.answer(frames.NOTHING));
+    this.socket.send(messages.syncStep2(messages.EMPTY_UPDATE));
     edits.forEach(({ update }, n) => {
       this.outbox.sentSome(n + 1);
-      this.line.send(frames.change(update));
+      this.socket.send(messages.updateMessage(update));
     });
   }
 
@@ -361,13 +380,13 @@ class Connection implements Room, Speaker {
     if (origin === this) return;
     if (transaction.local) {
       const edit = madeNow(update, this.replaced.take());
-      this.keeping?.edited(edit);
+      this.persistence?.edited(edit);
       this.outbox.edited(edit);
     }
     // Until the room asked for what it lacks, everything travels with that answer, in order.
-    if (this.outbox.answered && this.line.isOpen) {
+    if (this.outbox.answered && this.socket.isOpen) {
       this.outbox.sentAll();
-      this.line.send(frames.change(update));
+      this.socket.send(messages.updateMessage(update));
     }
     this.say({ unsaved: this.outbox.unsaved });
   };
@@ -381,6 +400,6 @@ class Connection implements Room, Speaker {
   };
 
   private sendAwareness(): void {
-    this.line.send(frames.presence(this.awareness));
+    this.socket.send(messages.awarenessMessage(this.awareness));
   }
 }

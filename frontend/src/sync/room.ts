@@ -3,11 +3,11 @@
 import type { Awareness } from "y-protocols/awareness";
 import type * as Y from "yjs";
 import { here } from "../api/page-url";
-import type { Device, Shelf } from "./indexed-db";
-import type { Stranded } from "./replaced-history";
+import type { CopyOwner, EditStore } from "./indexed-db";
+import type { StrandedEdits } from "./replaced-history";
 
 /** Why a room does not let this page in, or let it go. */
-export type Why =
+export type RefusalReason =
   | "session-ended"
   | "other-person"
   | "forbidden"
@@ -21,10 +21,10 @@ export type Why =
   | "too-slow"
   | "no-socket";
 
-export interface Link {
+export interface RoomLink {
   /** `refused` does not come back by itself: see `why` and `reconnect`. */
   readonly state: "connecting" | "live" | "offline" | "refused";
-  readonly why?: Why;
+  readonly why?: RefusalReason;
   /** Edits of this person that are not durable yet. */
   readonly unsaved: number;
   /** Whether those edits survive closing this page. Absent for a room that keeps nothing. */
@@ -39,7 +39,7 @@ export interface Room {
   readonly doc: Y.Doc;
   readonly awareness: Awareness;
   /** The same object until something of it changes. */
-  link(): Link;
+  link(): RoomLink;
   onLink(listener: () => void): () => void;
   /** Resolves with `seq` once everything is stored; rejects when the room closes or `signal` aborts. */
   settled(signal?: AbortSignal): Promise<number>;
@@ -48,7 +48,7 @@ export interface Room {
   /** Which history is kept here, and which one the server named last; empty when none is known. */
   histories(): { readonly here: string; readonly theirs: string };
   /** The edits that are not durable, as values; null when there are none. */
-  stranded(): Stranded | null;
+  stranded(): StrandedEdits | null;
   /** Forgets everything kept here of this history, edits that wait included. */
   forget(): Promise<void>;
   /** Leaves the room. Edits that were not stored stay in `doc`, and on the device if there is one. */
@@ -67,7 +67,7 @@ export interface Socket {
   close(code?: number): void;
 }
 
-export interface ConnectOptions {
+export interface RoomOptions {
   /** `wss://host/api/graphs/ID/room`; `roomUrl` makes it. */
   readonly url: string;
   readonly doc?: Y.Doc;
@@ -76,20 +76,20 @@ export interface ConnectOptions {
   /** 0 … 1, for the spread of reconnects. */
   readonly random?: () => number;
   /** Keeps the graph and the edits that wait on this device, for this person only. */
-  readonly keep?: Keep;
+  readonly keep?: PersistenceOptions;
   /**
    * Asked before each attempt: why not to come in, or null. A browser cannot tell a refused upgrade
    * from a dead server, nor whose cookie an upgrade carries. `again` after an attempt or a connection broke off.
    * Throwing means that nobody answers.
    */
-  readonly admit?: Admit;
+  readonly admit?: AdmissionCheck;
 }
 
-export type Admit = (again: boolean) => Promise<Why | null>;
+export type AdmissionCheck = (again: boolean) => Promise<RefusalReason | null>;
 
-export interface Keep extends Shelf {
+export interface PersistenceOptions extends CopyOwner {
   /** The browser's storage by default. */
-  readonly device?: Device;
+  readonly device?: EditStore;
   /** Only this history: what is kept of others stays where it is and is not shown. */
   readonly epoch?: string;
 }

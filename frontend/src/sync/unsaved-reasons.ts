@@ -1,10 +1,10 @@
 /** Why edits are not saved, in sentences for people. */
 
 import type { OtherPerson } from "./indexed-db";
-import type { Link, Why } from "./room-connection";
+import type { RefusalReason, RoomLink } from "./room-connection";
 
 /** What is with the edits that wait, or with the room; null when everything is saved. */
-export function whyNot(link: Link): string | null {
+export function unsavedReason(link: RoomLink): string | null {
   const edits = changes(link.unsaved);
   const keeps = link.unsaved === 0 ? "" : ` ${where(link)}`;
   switch (link.state) {
@@ -23,7 +23,7 @@ export function whyNot(link: Link): string | null {
 }
 
 /** Whose edits wait on this device until they sign in again; null when nobody's do. */
-export function othersWait(others: readonly OtherPerson[]): string | null {
+export function otherPeopleWait(others: readonly OtherPerson[]): string | null {
   if (others.length === 0) return null;
   const parts = others.map(({ name, waiting }) => `${changes(waiting)} of ${name || "a guest"}`);
   const [only] = others;
@@ -31,7 +31,7 @@ export function othersWait(others: readonly OtherPerson[]): string | null {
   return `${parts.join(" and ")} ${one ? "waits" : "wait"} on this device until they sign in again.`;
 }
 
-const refusals: Readonly<Record<Why, string>> = {
+const refusals: Readonly<Record<RefusalReason, string>> = {
   "session-ended": "You are signed out.",
   "other-person": "Somebody else is signed in in this browser now.",
   forbidden: "You may look at this graph, not change it.",
@@ -47,7 +47,7 @@ const refusals: Readonly<Record<Why, string>> = {
     "The server answers, but no live connection to it opens: a proxy in between may not pass WebSockets on.",
 };
 
-function where(link: Link): string {
+function where(link: RoomLink): string {
   const edits = changes(link.unsaved);
   const [wait, survive] = link.unsaved === 1 ? ["waits", "survives"] : ["wait", "survive"];
   return link.kept

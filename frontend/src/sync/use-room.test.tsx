@@ -3,15 +3,14 @@ import { act, StrictMode } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { addAction, rename } from "../graph/edit";
-import { FakeDevice } from "../testing/fake-device";
+import { FakeEditStore } from "../testing/fake-device";
 import { FakeServer } from "../testing/fake-server";
-import type { Keep } from "./room-connection";
+import type { PersistenceOptions } from "./room-connection";
 import {
-  type Choice,
   type OpenRoom,
   type OthersWaiting,
   RoomProvider,
-  useChoice,
+  type StrandedEditsChoice,
   useEditors,
   useFollowing,
   useGraph,
@@ -20,6 +19,7 @@ import {
   useOthersWaiting,
   usePeople,
   useRoom,
+  useStrandedEdits,
   useUndo,
 } from "./use-room";
 
@@ -132,13 +132,13 @@ test("leaving and changing the graph close the room that was open", async () => 
   expect(second.readyState).toBe(3);
 });
 
-let choice: Choice | null;
+let choice: StrandedEditsChoice | null;
 let left: OthersWaiting;
 let goAfter: (client: number | null) => void;
 
 function Together() {
   open = useRoom();
-  choice = useChoice();
+  choice = useStrandedEdits();
   const { state, unsaved } = useLink();
   const names = useGraph().actions.map((action) => action.name);
   const editors = useEditors("k|name").map((person) => person.name);
@@ -153,7 +153,7 @@ function Together() {
 
 const flush = () => act(() => new Promise((done) => setTimeout(done, 5)));
 
-async function showKept(keep: Keep) {
+async function showKept(keep: PersistenceOptions) {
   vi.stubGlobal("fetch", async () => Response.json({ person: keep.person }));
   act(() =>
     root.render(
@@ -176,7 +176,7 @@ const ADA = { id: "a", name: "Ada" };
 const MARI = { id: "m", name: "Mari" };
 
 test("a page knows who edits a field, where somebody looks, and whose edits wait here", async () => {
-  const device = new FakeDevice();
+  const device = new FakeEditStore();
   await showKept({ graph: "g", person: MARI, device });
   act(() => void addAction(open.doc, { name: "Scan" }));
   await leave();
@@ -192,7 +192,7 @@ test("a page knows who edits a field, where somebody looks, and whose edits wait
 });
 
 test("what another person left on this device can be read and let go, and is never sent", async () => {
-  const device = new FakeDevice();
+  const device = new FakeEditStore();
   await showKept({ graph: "g", person: MARI, device });
   act(() => void addAction(open.doc, { name: "Scan" }));
   await leave();
@@ -210,7 +210,7 @@ test("what another person left on this device can be read and let go, and is nev
 
 test("edits on a history that the server left are made again there, or dropped, as the person says", async () => {
   for (const decision of ["apply", "drop"] as const) {
-    const device = new FakeDevice();
+    const device = new FakeEditStore();
     server = new FakeServer("one");
     await showKept({ graph: "g", person: ADA, device });
     await heard(() => void server.accept());
@@ -226,7 +226,7 @@ test("edits on a history that the server left are made again there, or dropped, 
     await flush();
     expect(text()).toBe("live 0");
     expect(choice?.stranded.edits).toBe(1);
-    const { stranded } = choice as Choice;
+    const { stranded } = choice as StrandedEditsChoice;
     await act(async () => {
       await (decision === "apply" ? choice?.apply(stranded.difference) : choice?.drop());
     });

@@ -13,31 +13,35 @@ import {
 } from "react";
 import { same } from "../graph/equal";
 import { EMPTY_GRAPH, type Graph } from "../graph/model";
-import { type Notice, type Stay, Visit } from "./graph-connection";
-import { browser, type OtherPerson } from "./indexed-db";
+import {
+  type ConnectionNotice,
+  GraphConnection,
+  type GraphConnectionState,
+} from "./graph-connection";
+import { browserStore, type OtherPerson } from "./indexed-db";
 import type { OpenRoom } from "./open-room";
-import type { Person } from "./presence/presence";
-import { type Stranded, strandedOf } from "./replaced-history";
-import type { Keep, Link } from "./room-connection";
+import type { Participant } from "./presence/presence";
+import { type StrandedEdits, strandedEditsOf } from "./replaced-history";
+import type { PersistenceOptions, RoomLink } from "./room-connection";
 
 export type { OpenRoom } from "./open-room";
 
 /** What there is to decide about edits that wait on a history which the server has left. */
-export interface Choice {
-  readonly stranded: Stranded;
+export interface StrandedEditsChoice {
+  readonly stranded: StrandedEdits;
   /** Makes these of the changes in the graph as it is now, and lets go of the rest once stored. */
-  apply(chosen: Stranded["difference"]): Promise<number>;
+  apply(chosen: StrandedEdits["difference"]): Promise<number>;
   /** Lets go of the edits. */
   drop(): Promise<void>;
 }
 
-interface Held {
-  readonly visit: Visit;
-  readonly stay: Stay;
-  readonly keep: Keep | undefined;
+interface RoomContextValue {
+  readonly connection: GraphConnection;
+  readonly connectionState: GraphConnectionState;
+  readonly keep: PersistenceOptions | undefined;
 }
 
-const RoomContext = createContext<Held | null>(null);
+const RoomContext = createContext<RoomContextValue | null>(null);
 
 /**
  * Keeps the room at `url` open as long as it is shown. Children see it through the hooks below.
@@ -50,31 +54,35 @@ export function RoomProvider({
   children,
 }: {
   readonly url: string;
-  readonly keep?: Keep;
+  readonly keep?: PersistenceOptions;
   /** Shown for the moment in which the room is made. */
   readonly fallback?: ReactNode;
   readonly children: ReactNode;
 }) {
-  const keep = useSteady(given);
-  const [held, setHeld] = useState<Held | null>(null);
+  const keep = useStablePersistence(given);
+  const [roomContext, setHeld] = useState<RoomContextValue | null>(null);
   useEffect(() => {
-    const visit = new Visit({ url, ...(keep && { keep }) });
-    const show = () => setHeld({ visit, stay: visit.now(), keep });
-    const stop = visit.onChange(show);
+    const connection = new GraphConnection({ url, ...(keep && { keep }) });
+    const show = () => setHeld({ connection, connectionState: connection.now(), keep });
+    const stop = connection.onChange(show);
     show();
     return () => {
       stop();
-      visit.leave();
+      connection.leave();
       setHeld(null);
     };
   }, [url, keep]);
-  useBeforeLeaving(held);
-  return held === null ? fallback : <RoomContext value={held}>{children}</RoomContext>;
+  useBeforeLeaving(roomContext);
+  return roomContext === null ? (
+    fallback
+  ) : (
+    <RoomContext value={roomContext}>{children}</RoomContext>
+  );
 }
 
 /** Asks before the page is closed, when something would be lost by that. */
-function useBeforeLeaving(held: Held | null): void {
-  const open = held?.stay.open;
+function useBeforeLeaving(roomContext: RoomContextValue | null): void {
+  const open = roomContext?.connectionState.open;
   useEffect(() => {
     const onLeave = (event: BeforeUnloadEvent) => {
       const link = open?.room.link();
@@ -86,7 +94,9 @@ function useBeforeLeaving(held: Held | null): void {
 }
 
 /** The same object as long as graph and person are the same; the name in it is the newest. */
-function useSteady(keep: Keep | undefined): Keep | undefined {
+function useStablePersistence(
+  keep: PersistenceOptions | undefined,
+): PersistenceOptions | undefined {
   const { graph, device, person } = keep ?? {};
   const id = person?.id;
   const name = useRef("");
@@ -103,20 +113,20 @@ function useSteady(keep: Keep | undefined): Keep | undefined {
   }, [graph, device, id]);
 }
 
-function useHeld(): Held {
-  const held = useContext(RoomContext);
-  if (held === null) throw new Error("useRoom needs a RoomProvider around it");
-  return held;
+function useRoomContext(): RoomContextValue {
+  const roomContext = useContext(RoomContext);
+  if (roomContext === null) throw new Error("useRoom needs a RoomProvider around it");
+  return roomContext;
 }
 
 /** The room around this component. */
 export function useRoom(): OpenRoom {
-  return useHeld().stay.open;
+  return useRoomContext().connectionState.open;
 }
 
 /** The name of the person at this page; empty in a room that keeps nothing. */
 export function useMyName(): string {
-  return useHeld().keep?.person.name ?? "";
+  return useRoomContext().keep?.person.name ?? "";
 }
 
 /** The graph now. Actions and relations that did not change are the same objects as before. */
@@ -126,8 +136,8 @@ export function useGraph(): Graph {
 }
 
 /** The graph for what stands beside the canvas: own edits at once, those of others some times a second. */
-export function useCalmGraph(): Graph {
-  const { source, calm } = useRoom();
+export function useThrottledGraph(): Graph {
+  const { source, throttled: calm } = useRoom();
   return useSyncExternalStore(calm.onGraph, source.graph, () => EMPTY_GRAPH);
 }
 
@@ -139,36 +149,36 @@ export function useGraphPart<T>(part: (graph: Graph) => T): T {
 }
 
 /** How the page stands with the server, and how many edits are not stored yet. */
-export function useLink(): Link {
+export function useLink(): RoomLink {
   const { room, onLink } = useRoom();
   return useSyncExternalStore(onLink, room.link);
 }
 
 /** The link, as old as the calm graph where only its place in the log is another. */
-export function useCalmLink(): Link {
-  const { room, calm } = useRoom();
+export function useThrottledLink(): RoomLink {
+  const { room, throttled: calm } = useRoom();
   return useSyncExternalStore(calm.onLink, room.link);
 }
 
 /** One thing of the link; draws again only when it is another. */
-export function useLinkPart<T>(part: (link: Link) => T): T {
+export function useLinkPart<T>(part: (link: RoomLink) => T): T {
   const { room, onLink } = useRoom();
   return useSyncExternalStore(onLink, () => part(room.link()));
 }
 
 /** The others in the room. */
-export function usePeople(): readonly Person[] {
+export function usePeople(): readonly Participant[] {
   const { presence } = useRoom();
   return useSyncExternalStore(presence.onPeople, presence.people);
 }
 
 /** Somebody at a field: who they are, and nothing that changes while they are there. */
-export type Editing = Pick<Person, "client" | "id" | "name">;
+export type FieldEditor = Pick<Participant, "client" | "id" | "name">;
 
-const NO_EDITORS: readonly Editing[] = [];
+const NO_EDITORS: readonly FieldEditor[] = [];
 
 /** The others who edit one field, `<key>|<field>`; draws again only when somebody comes or goes. */
-export function useEditors(field: string): readonly Editing[] {
+export function useEditors(field: string): readonly FieldEditor[] {
   const { presence } = useRoom();
   const last = useRef(NO_EDITORS);
   return useSyncExternalStore(presence.onPeople, () => {
@@ -190,24 +200,27 @@ export function useFollowing() {
 }
 
 /** What there is to decide about edits that wait on another history; null when nothing is. */
-export function useChoice(): Choice | null {
-  const { visit, stay } = useHeld();
-  const [stranded] = stay.stranded;
+export function useStrandedEdits(): StrandedEditsChoice | null {
+  const { connection, connectionState } = useRoomContext();
+  const [stranded] = connectionState.stranded;
   return useMemo(() => {
     if (stranded === undefined) return null;
     return {
       stranded,
-      apply: (chosen) => visit.apply(stranded, chosen),
-      drop: () => visit.drop(stranded),
+      apply: (chosen) => connection.apply(stranded, chosen),
+      drop: () => connection.drop(stranded),
     };
-  }, [visit, stranded]);
+  }, [connection, stranded]);
 }
 
 /** What may be said softly about this room, until it was read. */
-export function useNotice(): { readonly notice: Notice; dismiss(): void } | null {
-  const { visit, stay } = useHeld();
-  const { notice } = stay;
-  return useMemo(() => notice && { notice, dismiss: () => visit.dismiss() }, [visit, notice]);
+export function useNotice(): { readonly notice: ConnectionNotice; dismiss(): void } | null {
+  const { connection, connectionState } = useRoomContext();
+  const { notice } = connectionState;
+  return useMemo(
+    () => notice && { notice, dismiss: () => connection.dismiss() },
+    [connection, notice],
+  );
 }
 
 const NOBODY: readonly OtherPerson[] = [];
@@ -216,15 +229,15 @@ const NOBODY: readonly OtherPerson[] = [];
 export interface OthersWaiting {
   readonly others: readonly OtherPerson[];
   /** What somebody changed, to save it as a file; never to send it. */
-  read(id: string): Promise<readonly Stranded[]>;
+  read(id: string): Promise<readonly StrandedEdits[]>;
   /** Lets go of somebody's edits for good. */
   forget(id: string): Promise<void>;
 }
 
 export function useOthersWaiting(): OthersWaiting {
-  const { keep } = useHeld();
+  const { keep } = useRoomContext();
   const [others, setOthers] = useState(NOBODY);
-  const device = keep && (keep.device ?? browser());
+  const device = keep && (keep.device ?? browserStore());
   useEffect(() => {
     if (keep === undefined || device === undefined) return;
     let gone = false;
@@ -244,11 +257,11 @@ export function useOthersWaiting(): OthersWaiting {
     };
     return {
       others,
-      read: async (id) => (await waiting(id)).map(strandedOf),
+      read: async (id) => (await waiting(id)).map(strandedEditsOf),
       forget: async (id) => {
         if (keep === undefined || device === undefined) return;
-        const shelf = { graph: keep.graph, person: { id, name: "" } };
-        for (const { epoch } of await waiting(id)) await device.forget(shelf, epoch);
+        const owner = { graph: keep.graph, person: { id, name: "" } };
+        for (const { epoch } of await waiting(id)) await device.forget(owner, epoch);
         setOthers((now) => now.filter((other) => other.id !== id));
       },
     };

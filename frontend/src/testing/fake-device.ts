@@ -1,25 +1,25 @@
 /** A device in memory for tests, which can refuse, hang, and lose what was not written yet. */
 
-import type { Batch, Device, Kept, Shelf, Waiting } from "../sync/indexed-db";
+import type { CopyOwner, EditStore, StoredCopy, StoreWrite, UnsavedEdit } from "../sync/indexed-db";
 
-interface Entry {
+interface StoredGraph {
   graph: string;
-  person: Shelf["person"];
+  person: CopyOwner["person"];
   epoch: string;
   seq: number;
   known: Uint8Array[];
-  waiting: Map<string, Waiting>;
+  waiting: Map<string, UnsavedEdit>;
 }
 
-export class FakeDevice implements Device {
-  readonly entries: Entry[] = [];
+export class FakeEditStore implements EditStore {
+  readonly entries: StoredGraph[] = [];
   /** While set, every call fails. */
   refuses = false;
   writes = 0;
   /** Resolves reads when it does; a hanging device otherwise. */
   ready: Promise<void> = Promise.resolve();
 
-  async read({ graph, person }: Shelf): Promise<readonly Kept[]> {
+  async read({ graph, person }: CopyOwner): Promise<readonly StoredCopy[]> {
     await this.ready;
     this.check();
     return this.entries
@@ -32,10 +32,10 @@ export class FakeDevice implements Device {
       }));
   }
 
-  async write(shelf: Shelf, epoch: string, batch: Batch): Promise<void> {
+  async write(owner: CopyOwner, epoch: string, batch: StoreWrite): Promise<void> {
     this.check();
     this.writes += 1;
-    const entry = this.entry(shelf, epoch);
+    const entry = this.entry(owner, epoch);
     if (batch.copy !== null) entry.known = [batch.copy];
     entry.known.push(...batch.known);
     for (const edit of batch.waits) entry.waiting.set(edit.id, edit);
@@ -46,7 +46,7 @@ export class FakeDevice implements Device {
     entry.seq = batch.seq;
   }
 
-  async forget({ graph, person }: Shelf, epoch: string): Promise<void> {
+  async forget({ graph, person }: CopyOwner, epoch: string): Promise<void> {
     this.check();
     const keep = this.entries.filter(
       (e) => e.graph !== graph || e.person.id !== person.id || e.epoch !== epoch,
@@ -54,7 +54,7 @@ export class FakeDevice implements Device {
     this.entries.splice(0, this.entries.length, ...keep);
   }
 
-  async others({ graph, person }: Shelf) {
+  async others({ graph, person }: CopyOwner) {
     this.check();
     return this.entries
       .filter((e) => e.graph === graph && e.person.id !== person.id && e.waiting.size > 0)
@@ -66,7 +66,7 @@ export class FakeDevice implements Device {
     return this.entries.reduce((sum, entry) => sum + entry.waiting.size, 0);
   }
 
-  private entry({ graph, person }: Shelf, epoch: string): Entry {
+  private entry({ graph, person }: CopyOwner, epoch: string): StoredGraph {
     const old = this.entries.find(
       (e) => e.graph === graph && e.person.id === person.id && e.epoch === epoch,
     );

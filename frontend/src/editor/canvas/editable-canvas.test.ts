@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { onePerId } from "../../people/people";
-import type { Person } from "../../sync/presence/presence";
+import type { Participant } from "../../sync/presence/presence";
 import { candidates } from "./quick-add";
 import { dragged, selectionAfter } from "./use-canvas-elements";
 
@@ -18,7 +18,11 @@ test("a selection that stays the same is the same", () => {
   expect(selectionAfter(before, [select("a", true)])).toBe(before);
 });
 
-const person = (client: number, id: string, drag?: Person["presence"]["drag"]): Person => ({
+const person = (
+  client: number,
+  id: string,
+  drag?: Participant["presence"]["drag"],
+): Participant => ({
   client,
   id,
   name: id,

@@ -30,7 +30,7 @@ import { insertInto, moveActions, together } from "../../graph/edit";
 import { type Note, notesOf, placeNotes, withContents } from "../../graph/edit/notes";
 import type { Graph, Key, Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
-import type { Person } from "../../sync/presence/presence";
+import type { Participant } from "../../sync/presence/presence";
 import { usePeople, useRoom } from "../../sync/use-room";
 import { colorsOf } from "../../ui/name-colors";
 import { arrowAt, pointOf } from "./hit-test";
@@ -57,7 +57,11 @@ interface Given {
 }
 
 /** Where everything stands while people drag it. */
-export function dragged(places: Places, people: readonly Person[], own: Places | null): Places {
+export function dragged(
+  places: Places,
+  people: readonly Participant[],
+  own: Places | null,
+): Places {
   const drags = people.flatMap((person) => person.presence.drag ?? []);
   if (drags.length === 0 && own === null) return places;
   const moved: Places = new Map(places);

@@ -1,13 +1,13 @@
 /** Whom this page follows: it looks where they look until either side has enough of it. */
 
-import { type PresenceSource, samePlace, type View } from "./presence";
+import { isSameView, type PresenceSource, type SharedView } from "./presence";
 
-export class Following {
+export class FollowedPerson {
   private readonly presence: PresenceSource;
   private readonly listeners = new Set<() => void>();
   private readonly unhear: () => void;
   private client: number | null = null;
-  private place: View | null = null;
+  private place: SharedView | null = null;
 
   constructor(presence: PresenceSource) {
     this.presence = presence;
@@ -18,7 +18,7 @@ export class Following {
   readonly whom = (): number | null => this.client;
 
   /** What of the canvas they see; the same object until that changes. Null when they do not say. */
-  readonly view = (): View | null => this.place;
+  readonly view = (): SharedView | null => this.place;
 
   readonly onChange = (listener: () => void): (() => void) => {
     this.listeners.add(listener);
@@ -46,7 +46,7 @@ export class Following {
       return;
     }
     const next = leader.presence.view ?? null;
-    if (samePlace(next, this.place)) return;
+    if (isSameView(next, this.place)) return;
     this.place = next;
     this.tell();
   }

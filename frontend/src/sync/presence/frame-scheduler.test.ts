@@ -1,11 +1,11 @@
 // @vitest-environment jsdom
 import { expect, test, vi } from "vitest";
-import { frames } from "./frame-scheduler";
+import { frameScheduler } from "./frame-scheduler";
 
 const nextFrame = () => new Promise((done) => requestAnimationFrame(done));
 
 test("whatever comes between two frames is told once", async () => {
-  const { soon } = frames();
+  const { soon } = frameScheduler();
   const tell = vi.fn();
   for (let n = 0; n < 40; n += 1) soon(tell);
   expect(tell).not.toHaveBeenCalled();
@@ -17,7 +17,7 @@ test("whatever comes between two frames is told once", async () => {
 });
 
 test("what has been told rests for a while", async () => {
-  const { soon } = frames(100);
+  const { soon } = frameScheduler(100);
   const times: number[] = [];
   const tell = () => times.push(performance.now());
   soon(tell);
@@ -30,13 +30,13 @@ test("what has been told rests for a while", async () => {
 
 test("a page without frames is told too", async () => {
   vi.stubGlobal("requestAnimationFrame", () => 0); // as in a hidden tab
-  const { soon } = frames();
+  const { soon } = frameScheduler();
   await new Promise<void>((told) => soon(told));
   vi.unstubAllGlobals();
 });
 
 test("a page that was left is told nothing any more", async () => {
-  const { soon, close } = frames();
+  const { soon, close } = frameScheduler();
   const tell = vi.fn();
   soon(tell);
   close();

@@ -6,12 +6,12 @@
  */
 
 /** Calls `tell` soon, once, however often it is asked until then. */
-export type Soon = (tell: () => void) => void;
+export type Schedule = (tell: () => void) => void;
 
-export const atOnce: Soon = (tell) => tell();
+export const immediately: Schedule = (tell) => tell();
 
-export interface Pace {
-  readonly soon: Soon;
+export interface FrameScheduler {
+  readonly soon: Schedule;
   /** What still waits is not told any more. */
   close(): void;
 }
@@ -20,7 +20,7 @@ export interface Pace {
 const UNSEEN_MS = 100;
 
 /** `gap`: what is told rests so long, ms, before it is told again. */
-export function frames(gap = 0): Pace {
+export function frameScheduler(gap = 0): FrameScheduler {
   const waiting = new Set<() => void>();
   let frame: number | undefined;
   let timer: ReturnType<typeof setTimeout> | undefined;

@@ -9,7 +9,7 @@
 import type { Awareness } from "y-protocols/awareness";
 import { same } from "../../graph/equal";
 import type { Key, Position } from "../../graph/model";
-import { atOnce, type Soon } from "./frame-scheduler";
+import { immediately, type Schedule } from "./frame-scheduler";
 
 /** What this page tells the others. */
 export interface Presence {
@@ -19,12 +19,12 @@ export interface Presence {
   /** The field being edited, as `<key>|<field>`. */
   readonly editing?: string;
   /** What of the canvas this page shows: the place of its top left corner, and how large. */
-  readonly view?: View;
+  readonly view?: SharedView;
   /** What is being dragged, and how far it has come. */
   readonly drag?: { readonly ids: readonly Key[]; readonly dx: number; readonly dy: number };
 }
 
-export interface View {
+export interface SharedView {
   readonly x: number;
   readonly y: number;
   readonly zoom: number;
@@ -33,12 +33,12 @@ export interface View {
   readonly height?: number;
 }
 
-export function samePlace(a: View | null, b: View | null): boolean {
+export function isSameView(a: SharedView | null, b: SharedView | null): boolean {
   return a === b || (a !== null && b !== null && same(a, b));
 }
 
 /** One other page. A person with two windows is here twice, with the same `id`. */
-export interface Person {
+export interface Participant {
   readonly client: number;
   readonly id: string;
   readonly name: string;
@@ -46,14 +46,14 @@ export interface Person {
   readonly presence: Presence;
 }
 
-type Change = { readonly [F in keyof Presence]?: Presence[F] | undefined };
+type PresenceChange = { readonly [F in keyof Presence]?: Presence[F] | undefined };
 
 export interface PresenceSource {
   /** The others, by name; the same list until something of it changes, unchanged people likewise. */
-  people(): readonly Person[];
+  people(): readonly Participant[];
   onPeople(listener: () => void): () => void;
   /** Tells the others, at most 20 times a second; `undefined` takes a field back. */
-  tell(change: Change): void;
+  tell(change: PresenceChange): void;
   close(): void;
 }
 
@@ -61,11 +61,11 @@ const INTERVAL_MS = 50;
 const NOTHING: Presence = { selection: [] };
 
 /** `soon` calls back for what changed among the others. */
-export function presenceOf(awareness: Awareness, soon: Soon = atOnce): PresenceSource {
+export function presenceOf(awareness: Awareness, soon: Schedule = immediately): PresenceSource {
   let mine: Presence = NOTHING;
   let toldAt = Number.NEGATIVE_INFINITY;
   let timer: ReturnType<typeof setTimeout> | undefined;
-  let people: readonly Person[] = peopleOf(awareness, []);
+  let people: readonly Participant[] = peopleOf(awareness, []);
   const listeners = new Set<() => void>();
 
   const send = () => {
@@ -106,14 +106,14 @@ export function presenceOf(awareness: Awareness, soon: Soon = atOnce): PresenceS
   };
 }
 
-function merge(old: Presence, change: Change): Presence {
+function merge(old: Presence, change: PresenceChange): Presence {
   const entries = Object.entries({ ...old, ...change }).filter(([, value]) => value !== undefined);
   return { ...NOTHING, ...(Object.fromEntries(entries) as Partial<Presence>) };
 }
 
-function peopleOf(awareness: Awareness, before: readonly Person[]): readonly Person[] {
+function peopleOf(awareness: Awareness, before: readonly Participant[]): readonly Participant[] {
   const known = new Map(before.map((person) => [person.client, person]));
-  const people: Person[] = [];
+  const people: Participant[] = [];
   for (const [client, state] of awareness.getStates()) {
     if (client === awareness.clientID) continue;
     const fresh = personOf(client, state);
@@ -126,7 +126,7 @@ function peopleOf(awareness: Awareness, before: readonly Person[]): readonly Per
   return unchanged ? before : people;
 }
 
-function personOf(client: number, state: Readonly<Record<string, unknown>>): Person | null {
+function personOf(client: number, state: Readonly<Record<string, unknown>>): Participant | null {
   const { id, name, color } = record(state.user);
   if (typeof id !== "string" || typeof name !== "string") return null;
   const cursor = pair(state.cursor);
@@ -153,7 +153,7 @@ function dragOf(value: unknown): Presence["drag"] | null {
   return way && { ids: texts(ids), dx: way[0], dy: way[1] };
 }
 
-function viewOf(value: unknown): View | null {
+function viewOf(value: unknown): SharedView | null {
   const { x, y, zoom, width, height } = record(value);
   const place = pair([x, y]);
   if (place === null || typeof zoom !== "number" || !(zoom > 0 && zoom < 1e3)) return null;
