@@ -11,7 +11,7 @@ import {
   type Precondition,
   type Relation,
   type Response,
-  spoken,
+  spokenOutcomes,
 } from "../graph/model";
 import type { Progress } from "../status/progress";
 import { CARD, PILL, type Places } from "./geometry/arrange";
@@ -250,7 +250,7 @@ function alikeMaps<T>(a: ReadonlyMap<Key, T>, b: ReadonlyMap<Key, T>): boolean {
 
 function arrowsOf(relation: Relation, options: ArrowOptions, { boxes, names }: Around): Arrow[] {
   const id = relationId(relation);
-  const outcomes = spoken(relation.conditions);
+  const outcomes = spokenOutcomes(relation.conditions);
   const shown: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
   const entry = relation.parent === ENTRY;
   const mark = options.marks.get(id) ?? null;

@@ -5,7 +5,7 @@ import { useState } from "react";
 import { usePerson } from "../api/use-person";
 import { printedKeys } from "../edit-actions/edit-action";
 import { selectedActions, useEditorContext } from "../edit-actions/editor-context";
-import { beginThread, reply, resolve, type Thread, unsay } from "../graph/edit/comments";
+import { beginThread, deleteMessage, reply, resolve, type Thread } from "../graph/edit/comments";
 import type { Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import { Empty } from "../ui/empty";
@@ -109,7 +109,7 @@ function ThreadCard({ thread, place, onPlace }: CardProps) {
                 <button
                   type="button"
                   className={style.unsay}
-                  onClick={() => unsay(doc, thread.id, message.id)}
+                  onClick={() => deleteMessage(doc, thread.id, message.id)}
                 >
                   Delete
                 </button>

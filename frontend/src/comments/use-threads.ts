@@ -2,7 +2,7 @@
 import { useEffect, useMemo, useRef, useSyncExternalStore } from "react";
 import { spotlight } from "../canvas/card-highlights";
 import { rootOf } from "../graph/document-keys";
-import { openTalk, readThreads, type Thread } from "../graph/edit/comments";
+import { openThreadCounts, readThreads, type Thread } from "../graph/edit/comments";
 import { useRoom } from "../sync/use-room";
 
 const NONE: readonly Thread[] = [];
@@ -30,6 +30,6 @@ export function useThreads(): readonly Thread[] {
 
 /** Cards show how many open threads there are about them. */
 export function useTalkOnCards(threads: readonly Thread[]): void {
-  useEffect(() => spotlight.set({ talk: openTalk(threads) }), [threads]);
+  useEffect(() => spotlight.set({ talk: openThreadCounts(threads) }), [threads]);
   useEffect(() => spotlight.reset, []);
 }

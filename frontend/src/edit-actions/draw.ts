@@ -18,12 +18,12 @@ import {
 } from "@tabler/icons-react";
 import { relationId } from "../graph/document-keys";
 import {
+  asOneEdit,
   removeActions,
   removeNotes,
   removeRelations,
   setEntry,
   setExit,
-  together,
   unsetEntry,
   unsetExit,
 } from "../graph/edit";
@@ -129,7 +129,7 @@ export const removeSelection: EditAction = {
   run: (context) => {
     const actions = selectedActions(context).map((action) => action.key);
     const relations = selectedRelations(context).map(relationId);
-    together(context.doc, () => {
+    asOneEdit(context.doc, () => {
       removeRelations(context.doc, relations);
       removeActions(context.doc, actions);
       removeNotes(context.doc, selectedNotes(context));
@@ -243,7 +243,7 @@ function toggleEnd(context: EditorContext, end: typeof ENTRY | typeof EXIT): voi
     );
   const actions = selectedActions(context);
   const all = actions.every(tied);
-  together(context.doc, () => {
+  asOneEdit(context.doc, () => {
     for (const { key } of actions) {
       if (end === ENTRY) all ? unsetEntry(context.doc, key) : setEntry(context.doc, key);
       else if (all) unsetExit(context.doc, key);

@@ -4,7 +4,7 @@ import type * as Y from "yjs";
 import { CARD, unplaced } from "../canvas/geometry/arrange";
 import type { DryRun } from "../dry-run/use-dry-run";
 import { relationId } from "../graph/document-keys";
-import { addAction, moveActions, type NewAction, together } from "../graph/edit";
+import { addAction, asOneEdit, moveActions, type NewAction } from "../graph/edit";
 import { notesOf, placeNotes, withContents } from "../graph/edit/notes";
 import type { Action, Graph, Key, Position, Precondition, Relation } from "../graph/model";
 
@@ -111,7 +111,7 @@ export function writePositions(context: EditorContext, moved: ReadonlyMap<string
   const { doc, graph } = context;
   const places = context.positions();
   const all = withContents(graph, moved, places, context.sizes());
-  together(doc, () => {
+  asOneEdit(doc, () => {
     moveActions(doc, new Map([...unplaced(graph, places), ...all]));
     placeNotes(doc, graph, all);
   });
@@ -143,7 +143,7 @@ export function freePosition(context: EditorContext): Position {
 
 /** Adds an action by hand: everything else stays where it is drawn. Answers its key. */
 export function addActionAt(context: EditorContext, action: NewAction, position: Position): Key {
-  return together(context.doc, () => {
+  return asOneEdit(context.doc, () => {
     moveActions(context.doc, unplaced(context.graph, context.positions()));
     return addAction(context.doc, { ...action, position });
   });

@@ -1,7 +1,7 @@
 /** What to do about edits that wait on a history which the server has left: take, drop, or save. */
 import { Button, Checkbox, Group, Modal, Text } from "@mantine/core";
 import { useCallback, useEffect, useMemo, useState } from "react";
-import { type Change, changesOf, chosen, type Line } from "../graph/changes";
+import { type ChangedField, changesOf, type GraphChange, onlyChanges } from "../graph/changes";
 import { mapsOf } from "../graph/document-keys";
 import {
   type StrandedEditsChoice,
@@ -19,7 +19,7 @@ function changes(n: number): string {
   return n === 1 ? "1 change" : `${n} changes`;
 }
 
-function Lines({ lines }: { lines: readonly Line[] }) {
+function Lines({ lines }: { lines: readonly ChangedField[] }) {
   return (
     <ul className={style.lines}>
       {lines.map((line) => (
@@ -44,7 +44,7 @@ function Lines({ lines }: { lines: readonly Line[] }) {
 }
 
 interface ItemProps {
-  change: Change;
+  change: GraphChange;
   taken: boolean;
   onTake: (taken: boolean) => void;
 }
@@ -139,7 +139,7 @@ function Body({ choice, by, onLater }: BodyProps) {
 
 interface AnswersProps {
   choice: StrandedEditsChoice;
-  taken: readonly Change[];
+  taken: readonly GraphChange[];
   /** How many that is, in words. */
   some: string;
   onLater: () => void;
@@ -176,7 +176,7 @@ function Answers({ choice, taken, some, onLater, onSave }: AnswersProps) {
           data-autofocus
           loading={busy}
           disabled={taken.length === 0 || state !== "live"}
-          onClick={() => work(() => choice.apply(chosen(difference, taken)))}
+          onClick={() => work(() => choice.apply(onlyChanges(difference, taken)))}
         >
           Apply {some}
         </Button>

@@ -1,6 +1,6 @@
 /** Changes as a file that people and programs can read, saved by the browser. */
 
-import { type Change, changesOf } from "../graph/changes";
+import { changesOf, type GraphChange } from "../graph/changes";
 import { type Maps, mapsFrom } from "../graph/document-keys";
 import type { StrandedEdits } from "../sync/replaced-history";
 
@@ -18,7 +18,7 @@ interface ChangesFile {
 }
 
 /** In one line: "changed action Look". */
-export function changeSentence({ kind, thing, title }: Change): string {
+export function changeSentence({ kind, thing, title }: GraphChange): string {
   return thing === "graph" ? `${kind} the graph` : `${kind} ${thing} ${title}`;
 }
 

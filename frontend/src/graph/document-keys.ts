@@ -48,11 +48,11 @@ export function splitKey(key: string): { head: string; rest: string } {
   return bar < 0 ? { head: key, rest: "" } : { head: key.slice(0, bar), rest: key.slice(bar + 1) };
 }
 
-export type Side = "in" | "out";
+export type ParameterSide = "in" | "out";
 export type RelationSide = "parents" | "children";
 
 export const actionKey = (aid: Key, field: string): string => `${aid}|${field}`;
-export const parameterKey = (aid: Key, side: Side, path: string): string =>
+export const parameterKey = (aid: Key, side: ParameterSide, path: string): string =>
   `${aid}|${side}/${path}`;
 export const extraKey = (aid: Key, field: string): string => `${aid}|x/${field}`;
 export const noteKey = (id: string): string => `g/${id}`;
@@ -63,7 +63,7 @@ export function relationId(relation: { parent: Key; child: Key; listing?: number
   return relation.listing ? `${pair};${relation.listing}` : pair;
 }
 
-export interface Ends {
+export interface RelationEnds {
   readonly parent: Key;
   readonly child: Key;
   readonly listing: number;
@@ -72,7 +72,7 @@ export interface Ends {
 const LISTING = /^[1-9][0-9]{0,8}$/;
 
 /** The ends named by a relation id; null when it fits no pattern. */
-export function endsOf(id: string): Ends | null {
+export function endsOf(id: string): RelationEnds | null {
   const arrow = id.indexOf(">");
   if (arrow < 0) return null;
   const parent = id.slice(0, arrow);

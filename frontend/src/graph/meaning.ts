@@ -32,16 +32,16 @@ function parameters(list: readonly Parameter[]): unknown {
   return list.map(({ path, text }) => `${path} ${JSON.stringify(ordered(value(text)))}`).sort();
 }
 
-type Said = readonly [name: string, ...rest: unknown[]];
+type MeaningEntry = readonly [name: string, ...rest: unknown[]];
 
 /** What each action and each arrow says, by the names that the engine knows. */
-function said(graph: Graph): { actions: Said[]; arrows: Said[] } {
+function said(graph: Graph): { actions: MeaningEntry[]; arrows: MeaningEntry[] } {
   const names = new Map<Key, string>(graph.actions.map((action) => [action.key, fullName(action)]));
   names.set(ENTRY, ">").set(EXIT, "<");
   const actions = graph.actions
     .filter((action) => !action.missing)
     .map(
-      (action): Said => [
+      (action): MeaningEntry => [
         fullName(action),
         action.type,
         action.actor,
@@ -53,7 +53,7 @@ function said(graph: Graph): { actions: Said[]; arrows: Said[] } {
   const arrows = graph.relations
     .filter(({ parent, child }) => names.has(parent) && names.has(child))
     .map(
-      (relation): Said => [
+      (relation): MeaningEntry => [
         names.get(relation.parent) ?? "",
         names.get(relation.child),
         relation.parent === ENTRY
@@ -68,11 +68,11 @@ function said(graph: Graph): { actions: Said[]; arrows: Said[] } {
 
 export function meaning(graph: Graph): string {
   const { actions, arrows } = said(graph);
-  const sorted = (list: readonly Said[]) => list.map((item) => JSON.stringify(item)).sort();
+  const sorted = (list: readonly MeaningEntry[]) => list.map((item) => JSON.stringify(item)).sort();
   return JSON.stringify([graph.name, graph.description, sorted(actions), sorted(arrows)]);
 }
 
-export interface Difference {
+export interface MeaningDifference {
   readonly kind: "added" | "removed" | "changed";
   readonly what: string;
   /** What of it changes, from what to what: "delay: 0.5 → 0.9". */
@@ -80,14 +80,14 @@ export interface Difference {
 }
 
 /** What another graph does otherwise, thing by thing; how it is drawn is no difference. */
-export function differences(before: Graph, after: Graph): Difference[] {
+export function differences(before: Graph, after: Graph): MeaningDifference[] {
   const [old, now] = [said(before), said(after)];
   const ends = (name: string) => (name === ">" ? "Start" : name === "<" ? "End" : name);
   const head =
     before.name !== after.name || before.description !== after.description
       ? [{ kind: "changed", what: "Name or description of the graph", details: [] } as const]
       : [];
-  const arrow = ([parent, child]: Said) => `Arrow ${ends(parent)} → ${ends(String(child))}`;
+  const arrow = ([parent, child]: MeaningEntry) => `Arrow ${ends(parent)} → ${ends(String(child))}`;
   return [
     ...head,
     ...compared(
@@ -146,13 +146,13 @@ function inParameters(was: readonly Parameter[], is: readonly Parameter[], side 
 }
 
 /** What of an arrow is not as it was: responses, whether it is waited for, what it renames. */
-function inArrow(was: Said, is: Said): string[] {
-  const responses = (said: Said) => said[2] as readonly string[];
+function inArrow(was: MeaningEntry, is: MeaningEntry): string[] {
+  const responses = (said: MeaningEntry) => said[2] as readonly string[];
   const answers = PRECONDITIONS.flatMap((outcome, i) =>
     becomes(outcome.replace("_", " "), responses(was)[i] ?? "", responses(is)[i] ?? ""),
   );
-  const waited = (said: Said) => (said[3] ? "yes" : "no");
-  const renamed = (said: Said) => (said[4] as readonly string[]).join(", ") || "nothing";
+  const waited = (said: MeaningEntry) => (said[3] ? "yes" : "no");
+  const renamed = (said: MeaningEntry) => (said[4] as readonly string[]).join(", ") || "nothing";
   return [
     ...answers,
     ...becomes("is waited for", waited(was), waited(is)),
@@ -161,14 +161,15 @@ function inArrow(was: Said, is: Said): string[] {
 }
 
 function compared(
-  before: readonly Said[],
-  after: readonly Said[],
-  named: (said: Said) => string,
-  detailed: (name: string, was: Said, is: Said) => string[],
-): Difference[] {
-  const byName = (list: readonly Said[]) => new Map(list.map((item) => [named(item), item]));
+  before: readonly MeaningEntry[],
+  after: readonly MeaningEntry[],
+  named: (said: MeaningEntry) => string,
+  detailed: (name: string, was: MeaningEntry, is: MeaningEntry) => string[],
+): MeaningDifference[] {
+  const byName = (list: readonly MeaningEntry[]) =>
+    new Map(list.map((item) => [named(item), item]));
   const [old, now] = [byName(before), byName(after)];
-  const found: Difference[] = [];
+  const found: MeaningDifference[] = [];
   for (const [what, is] of now) {
     const was = old.get(what);
     if (was === undefined) found.push({ kind: "added", what, details: [] });

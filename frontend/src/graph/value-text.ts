@@ -16,14 +16,14 @@ export function valueText(parameter: Parameter): string | null {
   return text.startsWith("{") ? memberText(text, "pvf_value") : text;
 }
 
-export interface CardLine {
+export interface ParameterLine {
   readonly name: string;
   /** Null: no value of its own. */
   readonly value: string | null;
 }
 
 /** The inputs that matter most: those with a value, then those that still wait for one. */
-export function cardLines(inputs: readonly Parameter[], most: number): CardLine[] {
+export function cardLines(inputs: readonly Parameter[], most: number): ParameterLine[] {
   const lines = inputs.map((input) => ({
     name: pathWords(input.path),
     value: valueText(input)?.replace(/\s+/g, " ") ?? null,
@@ -33,6 +33,6 @@ export function cardLines(inputs: readonly Parameter[], most: number): CardLine[
   return [...given, ...open].slice(0, most);
 }
 
-export function lineText({ name, value }: CardLine): string {
+export function lineText({ name, value }: ParameterLine): string {
   return value === null ? `${name} = ?` : `${name} = ${value}`;
 }

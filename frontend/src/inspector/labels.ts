@@ -1,7 +1,7 @@
 /** What people sort a graph under: `labels` in its `gui_attributes`, which no engine reads. */
 import type * as Y from "yjs";
 import { rootOf } from "../graph/document-keys";
-import { together } from "../graph/edit/document-writes";
+import { asOneEdit } from "../graph/edit/document-writes";
 import { memberText, withMember } from "../graph/json-members";
 import type { Graph } from "../graph/model";
 import { asJsonText } from "../graph/values";
@@ -27,7 +27,7 @@ export function setLabels(doc: Y.Doc, labels: readonly string[]): void {
     "labels",
     kept.length === 0 ? null : JSON.stringify(kept),
   );
-  together(doc, () => {
+  asOneEdit(doc, () => {
     if (text === "{}") rootOf(doc, "meta").delete(KEY);
     else rootOf(doc, "meta").set(KEY, text);
   });

@@ -12,10 +12,10 @@ import {
   ABOUT,
   applyExamples,
   applyFix,
-  applySafe,
-  exampleOnes,
+  applySafeFixes,
+  exampleFixes,
   fixOf,
-  safeOnes,
+  safeFixes,
 } from "../graph/edit/fixes";
 import type { Graph } from "../graph/model";
 import { endName } from "../graph/relation-words";
@@ -129,8 +129,8 @@ export function ProblemList({ problems, seq }: Props) {
   const context = useEditorContext();
   if (!problems) return <p className={style.checked}>Checking …</p>;
   const order = bySeverity(problems.problems);
-  const safe = safeOnes(order).length;
-  const examples = exampleOnes(order).length;
+  const safe = safeFixes(order).length;
+  const examples = exampleFixes(order).length;
   return (
     <div className={style.list}>
       {order.length === 0 && (
@@ -145,7 +145,7 @@ export function ProblemList({ problems, seq }: Props) {
           leftSection={<IconTool size={15} aria-hidden />}
           title="Everything that can be mended without losing what was drawn. One undo takes it back."
           onClick={() => {
-            if (applySafe(context.doc, order) === 0) tellNothing();
+            if (applySafeFixes(context.doc, order) === 0) tellNothing();
           }}
         >
           Fix all {safe} safe ones

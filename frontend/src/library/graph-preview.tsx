@@ -5,7 +5,7 @@ import { graphText } from "../api/graphs";
 import { fromUmrf } from "../canvas/from-umrf";
 import { arrange } from "../canvas/geometry/arrange";
 import { outcomeColor } from "../canvas/outcome";
-import { ENTRY, EXIT, type Graph, spoken } from "../graph/model";
+import { ENTRY, EXIT, type Graph, spokenOutcomes } from "../graph/model";
 import { robotColor } from "../ui/name-colors";
 
 const MARGIN = 26;
@@ -51,7 +51,7 @@ export function Miniature({ graph }: { graph: Graph }) {
         const [x1, y1] = [from.x + from.width, from.y + from.height / 2];
         const [x2, y2] = [to.x, to.y + to.height / 2];
         const bend = Math.max(30, Math.abs(x2 - x1) / 2);
-        const outcome = spoken(relation.conditions)[0] ?? "on_true";
+        const outcome = spokenOutcomes(relation.conditions)[0] ?? "on_true";
         const color = relation.parent === ENTRY ? "var(--ink4)" : outcomeColor[outcome];
         return (
           <path

@@ -3,7 +3,7 @@
 import type { EditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import { removeActions, removeNotes, removeRelation, setResponse, swapOrder } from "../graph/edit";
-import { ENTRY, type Key, spoken } from "../graph/model";
+import { ENTRY, type Key, spokenOutcomes } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import type { Change } from "./row-edit";
 import type { Row } from "./rows";
@@ -68,7 +68,9 @@ export function removeRow(context: EditorContext, row: Row): string {
   }
   if (row.kind !== "target") return "";
   const id = relationId(row.relation);
-  const others = spoken(row.relation.conditions).filter((outcome) => outcome !== row.outcome);
+  const others = spokenOutcomes(row.relation.conditions).filter(
+    (outcome) => outcome !== row.outcome,
+  );
   if (others.length > 0 && row.relation.parent !== ENTRY) {
     setResponse(context.doc, id, row.outcome, "ignore");
   } else removeRelation(context.doc, id);

@@ -9,7 +9,7 @@ import { useLive } from "../api/live/use-live";
 import type { Robot } from "../api/robots";
 import { modifyRun, playedBy, type Run } from "../api/runs";
 import { useMay } from "../api/use-person";
-import type { Difference } from "../graph/meaning";
+import type { MeaningDifference } from "../graph/meaning";
 import { HoldButton } from "../ui/hold-button";
 import style from "./modify-run.module.css";
 import { complain, nextLabel, published } from "./start/use-start";
@@ -18,7 +18,7 @@ interface Props {
   run: Run;
   /** The version that runs. */
   label: string;
-  found: readonly Difference[];
+  found: readonly MeaningDifference[];
   seq: number;
   settle: () => Promise<number>;
   obstacle: string | null;
@@ -38,7 +38,7 @@ export function whyNot(run: Run, engine: Robot | undefined, obstacle: string | n
   return obstacle;
 }
 
-function List({ found }: { found: readonly Difference[] }) {
+function List({ found }: { found: readonly MeaningDifference[] }) {
   const more = found.length - MOST;
   return (
     <>

@@ -1,7 +1,7 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import { addAction, rename } from "../graph/edit";
-import { graphOf } from "../graph/edit/document-writes";
+import { graphNow } from "../graph/edit/document-writes";
 import { FakeEditStore } from "../testing/fake-device";
 import { FakeServer } from "../testing/fake-server";
 import { GraphConnection } from "./graph-connection";
@@ -46,7 +46,7 @@ async function arrive(): Promise<void> {
 
 const docOf = (connection: GraphConnection) => connection.now().open.doc;
 const names = (doc: Y.Doc) =>
-  graphOf(doc)
+  graphNow(doc)
     .actions.map(({ name }) => name)
     .sort();
 const link = (connection: GraphConnection) => connection.now().open.room.link();

@@ -2,7 +2,7 @@
 
 import type * as Y from "yjs";
 import { undoOf } from "../graph/edit";
-import { same } from "../graph/equal";
+import { isEqual } from "../graph/equal";
 import { followGraph, type GraphSource } from "../graph/read";
 import { FollowedPerson } from "./presence/following";
 import { frameScheduler } from "./presence/frame-scheduler";
@@ -56,7 +56,7 @@ export function openRoom(options: RoomOptions): ClosableRoom {
         return room.onLink(() => {
           const link = room.link();
           // Each edit of anybody has a place in the log; all else is news.
-          const named = same({ ...last, seq: 0 }, { ...link, seq: 0 });
+          const named = isEqual({ ...last, seq: 0 }, { ...link, seq: 0 });
           last = link;
           (named ? calm : scheduler).soon(listener);
         });

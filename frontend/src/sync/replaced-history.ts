@@ -17,8 +17,8 @@ import {
   rootOf,
   splitKey,
 } from "../graph/document-keys";
-import { together } from "../graph/edit/document-writes";
-import { same } from "../graph/equal";
+import { asOneEdit } from "../graph/edit/document-writes";
+import { isEqual } from "../graph/equal";
 import { ENTRY, EXIT } from "../graph/model";
 import type { StoredCopy, UnsavedEdit } from "./indexed-db";
 
@@ -128,7 +128,7 @@ export function strandedEditsIn(
   for (const root of ROOTS) {
     for (const [key, value] of before[root]) {
       // Made and taken back again.
-      if (difference[root].has(key) && same(difference[root].get(key), value)) {
+      if (difference[root].has(key) && isEqual(difference[root].get(key), value)) {
         difference[root].delete(key);
       }
     }
@@ -161,7 +161,7 @@ export function differenceOf(before: Y.Doc, after: Y.Doc): DocumentDifference {
   const difference = mutable();
   for (const root of ROOTS) {
     for (const [key, value] of now[root]) {
-      if (!same(value, old[root].get(key))) difference[root].set(key, value);
+      if (!isEqual(value, old[root].get(key))) difference[root].set(key, value);
     }
     for (const key of old[root].keys()) {
       if (!now[root].has(key)) difference[root].set(key, undefined);
@@ -185,12 +185,12 @@ export function applyDifference(doc: Y.Doc, difference: DocumentDifference): num
     return ends === null || (isEnd(ends.parent) && isEnd(ends.child));
   };
   let changed = 0;
-  together(doc, () => {
+  asOneEdit(doc, () => {
     for (const root of ROOTS) {
       const map = rootOf(doc, root);
       for (const [key, value] of difference[root]) {
         if (value !== undefined && !fits(root, splitKey(key))) continue;
-        if (value === undefined ? !map.has(key) : same(map.get(key), value)) continue;
+        if (value === undefined ? !map.has(key) : isEqual(map.get(key), value)) continue;
         if (value === undefined) map.delete(key);
         else map.set(key, value);
         changed += 1;

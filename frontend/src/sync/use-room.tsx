@@ -11,7 +11,7 @@ import {
   useState,
   useSyncExternalStore,
 } from "react";
-import { same } from "../graph/equal";
+import { isEqual } from "../graph/equal";
 import { EMPTY_GRAPH, type Graph } from "../graph/model";
 import {
   type ConnectionNotice,
@@ -186,7 +186,7 @@ export function useEditors(field: string): readonly FieldEditor[] {
       .people()
       .filter((person) => person.presence.editing === field)
       .map(({ client, id, name }) => ({ client, id, name }));
-    if (!same(found, last.current)) last.current = found;
+    if (!isEqual(found, last.current)) last.current = found;
     return last.current;
   });
 }

@@ -3,19 +3,19 @@
 import * as Y from "yjs";
 import { mapsOf, relationId } from "../graph/document-keys";
 import { addAction } from "../graph/edit";
-import { type Graph, type Key, type Relation, spoken } from "../graph/model";
+import { type Graph, type Key, type Relation, spokenOutcomes } from "../graph/model";
 import { readGraph } from "../graph/read";
 
-export const graphOf = (doc: Y.Doc): Graph => readGraph(mapsOf(doc));
-export const actionOf = (doc: Y.Doc, key: Key) => graphOf(doc).actions.find((a) => a.key === key);
-export const relationOf = (doc: Y.Doc, id: string | null): Relation | undefined =>
-  graphOf(doc).relations.find((relation) => relationId(relation) === id);
+export const graphIn = (doc: Y.Doc): Graph => readGraph(mapsOf(doc));
+export const actionIn = (doc: Y.Doc, key: Key) => graphIn(doc).actions.find((a) => a.key === key);
+export const relationIn = (doc: Y.Doc, id: string | null): Relation | undefined =>
+  graphIn(doc).relations.find((relation) => relationId(relation) === id);
 export const says = (relation: Relation | undefined) =>
-  relation && spoken(relation.conditions).map((o) => `${o} -> ${relation.conditions[o]}`);
+  relation && spokenOutcomes(relation.conditions).map((o) => `${o} -> ${relation.conditions[o]}`);
 export const arrows = (doc: Y.Doc) =>
-  graphOf(doc)
+  graphIn(doc)
     .relations.map((relation) => {
-      const name = (key: Key) => actionOf(doc, key)?.name ?? key;
+      const name = (key: Key) => actionIn(doc, key)?.name ?? key;
       return `${name(relation.parent)}>${name(relation.child)}`;
     })
     .sort();

@@ -22,7 +22,7 @@ import { noteColor } from "../../canvas/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { ArrowTips } from "../../canvas/outcome-arrow";
 import { addActionAt, type EditorContext, GRID } from "../../edit-actions/editor-context";
-import { insertInto, removeNotes, together } from "../../graph/edit";
+import { asOneEdit, insertInto, removeNotes } from "../../graph/edit";
 import { changeNote } from "../../graph/edit/notes";
 import type { Position } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
@@ -178,7 +178,7 @@ export function Canvas({ context, canvas, me, map, onPanned, pointer, writing }:
         const at = flow.screenToFlowPosition({ x, y });
         const position: Position = [Math.round(at.x - CARD.width / 2), Math.round(at.y - 24)];
         const arrow = arrowAt([x, y]);
-        const key = together(context.doc, () => {
+        const key = asOneEdit(context.doc, () => {
           const added = addActionAt(context, load, position);
           if (arrow !== null) insertInto(context.doc, arrow, added);
           return added;

@@ -5,7 +5,7 @@ import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import type { EditorContext } from "../../edit-actions/editor-context";
-import { graphOf } from "../../graph/edit/document-writes";
+import { graphNow } from "../../graph/edit/document-writes";
 import { EMPTY_GRAPH } from "../../graph/model";
 import { QuickAdd } from "./quick-add";
 
@@ -57,7 +57,7 @@ function found<T extends Element>(selector: string): T {
 const fire = (on: Element, event: Event) => act(() => void on.dispatchEvent(event));
 const enter = () =>
   fire(found("input"), new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
-const names = () => graphOf(doc).actions.map(({ name }) => name);
+const names = () => graphNow(doc).actions.map(({ name }) => name);
 
 test("Enter takes what the keys chose, also when the list opens under a pointer at rest", () => {
   fire(found("[role=option]:last-child"), new Event("pointerover", { bubbles: true }));

@@ -9,7 +9,7 @@ import {
   addActionAt,
   type EditorContext,
 } from "../../edit-actions/editor-context";
-import { connect, insertInto, type NewAction, together } from "../../graph/edit";
+import { asOneEdit, connect, insertInto, type NewAction } from "../../graph/edit";
 import type { Position } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import style from "./quick-add.module.css";
@@ -46,7 +46,7 @@ export function candidates(known: readonly NewAction[], search: string): NewActi
 function placed(context: EditorContext, request: AddRequest, template: NewAction): string {
   const [x, y] = request.at;
   const position: Position = [x - Math.round(CARD.width / 2), y];
-  return together(context.doc, () => {
+  return asOneEdit(context.doc, () => {
     const key = addActionAt(context, template, position);
     if (request.from) connect(context.doc, request.from.key, key, request.from.outcome);
     if (request.into) insertInto(context.doc, request.into, key);

@@ -26,7 +26,7 @@ import {
 import { type Places, placesOf, unplaced } from "../../canvas/geometry/arrange";
 import { notePlaces } from "../../canvas/note-nodes";
 import type { Marks } from "../../canvas/problem-marks";
-import { insertInto, moveActions, together } from "../../graph/edit";
+import { asOneEdit, insertInto, moveActions } from "../../graph/edit";
 import { type Note, notesOf, placeNotes, withContents } from "../../graph/edit/notes";
 import type { Graph, Key, Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
@@ -222,7 +222,7 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
     );
     if (begun.current !== null) {
       const dropped = withContents(graph, moved, rest, sizes);
-      together(doc, () => {
+      asOneEdit(doc, () => {
         moveActions(doc, new Map([...unplaced(graph, rest), ...dropped]));
         placeNotes(doc, graph, dropped);
         const [only] = all;

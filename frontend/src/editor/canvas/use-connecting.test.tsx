@@ -5,7 +5,7 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { addAction } from "../../graph/edit";
-import { graphOf } from "../../graph/edit/document-writes";
+import { graphNow } from "../../graph/edit/document-writes";
 import { useConnecting } from "./use-connecting";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
@@ -57,7 +57,7 @@ test("who taps an outcome and then draws an arrow by dragging is not asked what 
   expect(connecting.pending).toBeNull();
   const card = underPointer(c).parentElement;
   if (card) click(card);
-  expect(graphOf(context.doc).relations.map(({ parent, child }) => [parent, child])).toEqual([
+  expect(graphNow(context.doc).relations.map(({ parent, child }) => [parent, child])).toEqual([
     [b, c],
   ]);
 });

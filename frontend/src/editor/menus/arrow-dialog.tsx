@@ -6,7 +6,7 @@ import { useEffect, useRef, useState } from "react";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { addActionAt, type EditorContext, freePosition } from "../../edit-actions/editor-context";
 import { endsOf } from "../../graph/document-keys";
-import { connect, moveRelation, together } from "../../graph/edit";
+import { asOneEdit, connect, moveRelation } from "../../graph/edit";
 import { ENTRY, EXIT, type Key, type Precondition } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { robotColor } from "../../ui/name-colors";
@@ -112,7 +112,7 @@ export function ArrowDialog({ context, from: given, to, onClose }: Props) {
   const [outcome, setOutcome] = useState<Precondition | null>(given === ENTRY ? "on_true" : null);
   const draw = (parent: Key, child: Key, when: Precondition) => {
     const target = child.startsWith(FRESH) ? null : child;
-    const relation = together(context.doc, () => {
+    const relation = asOneEdit(context.doc, () => {
       const key =
         target ?? addActionAt(context, { name: child.slice(FRESH.length) }, freePosition(context));
       return connect(context.doc, parent, key, when);

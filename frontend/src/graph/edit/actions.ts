@@ -16,14 +16,14 @@ import {
   type Relation,
 } from "../model";
 import {
-  after,
-  erase,
-  graphOf,
+  asOneEdit,
+  eraseKeys,
+  graphNow,
   hasAction,
+  nextNumber,
+  numberGhosts,
   numbersOf,
-  put,
-  settleGhosts,
-  together,
+  writeKey,
 } from "./document-writes";
 import { keepingEnds } from "./ends";
 import { writeParameters } from "./parameters";
@@ -43,27 +43,29 @@ export interface NewAction {
 
 /** Adds an action under the lowest free number of its name and answers its key. */
 export function addAction(doc: Y.Doc, action: NewAction): Key {
-  return together(doc, () => {
+  return asOneEdit(doc, () => {
     const key = newAid();
     const instanceId = freeNumber(numbersOf(doc), action.name);
-    put(
+    writeKey(
       doc,
       "actions",
       actionKey(key, "order"),
-      after(doc, "actions", "order", () => true),
+      nextNumber(doc, "actions", "order", () => true),
     );
-    put(doc, "actions", key, action.name);
-    if (instanceId) put(doc, "actions", actionKey(key, "instance_id"), instanceId);
+    writeKey(doc, "actions", key, action.name);
+    if (instanceId) writeKey(doc, "actions", actionKey(key, "instance_id"), instanceId);
     if (action.type && action.type !== "sync")
-      put(doc, "actions", actionKey(key, "type"), action.type);
-    if (action.actor) put(doc, "actions", actionKey(key, "actor"), action.actor);
-    if (action.description) put(doc, "actions", actionKey(key, "description"), action.description);
+      writeKey(doc, "actions", actionKey(key, "type"), action.type);
+    if (action.actor) writeKey(doc, "actions", actionKey(key, "actor"), action.actor);
+    if (action.description)
+      writeKey(doc, "actions", actionKey(key, "description"), action.description);
     writeParameters(doc, key, "in", action.inputs ?? []);
     writeParameters(doc, key, "out", action.outputs ?? []);
-    for (const [field, text] of action.extra ?? []) put(doc, "actions", extraKey(key, field), text);
+    for (const [field, text] of action.extra ?? [])
+      writeKey(doc, "actions", extraKey(key, field), text);
     if (action.position) rootOf(doc, "positions").set(key, [...action.position]);
-    erase(doc, "meta", "x/actions");
-    settleGhosts(doc);
+    eraseKeys(doc, "meta", "x/actions");
+    numberGhosts(doc);
     return key;
   });
 }
@@ -90,8 +92,8 @@ export function removeActions(
   options: { readonly heal?: boolean } = {},
 ): void {
   const gone = new Set([...keys].filter((key) => key !== ENTRY && key !== EXIT));
-  together(doc, () => {
-    settleGhosts(doc);
+  asOneEdit(doc, () => {
+    numberGhosts(doc);
     if (options.heal) keepingEnds(doc, () => healAndRemove(doc, gone));
     else remove(doc, gone);
   });
@@ -110,11 +112,11 @@ function remove(doc: Y.Doc, gone: ReadonlySet<Key>): void {
     const ends = endsOf(splitKey(key).head);
     if (ends && (gone.has(ends.parent) || gone.has(ends.child))) relations.delete(key);
   }
-  erase(doc, "positions", ...gone);
+  eraseKeys(doc, "positions", ...gone);
 }
 
 function heal(doc: Y.Doc, key: Key): void {
-  const graph = graphOf(doc);
+  const graph = graphNow(doc);
   const { before, next } = around(graph, key);
   for (const parent of before) {
     for (const child of next) {
@@ -142,8 +144,8 @@ function around(graph: Graph, key: Key): { before: Relation[]; next: Relation[] 
 /** Renames; keeps the number unless another action of the new name has it. */
 export function rename(doc: Y.Doc, key: Key, name: string): boolean {
   if (!hasAction(doc, key)) return false;
-  together(doc, () => {
-    settleGhosts(doc);
+  asOneEdit(doc, () => {
+    numberGhosts(doc);
     const actions = numbersOf(doc);
     const action = actions.find((candidate) => candidate.key === key);
     if (action === undefined || action.name === name) return;
@@ -151,20 +153,20 @@ export function rename(doc: Y.Doc, key: Key, name: string): boolean {
       (other) => !other.missing && other.name === name && other.instanceId === action.instanceId,
     );
     const number = clash ? freeNumber(actions, name, key) : action.instanceId;
-    put(doc, "actions", key, name);
+    writeKey(doc, "actions", key, name);
     writeNumber(doc, key, number);
-    erase(doc, "actions", extraKey(key, "name"));
-    settleGhosts(doc);
+    eraseKeys(doc, "actions", extraKey(key, "name"));
+    numberGhosts(doc);
   });
   return true;
 }
 
 function writeNumber(doc: Y.Doc, key: Key, number: number): void {
   const field = actionKey(key, "instance_id");
-  if (number !== 0 || rootOf(doc, "actions").has(field)) put(doc, "actions", field, number);
-  erase(doc, "actions", extraKey(key, "instance_id"), actionKey(key, "twin"));
+  if (number !== 0 || rootOf(doc, "actions").has(field)) writeKey(doc, "actions", field, number);
+  eraseKeys(doc, "actions", extraKey(key, "instance_id"), actionKey(key, "twin"));
   const odd = [...rootOf(doc, "relations").keys()].filter((field) => saysNumberOf(field, key));
-  erase(doc, "relations", ...odd);
+  eraseKeys(doc, "relations", ...odd);
 }
 
 /** Whether a key keeps an imported number that refers to the action and did not fit. */
@@ -175,7 +177,7 @@ function saysNumberOf(field: string, key: Key): boolean {
   return rest === "x/parents/instance_id" && ends?.parent === key;
 }
 
-interface Fields {
+interface ActionFields {
   readonly type: string;
   readonly actor: string;
   readonly description: string;
@@ -183,22 +185,22 @@ interface Fields {
 }
 
 /** Sets one field of an action. A number that another action of the name has is shared out again. */
-export function setField<F extends keyof Fields>(
+export function setField<F extends keyof ActionFields>(
   doc: Y.Doc,
   key: Key,
   field: F,
-  value: Fields[F],
+  value: ActionFields[F],
 ): boolean {
   if (!hasAction(doc, key)) return false;
-  together(doc, () => {
+  asOneEdit(doc, () => {
     if (typeof value === "number") {
-      settleGhosts(doc);
+      numberGhosts(doc);
       writeNumber(doc, key, value);
-      settleGhosts(doc);
+      numberGhosts(doc);
       return;
     }
-    put(doc, "actions", actionKey(key, field), value);
-    erase(doc, "actions", extraKey(key, field));
+    writeKey(doc, "actions", actionKey(key, field), value);
+    eraseKeys(doc, "actions", extraKey(key, field));
   });
   return true;
 }
@@ -206,13 +208,13 @@ export function setField<F extends keyof Fields>(
 /** Makes a ghost an action of the graph, with its arrows as they are. */
 export function adoptGhost(doc: Y.Doc, key: Key, like: Omit<NewAction, "name"> = {}): boolean {
   if (!hasAction(doc, key)) return false;
-  together(doc, () => {
-    erase(doc, "actions", actionKey(key, "missing"));
-    put(
+  asOneEdit(doc, () => {
+    eraseKeys(doc, "actions", actionKey(key, "missing"));
+    writeKey(
       doc,
       "actions",
       actionKey(key, "order"),
-      after(doc, "actions", "order", () => true),
+      nextNumber(doc, "actions", "order", () => true),
     );
     if (like.type) setField(doc, key, "type", like.type);
     if (like.description) setField(doc, key, "description", like.description);

@@ -20,18 +20,18 @@ import { isAid, newAid } from "../ids";
 import { ENTRY, EXIT, type Key, type Position } from "../model";
 import { asNumber, asPosition } from "../values";
 import { freeNumber } from "./actions";
-import { after, numbersOf, put, settleGhosts, together } from "./document-writes";
+import { asOneEdit, nextNumber, numberGhosts, numbersOf, writeKey } from "./document-writes";
 
-type Values = Readonly<Record<string, unknown>>;
+type ClipValues = Readonly<Record<string, unknown>>;
 
 export interface Clip {
-  readonly actions: Values;
-  readonly relations: Values;
-  readonly positions: Values;
+  readonly actions: ClipValues;
+  readonly relations: ClipValues;
+  readonly positions: ClipValues;
 }
 
 /** Where pasted things stand: moved by so much, or with their upper left corner at a place. */
-export type Landing = { readonly by: Position } | { readonly at: Position };
+export type PastePosition = { readonly by: Position } | { readonly at: Position };
 
 /** What is chosen, with the arrows inside; `places` says where things stand that have no place. */
 export function clipOf(
@@ -41,7 +41,7 @@ export function clipOf(
 ): Clip {
   const maps = mapsOf(doc);
   const within = (key: Key) => isAid(key) && chosen.has(key);
-  const pick = (root: ReadonlyMap<string, unknown>, fits: (key: string) => boolean): Values =>
+  const pick = (root: ReadonlyMap<string, unknown>, fits: (key: string) => boolean): ClipValues =>
     Object.fromEntries([...root].filter(([key]) => fits(key)));
   const actions = pick(maps.actions, (key) => within(splitKey(key).head));
   const relations = pick(maps.relations, (key) => {
@@ -65,9 +65,9 @@ export function isEmpty(clip: Clip): boolean {
  * Adds the pieces as one edit and answers the keys of what is new. Arrows from the entry and to the
  * exit come along only into a graph that has no action yet: elsewhere nobody drew them.
  */
-export function paste(doc: Y.Doc, clip: Clip, landing: Landing): string[] {
-  return together(doc, () => {
-    settleGhosts(doc);
+export function paste(doc: Y.Doc, clip: Clip, landing: PastePosition): string[] {
+  return asOneEdit(doc, () => {
+    numberGhosts(doc);
     const empty = numbersOf(doc).length === 0;
     const names = new Map<Key, Key>();
     for (const [key, value] of Object.entries(clip.actions)) {
@@ -86,23 +86,23 @@ export function paste(doc: Y.Doc, clip: Clip, landing: Landing): string[] {
 
 function pasteActions(doc: Y.Doc, clip: Clip, names: ReadonlyMap<Key, Key>): void {
   const order = (key: Key) => asNumber(clip.actions[actionKey(key, "order")]) ?? 0;
-  let next = after(doc, "actions", "order", () => true);
+  let next = nextNumber(doc, "actions", "order", () => true);
   const known = [...numbersOf(doc)];
   for (const [old, key] of [...names].sort(([a], [b]) => order(a) - order(b))) {
     const name = String(clip.actions[old]);
     const wanted = asNumber(clip.actions[actionKey(old, "instance_id")]) ?? 0;
     const taken = known.some((other) => other.name === name && other.instanceId === wanted);
     const instanceId = taken ? freeNumber(known, name) : wanted;
-    put(doc, "actions", key, name);
-    put(doc, "actions", actionKey(key, "order"), next);
-    if (instanceId !== 0) put(doc, "actions", actionKey(key, "instance_id"), instanceId);
+    writeKey(doc, "actions", key, name);
+    writeKey(doc, "actions", actionKey(key, "order"), next);
+    if (instanceId !== 0) writeKey(doc, "actions", actionKey(key, "instance_id"), instanceId);
     next += 1;
     known.push({ ...BLANK, key, name, instanceId });
   }
   for (const [field, value] of Object.entries(clip.actions)) {
     const { head, rest } = splitKey(field);
     const key = names.get(head);
-    if (key && rest !== "" && !OWN.has(rest)) put(doc, "actions", actionKey(key, rest), value);
+    if (key && rest !== "" && !OWN.has(rest)) writeKey(doc, "actions", actionKey(key, rest), value);
   }
 }
 
@@ -132,7 +132,7 @@ function pasteRelations(doc: Y.Doc, clip: Clip, names: ReadonlyMap<Key, Key>): v
     const child = ends && names.get(ends.child);
     if (!parent || !child || NUMBERS.has(rest)) continue;
     const id = relationId({ parent, child, listing: ends.listing });
-    put(doc, "relations", `${id}|${rest}`, value);
+    writeKey(doc, "relations", `${id}|${rest}`, value);
   }
 }
 
@@ -140,7 +140,7 @@ function pastePositions(
   doc: Y.Doc,
   clip: Clip,
   names: ReadonlyMap<Key, Key>,
-  landing: Landing,
+  landing: PastePosition,
 ): string[] {
   const [dx, dy] = shiftOf(clip, landing);
   const positions = rootOf(doc, "positions");
@@ -153,13 +153,13 @@ function pastePositions(
     if (note === null) continue;
     const id = noteKey(newAid());
     const moved = { ...note.fields, at: [note.at[0] + dx, note.at[1] + dy] };
-    put(doc, "positions", id, JSON.stringify(moved));
+    writeKey(doc, "positions", id, JSON.stringify(moved));
     notes.push(id);
   }
   return notes;
 }
 
-function shiftOf(clip: Clip, landing: Landing): Position {
+function shiftOf(clip: Clip, landing: PastePosition): Position {
   if ("by" in landing) return landing.by;
   const places = Object.values(clip.positions).flatMap((value) => {
     const at = asPosition(value) ?? noteAt(value)?.at;

@@ -10,16 +10,16 @@ import type * as Y from "yjs";
 import { rootOf } from "../document-keys";
 import { newAid } from "../ids";
 import type { Key } from "../model";
-import { erase, put, together } from "./document-writes";
+import { asOneEdit, eraseKeys, writeKey } from "./document-writes";
 
-export interface Author {
+export interface CommentAuthor {
   readonly id: string;
   readonly name: string;
 }
 
-export interface Message {
+export interface CommentMessage {
   readonly id: string;
-  readonly author: Author;
+  readonly author: CommentAuthor;
   /** Milliseconds since 1970, by the clock of whoever wrote it. */
   readonly at: number;
   readonly text: string;
@@ -29,11 +29,11 @@ export interface Thread {
   readonly id: string;
   /** The action; it may be gone. */
   readonly about: Key;
-  readonly messages: readonly Message[];
+  readonly messages: readonly CommentMessage[];
   readonly resolved: boolean;
 }
 
-interface Said extends Message {
+interface ParsedMessage extends CommentMessage {
   readonly thread: string;
   readonly about: Key | null;
   readonly resolved: boolean | null;
@@ -43,7 +43,7 @@ const text = (value: unknown, most: number): string =>
   typeof value === "string" ? value.slice(0, most) : "";
 
 /** One message as somebody wrote it; null when it is none. */
-function said(key: string, value: unknown): Said | null {
+function said(key: string, value: unknown): ParsedMessage | null {
   const [thread, id, ...more] = key.split("/");
   if (!thread || !id || more.length > 0 || typeof value !== "string") return null;
   let body: unknown;
@@ -71,7 +71,7 @@ function said(key: string, value: unknown): Said | null {
 
 /** The threads of a document, the newest talk first. Never fails; skips what is none. */
 export function readThreads(comments: Iterable<readonly [string, unknown]>): Thread[] {
-  const threads = new Map<string, Said[]>();
+  const threads = new Map<string, ParsedMessage[]>();
   for (const [key, value] of comments) {
     const message = said(key, value);
     if (message === null) continue;
@@ -93,7 +93,7 @@ export function readThreads(comments: Iterable<readonly [string, unknown]>): Thr
 }
 
 /** How many threads are open about each action. */
-export function openTalk(threads: readonly Thread[]): Map<Key, number> {
+export function openThreadCounts(threads: readonly Thread[]): Map<Key, number> {
   const counts = new Map<Key, number>();
   for (const { about, resolved } of threads) {
     if (!resolved) counts.set(about, (counts.get(about) ?? 0) + 1);
@@ -102,7 +102,7 @@ export function openTalk(threads: readonly Thread[]): Map<Key, number> {
 }
 
 interface Words {
-  readonly author: Author;
+  readonly author: CommentAuthor;
   readonly at: number;
   readonly text: string;
 }
@@ -129,18 +129,18 @@ export function resolve(
 }
 
 /** Takes a message back. */
-export function unsay(doc: Y.Doc, thread: string, message: string): void {
+export function deleteMessage(doc: Y.Doc, thread: string, message: string): void {
   const key = `${thread}/${message}`;
   const first = said(key, rootOf(doc, "comments").get(key));
-  together(doc, () => {
+  asOneEdit(doc, () => {
     // The first message names the action; without its words the answers still have their place.
     if (first?.about != null) {
       const { about, author, at } = first;
-      put(doc, "comments", key, JSON.stringify({ about, author, at }));
-    } else erase(doc, "comments", key);
+      writeKey(doc, "comments", key, JSON.stringify({ about, author, at }));
+    } else eraseKeys(doc, "comments", key);
   });
 }
 
 function write(doc: Y.Doc, thread: string, body: Readonly<Record<string, unknown>>): void {
-  together(doc, () => put(doc, "comments", `${thread}/${newAid()}`, JSON.stringify(body)));
+  asOneEdit(doc, () => writeKey(doc, "comments", `${thread}/${newAid()}`, JSON.stringify(body)));
 }

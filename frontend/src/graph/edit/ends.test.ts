@@ -1,7 +1,7 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import type * as Y from "yjs";
-import { actionOf, docWith, graphOf } from "../../testing/edited-graph";
+import { actionIn, docWith, graphIn } from "../../testing/edited-graph";
 import { EXIT, type Key, type Precondition } from "../model";
 import {
   addAction,
@@ -19,12 +19,12 @@ import {
 
 /** Which actions the end waits for. */
 const waitedFor = (doc: Y.Doc): string[] =>
-  graphOf(doc)
+  graphIn(doc)
     .relations.filter(({ child, required }) => child === EXIT && required)
-    .map(({ parent }) => actionOf(doc, parent)?.name ?? "")
+    .map(({ parent }) => actionIn(doc, parent)?.name ?? "")
     .sort();
 
-const outputs = (doc: Y.Doc, key: Key) => actionOf(doc, key)?.outputs.map(({ text }) => text);
+const outputs = (doc: Y.Doc, key: Key) => actionIn(doc, key)?.outputs.map(({ text }) => text);
 
 type Three = [Y.Doc, Key, Key, Key];
 
@@ -102,7 +102,7 @@ test("an action that is put into the way to the end takes the place of the one b
   expect(waitedFor(doc)).toEqual([]);
   removeActions(doc, [x], { heal: true });
   expect(waitedFor(doc)).toEqual([]);
-  expect(graphOf(doc).relations.filter(({ child }) => child === EXIT)).toHaveLength(2);
+  expect(graphIn(doc).relations.filter(({ child }) => child === EXIT)).toHaveLength(2);
 });
 
 test("an arrow that is led to the end counts like a drawn one", () => {
@@ -149,12 +149,12 @@ test("it is one step of undo with the arrow", () => {
   const [doc, , b, c] = decided();
   addParameter(doc, c, "out", "x", NUMBER);
   setExit(doc, b);
-  const before = JSON.stringify(graphOf(doc));
+  const before = JSON.stringify(graphIn(doc));
   const undo = undoOf(doc);
   setExit(doc, c);
   expect(undo.undoStack).toHaveLength(1);
   undo.undo();
-  expect(JSON.stringify(graphOf(doc))).toBe(before);
+  expect(JSON.stringify(graphIn(doc))).toBe(before);
 });
 
 test("however it is drawn, the end waits for all or for none, and for all beside a fork", () => {
@@ -173,14 +173,14 @@ test("however it is drawn, the end waits for all or for none, and for all beside
       }
       const asked = new Set<string>();
       let forks = false;
-      for (const { parent, conditions } of graphOf(doc).relations) {
+      for (const { parent, conditions } of graphIn(doc).relations) {
         for (const when of ["on_true", "on_false", "on_error"] as const) {
           if (parent === "entry" || conditions[when] === "ignore") continue;
           forks ||= asked.has(parent + when);
           asked.add(parent + when);
         }
       }
-      const ends = graphOf(doc).relations.filter(({ child }) => child === EXIT);
+      const ends = graphIn(doc).relations.filter(({ child }) => child === EXIT);
       const waited = ends.filter(({ required }) => required);
       if (forks || ends.length < 2) expect(waited).toHaveLength(ends.length);
       else expect([0, ends.length]).toContain(waited.length);

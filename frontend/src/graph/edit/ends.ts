@@ -11,21 +11,21 @@ import type * as Y from "yjs";
 import { endsOf, parameterKey, relationId, rootOf, splitKey } from "../document-keys";
 import { memberText, withMember } from "../json-members";
 import { ENTRY, EXIT, type Graph, type Key, type Parameter, PRECONDITIONS } from "../model";
-import { erase, graphOf, put } from "./document-writes";
+import { eraseKeys, graphNow, writeKey } from "./document-writes";
 
 /** Does an edit of arrows, and makes the end wait for what it now has to wait for. */
 export function keepingEnds<T>(doc: Y.Doc, work: () => T): T {
-  const wasApart = severalEnds(doc) && sideBySide(graphOf(doc));
+  const wasApart = severalEnds(doc) && sideBySide(graphNow(doc));
   const done = work();
   if (!severalEnds(doc)) {
-    if (failureEnds(doc)) optionalOutputs(doc, graphOf(doc));
+    if (failureEnds(doc)) optionalOutputs(doc, graphNow(doc));
     return done;
   }
-  const graph = graphOf(doc);
+  const graph = graphNow(doc);
   if (sideBySide(graph)) {
-    if (!wasApart) for (const id of ends(graph)) erase(doc, "relations", `${id}|required`);
+    if (!wasApart) for (const id of ends(graph)) eraseKeys(doc, "relations", `${id}|required`);
   } else if (allReached(graph)) {
-    for (const id of ends(graph)) put(doc, "relations", `${id}|required`, false);
+    for (const id of ends(graph)) writeKey(doc, "relations", `${id}|required`, false);
   }
   if (failureEnds(doc) || outputsDiffer(graph)) optionalOutputs(doc, graph);
   return done;
@@ -33,10 +33,15 @@ export function keepingEnds<T>(doc: Y.Doc, work: () => T): T {
 
 /** Nobody waits for the outputs of this action: the end of the graph does not need them. */
 export function setOutputsOptional(doc: Y.Doc, key: Key): boolean {
-  const action = graphOf(doc).actions.find((candidate) => candidate.key === key);
+  const action = graphNow(doc).actions.find((candidate) => candidate.key === key);
   const waited = action?.outputs.filter(({ text }) => isWaitedFor(text)) ?? [];
   for (const { path, text } of waited) {
-    put(doc, "actions", parameterKey(key, "out", path), withMember(text, "pvf_required", "false"));
+    writeKey(
+      doc,
+      "actions",
+      parameterKey(key, "out", path),
+      withMember(text, "pvf_required", "false"),
+    );
   }
   return waited.length > 0;
 }

@@ -8,11 +8,11 @@ import {
   ABOUT,
   applyExamples,
   applyFix,
-  applySafe,
+  applySafeFixes,
   FIXES,
   type Fix,
   fixOf,
-  safeOnes,
+  safeFixes,
 } from "./fixes";
 
 const graphOf = (doc: Y.Doc): Graph => readGraph(mapsOf(doc));
@@ -140,7 +140,7 @@ test("every example is taken at once and undone at once, and never along with th
     addParameter(doc, aid, "in", "to", leaf);
     return { fix: "take-example", where: { aid, path: "/actions/0/input_parameters/to" } };
   });
-  expect(safeOnes(problems)).toEqual([]);
+  expect(safeFixes(problems)).toEqual([]);
   const undo = undoOf(doc);
   expect(applyExamples(doc, problems)).toBe(2);
   expect(applyExamples(doc, problems)).toBe(0);
@@ -162,8 +162,8 @@ test("everything that loses nothing is mended at once and undone at once", () =>
     { fix: "remove-relation", where: { relation: arrow } },
     { where: { aid: a } },
   ];
-  expect(safeOnes(problems)).toHaveLength(2);
-  expect(applySafe(doc, problems)).toBe(2);
+  expect(safeFixes(problems)).toHaveLength(2);
+  expect(applySafeFixes(doc, problems)).toBe(2);
   expect(graphOf(doc).relations).toHaveLength(1);
   undo.undo();
   expect(graphOf(doc).relations[0]?.only).toBe("parents");

@@ -10,7 +10,7 @@ import { endsOf } from "../document-keys";
 import { withMember } from "../json-members";
 import type { Key } from "../model";
 import { removeActions, setField } from "./actions";
-import { graphOf, numbersOf, together } from "./document-writes";
+import { asOneEdit, graphNow, numbersOf } from "./document-writes";
 import { setOutputsOptional } from "./ends";
 import { exampleOf } from "./examples";
 import { setParameter } from "./parameters";
@@ -87,7 +87,7 @@ export function applyFix(doc: Y.Doc, problem: Fixable): boolean {
   const fix = fixOf(problem);
   const place = fix && placeOf(fix, problem.where);
   if (!fix || !place) return false;
-  return together(doc, () => {
+  return asOneEdit(doc, () => {
     switch (fix) {
       case "mirror-relation":
         return mirrorRelation(doc, place);
@@ -108,7 +108,7 @@ export function applyFix(doc: Y.Doc, problem: Fixable): boolean {
 }
 
 /** Those that lose nothing, each by what it is about: two problems may have one fix. */
-export function safeOnes<P extends Fixable>(problems: readonly P[]): P[] {
+export function safeFixes<P extends Fixable>(problems: readonly P[]): P[] {
   const seen = new Set<string>();
   return problems.filter((problem) => {
     const fix = fixOf(problem);
@@ -121,22 +121,22 @@ export function safeOnes<P extends Fixable>(problems: readonly P[]): P[] {
 }
 
 /** All that lose nothing, as one step of undo. Answers how many did something. */
-export function applySafe(doc: Y.Doc, problems: readonly Fixable[]): number {
-  return together(doc, () => safeOnes(problems).filter((one) => applyFix(doc, one)).length);
+export function applySafeFixes(doc: Y.Doc, problems: readonly Fixable[]): number {
+  return asOneEdit(doc, () => safeFixes(problems).filter((one) => applyFix(doc, one)).length);
 }
 
 /** Those that take an example as value. */
-export function exampleOnes<P extends Fixable>(problems: readonly P[]): P[] {
+export function exampleFixes<P extends Fixable>(problems: readonly P[]): P[] {
   return problems.filter((problem) => fixOf(problem) === "take-example");
 }
 
 /** All that take an example, as one step of undo. Answers how many did something. */
 export function applyExamples(doc: Y.Doc, problems: readonly Fixable[]): number {
-  return together(doc, () => exampleOnes(problems).filter((one) => applyFix(doc, one)).length);
+  return asOneEdit(doc, () => exampleFixes(problems).filter((one) => applyFix(doc, one)).length);
 }
 
 function takeExample(doc: Y.Doc, key: Key, path: string): boolean {
-  const action = graphOf(doc).actions.find((candidate) => candidate.key === key);
+  const action = graphNow(doc).actions.find((candidate) => candidate.key === key);
   const input = action?.inputs.find((candidate) => candidate.path === path);
   const value = input ? exampleOf(input.text) : null;
   if (value === null) return false;
@@ -147,7 +147,7 @@ function takeExample(doc: Y.Doc, key: Key, path: string): boolean {
 function removeWithGhosts(doc: Y.Doc, id: string): boolean {
   const ends = endsOf(id);
   if (ends === null || !removeRelation(doc, id)) return false;
-  const { actions, relations } = graphOf(doc);
+  const { actions, relations } = graphNow(doc);
   const named = new Set(relations.flatMap(({ parent, child }) => [parent, child]));
   const lonely = actions.filter(
     ({ key, missing }) => missing && !named.has(key) && (key === ends.parent || key === ends.child),
@@ -180,6 +180,6 @@ function renumber(doc: Y.Doc, key: Key): boolean {
 }
 
 function typeSync(doc: Y.Doc, key: Key): boolean {
-  const action = graphOf(doc).actions.find((candidate) => candidate.key === key);
+  const action = graphNow(doc).actions.find((candidate) => candidate.key === key);
   return action?.type === "" && setField(doc, key, "type", "sync");
 }

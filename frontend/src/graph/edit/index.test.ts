@@ -2,13 +2,13 @@ import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
 import {
-  actionOf,
+  actionIn,
   arrows,
   copyOf,
   docWith,
   exchange,
-  graphOf,
-  relationOf,
+  graphIn,
+  relationIn,
   says,
   updatesOf,
 } from "../../testing/edited-graph";
@@ -18,6 +18,7 @@ import {
   addAction,
   addNote,
   addParameter,
+  asOneEdit,
   connect,
   insertInto,
   moveActions,
@@ -39,7 +40,6 @@ import {
   setRemap,
   setRequired,
   setResponse,
-  together,
   undoOf,
 } from ".";
 
@@ -57,7 +57,7 @@ test("an added action has what the library says of it, and the lowest free numbe
     outputs: parametersFrom({ found: { pvf_type: "bool" } }),
     position: [10, 20],
   });
-  expect(actionOf(doc, key)).toMatchObject({
+  expect(actionIn(doc, key)).toMatchObject({
     instanceId: 0,
     type: "async",
     actor: "robot",
@@ -69,7 +69,7 @@ test("an added action has what the library says of it, and the lowest free numbe
     outputs: [{ path: "found", text: '{"pvf_type":"bool"}' }],
     position: [10, 20],
   });
-  expect(graphOf(doc).actions.map(fullName)).toEqual(["Scan_1", "Grip_0", "Scan_0"]);
+  expect(graphIn(doc).actions.map(fullName)).toEqual(["Scan_1", "Grip_0", "Scan_0"]);
 });
 
 test("each edit is one update for the others, and one that changes nothing is none", () => {
@@ -81,7 +81,7 @@ test("each edit is one update for the others, and one that changes nothing is no
   expect(updatesOf(doc, () => moveActions(doc, [[a, [1, 2]]]))).toBe(1);
   expect(updatesOf(doc, () => moveActions(doc, [[a, [1, 2]]]))).toBe(0);
   const two = () =>
-    together(doc, () => {
+    asOneEdit(doc, () => {
       setGraphName(doc, "g");
       setGraphDescription(doc, "d");
     });
@@ -118,17 +118,17 @@ test("healing runs what would have followed the success of what was removed", ()
   connect(doc, y, y, "on_false");
   removeActions(doc, [x, y], { heal: true });
   expect(arrows(doc)).toEqual(["A>B"]);
-  expect(says(graphOf(doc).relations[0])).toEqual(["on_false -> run"]);
+  expect(says(graphIn(doc).relations[0])).toEqual(["on_false -> run"]);
 });
 
 test("a renamed action keeps its number unless the new name has it already", () => {
   const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
   const second = addAction(doc, { name: "A" });
   rename(doc, second, "C");
-  expect(fullName(actionOf(doc, second) as never)).toBe("C_1");
+  expect(fullName(actionIn(doc, second) as never)).toBe("C_1");
   rename(doc, b, "A");
-  expect(fullName(actionOf(doc, b) as never)).toBe("A_1");
-  expect(fullName(actionOf(doc, a) as never)).toBe("A_0");
+  expect(fullName(actionIn(doc, b) as never)).toBe("A_1");
+  expect(fullName(actionIn(doc, a) as never)).toBe("A_0");
   expect(rename(doc, "nobodynobody", "X")).toBe(false);
 });
 
@@ -137,16 +137,16 @@ test("a number that another action has is shared out; a twin that is renumbered 
   const twin = addAction(doc, { name: "A" });
   doc.getMap("actions").set(`${twin}|instance_id`, 0);
   doc.getMap("actions").set(`${twin}|twin`, true);
-  expect(graphOf(doc).actions.map(fullName)).toEqual(["A_0", "A_0"]);
+  expect(graphIn(doc).actions.map(fullName)).toEqual(["A_0", "A_0"]);
   setField(doc, twin, "instanceId", 4);
-  expect(actionOf(doc, twin)).toMatchObject({ instanceId: 4, twin: false });
+  expect(actionIn(doc, twin)).toMatchObject({ instanceId: 4, twin: false });
   setField(doc, twin, "instanceId", 0);
   expect(
-    graphOf(doc)
+    graphIn(doc)
       .actions.map((action) => action.instanceId)
       .sort(),
   ).toEqual([0, 1]);
-  expect(actionOf(doc, a)).toBeDefined();
+  expect(actionIn(doc, a)).toBeDefined();
 });
 
 test("an imported value that did not fit gives way to the first edit of its field", () => {
@@ -170,9 +170,9 @@ test("an imported value that did not fit gives way to the first edit of its fiel
   setRemap(doc, id, "x", "y");
   setGraphName(doc, "g");
   setField(doc, a, "instanceId", 3);
-  expect(actionOf(doc, a)?.extra).toEqual([["effect", "7"]]);
-  expect(relationOf(doc, id)).toMatchObject({ parentsExtra: [["id", "7"]], childrenExtra: [] });
-  expect(graphOf(doc).extra).toEqual([]);
+  expect(actionIn(doc, a)?.extra).toEqual([["effect", "7"]]);
+  expect(relationIn(doc, id)).toMatchObject({ parentsExtra: [["id", "7"]], childrenExtra: [] });
+  expect(graphIn(doc).extra).toEqual([]);
 });
 
 // -- parameters, notes ------------------------------------------------------------------------
@@ -187,7 +187,7 @@ test("parameters keep their text and their order", () => {
   expect(renameParameter(doc, a, "in", "a", "b")).toBe(true);
   expect(removeParameter(doc, a, "in", "z")).toBe(true);
   addParameter(doc, a, "in", "0", "2");
-  expect(actionOf(doc, a)?.inputs).toEqual([
+  expect(actionIn(doc, a)?.inputs).toEqual([
     { path: "b", text: '{"pvf_value": 5.0}' },
     { path: "m", text: "1.0" },
     { path: "0", text: "2" },
@@ -201,7 +201,7 @@ test("a change of a parameter keeps what a colleague has changed of it meanwhile
   setParameter(ben, a, "in", "x", (now) => now.replace("}", ', "pvf_locked": true}'));
   exchange(doc, ben);
   setParameter(doc, a, "in", "x", (now) => now.replace("}", ', "pvf_value": 1.0}'));
-  expect(actionOf(doc, a)?.inputs).toEqual([
+  expect(actionIn(doc, a)?.inputs).toEqual([
     { path: "x", text: '{"pvf_type": "number", "pvf_locked": true, "pvf_value": 1.0}' },
   ]);
 });
@@ -213,7 +213,7 @@ test("two people who fill in different parameters both keep theirs", () => {
   addParameter(colleague, a, "in", "theirs", "2");
   exchange(doc, colleague);
   expect(
-    actionOf(doc, a)
+    actionIn(doc, a)
       ?.inputs.map((parameter) => parameter.path)
       .sort(),
   ).toEqual(["mine", "theirs"]);
@@ -223,9 +223,9 @@ test("notes are added, changed and removed", () => {
   const doc = new Y.Doc();
   const id = addNote(doc, '{"text":"a"}');
   setNote(doc, id, '{"text":"b"}');
-  expect(graphOf(doc).notes).toEqual([[id, '{"text":"b"}']]);
+  expect(graphIn(doc).notes).toEqual([[id, '{"text":"b"}']]);
   removeNotes(doc, [id]);
-  expect(graphOf(doc).notes).toEqual([]);
+  expect(graphIn(doc).notes).toEqual([]);
 });
 
 // -- undo -------------------------------------------------------------------------------------
@@ -237,20 +237,20 @@ test("an undone delete brings back everything, with what a colleague changed mea
   setEntry(doc, a);
   moveActions(doc, [[a, [1, 2]]]);
   const undo = undoOf(doc);
-  const before = graphOf(doc);
+  const before = graphIn(doc);
   const colleague = copyOf(doc);
   removeActions(doc, [a]);
   setField(colleague, a, "description", "new");
   connect(colleague, a, b, "on_true");
   exchange(doc, colleague);
-  expect(actionOf(colleague, a)).toBeUndefined();
+  expect(actionIn(colleague, a)).toBeUndefined();
   undo.undo();
   exchange(doc, colleague);
-  const after = graphOf(doc);
-  expect(actionOf(doc, a)).toEqual({ ...before.actions[0], description: "new" });
-  expect(says(relationOf(doc, `${a}>${b}`))).toEqual(["on_true -> run", "on_error -> run"]);
+  const after = graphIn(doc);
+  expect(actionIn(doc, a)).toEqual({ ...before.actions[0], description: "new" });
+  expect(says(relationIn(doc, `${a}>${b}`))).toEqual(["on_true -> run", "on_error -> run"]);
   expect(arrows(doc)).toEqual(["A>B", "entry>A"]);
-  expect(graphOf(colleague)).toEqual(after);
+  expect(graphIn(colleague)).toEqual(after);
 });
 
 test("undo takes back one edit at a time, and only one's own", () => {
@@ -262,11 +262,11 @@ test("undo takes back one edit at a time, and only one's own", () => {
   setField(colleague, a, "description", "theirs");
   exchange(doc, colleague);
   undo.undo();
-  expect(actionOf(doc, a)).toMatchObject({ name: "A", actor: "mine", description: "theirs" });
+  expect(actionIn(doc, a)).toMatchObject({ name: "A", actor: "mine", description: "theirs" });
   undo.undo();
-  expect(actionOf(doc, a)).toMatchObject({ name: "A", actor: "", description: "theirs" });
+  expect(actionIn(doc, a)).toMatchObject({ name: "A", actor: "", description: "theirs" });
   undo.redo();
-  expect(actionOf(doc, a)).toMatchObject({ actor: "mine" });
+  expect(actionIn(doc, a)).toMatchObject({ actor: "mine" });
   expect(undo.undoStack.length).toBe(1);
 });
 
@@ -278,7 +278,7 @@ test("undoing an edit does not take back what a colleague wrote over it", () => 
   setField(colleague, a, "description", "theirs");
   exchange(doc, colleague);
   undo.undo();
-  expect(actionOf(doc, a)?.description).toBe("theirs");
+  expect(actionIn(doc, a)?.description).toBe("theirs");
 });
 
 // -- people race ------------------------------------------------------------------------------
@@ -287,7 +287,7 @@ type Step = readonly [person: number, edit: number, x: number, y: number];
 
 /** One of the edits, aimed at whatever the person sees. */
 function act(doc: Y.Doc, undo: Y.UndoManager, [, edit, x, y]: Step): void {
-  const { actions, relations } = graphOf(doc);
+  const { actions, relations } = graphIn(doc);
   const key = (n: number) => actions[n % Math.max(1, actions.length)]?.key ?? "nobodynobody";
   const relation = relations[x % Math.max(1, relations.length)];
   const id = relation ? relationId(relation) : "";
@@ -326,8 +326,8 @@ test("whatever people do at once, all see the same graph, with names that differ
           act(people[person as 0 | 1], undos[person] as Y.UndoManager, step);
         }
         exchange(...people);
-        const graph = graphOf(people[0]);
-        expect(graphOf(people[1])).toEqual(graph);
+        const graph = graphIn(people[0]);
+        expect(graphIn(people[1])).toEqual(graph);
         expect(new Set(graph.actions.map(fullName)).size).toBe(graph.actions.length);
         const ends = new Set([ENTRY, EXIT, ...graph.actions.map((action) => action.key)]);
         for (const { parent, child } of graph.relations)
@@ -344,11 +344,11 @@ test("undoing everything brings back the beginning", () => {
     fc.property(fc.array(steps, { maxLength: 12 }), (script) => {
       const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
       connect(doc, a, b);
-      const before = graphOf(doc);
+      const before = graphIn(doc);
       const undo = undoOf(doc);
       for (const step of script) act(doc, undo, step);
       while (undo.canUndo()) undo.undo();
-      expect(graphOf(doc)).toEqual(before);
+      expect(graphIn(doc)).toEqual(before);
     }),
     { numRuns: 100 },
   );

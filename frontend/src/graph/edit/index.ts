@@ -1,8 +1,8 @@
 /**
  * Every edit of a graph, as functions over the Yjs document.
  *
- * Each is one transaction of the person's own (see `MINE`), so one update for the others and one
- * step of undo; `together` joins several. An edit of something that a colleague has deleted
+ * Each is one transaction of the person's own (see `OWN_EDITS`), so one update for the others and one
+ * step of undo; `asOneEdit` joins several. An edit of something that a colleague has deleted
  * meanwhile does nothing and says so by its answer: null or false. What was imported and did not fit
  * (`x/<field>`) gives way to the first edit of its field.
  */
@@ -11,30 +11,30 @@ import type * as Y from "yjs";
 import { noteKey, rootOf } from "../document-keys";
 import { newAid } from "../ids";
 import type { JsonText, Key, Position } from "../model";
-import { erase, hasEnd, put, together } from "./document-writes";
+import { asOneEdit, eraseKeys, hasEnd, writeKey } from "./document-writes";
 
 export * from "./actions";
-export { MINE, together, undoOf } from "./document-writes";
+export { asOneEdit, OWN_EDITS, undoOf } from "./document-writes";
 export * from "./parameters";
 export * from "./relations";
 
 export function setGraphName(doc: Y.Doc, name: string): void {
-  together(doc, () => {
-    put(doc, "meta", "name", name);
-    erase(doc, "meta", "x/graph_name");
+  asOneEdit(doc, () => {
+    writeKey(doc, "meta", "name", name);
+    eraseKeys(doc, "meta", "x/graph_name");
   });
 }
 
 export function setGraphDescription(doc: Y.Doc, description: string): void {
-  together(doc, () => {
-    put(doc, "meta", "description", description);
-    erase(doc, "meta", "x/graph_description");
+  asOneEdit(doc, () => {
+    writeKey(doc, "meta", "description", description);
+    eraseKeys(doc, "meta", "x/graph_description");
   });
 }
 
 /** Writes where things stand, once, when they are dropped: actions, `ENTRY` and `EXIT`. */
 export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Position]>): void {
-  together(doc, () => {
+  asOneEdit(doc, () => {
     for (const [key, [x, y]] of positions) {
       if (!hasEnd(doc, key)) continue;
       const old = rootOf(doc, "positions").get(key);
@@ -48,18 +48,18 @@ export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Posit
 /** Adds a note or frame; `text` is its JSON. Answers its id. */
 export function addNote(doc: Y.Doc, text: JsonText): string {
   const id = newAid();
-  together(doc, () => put(doc, "positions", noteKey(id), text));
+  asOneEdit(doc, () => writeKey(doc, "positions", noteKey(id), text));
   return id;
 }
 
 export function setNote(doc: Y.Doc, id: string, text: JsonText): boolean {
   if (!rootOf(doc, "positions").has(noteKey(id))) return false;
-  together(doc, () => put(doc, "positions", noteKey(id), text));
+  asOneEdit(doc, () => writeKey(doc, "positions", noteKey(id), text));
   return true;
 }
 
 export function removeNotes(doc: Y.Doc, ids: Iterable<string>): void {
-  together(doc, () => {
-    for (const id of ids) erase(doc, "positions", noteKey(id));
+  asOneEdit(doc, () => {
+    for (const id of ids) eraseKeys(doc, "positions", noteKey(id));
   });
 }

@@ -5,7 +5,7 @@ import { noteKey, rootOf } from "../document-keys";
 import type { Graph, JsonText, Position } from "../model";
 import { asJsonText } from "../values";
 import { addNote, setNote } from ".";
-import { together } from "./document-writes";
+import { asOneEdit } from "./document-writes";
 
 export const NOTE_COLORS = ["grey", "amber", "green", "blue", "violet", "red"] as const;
 export type NoteColor = (typeof NOTE_COLORS)[number];
@@ -90,7 +90,7 @@ function textOf({ kind, at, size, text, color }: NewNote, others: object): JsonT
 
 /** Moves several as one edit. */
 export function placeNotes(doc: Y.Doc, graph: Graph, places: ReadonlyMap<string, Position>): void {
-  together(doc, () => {
+  asOneEdit(doc, () => {
     for (const { key, at } of notesOf(graph)) {
       const to = places.get(key);
       if (to && (to[0] !== at[0] || to[1] !== at[1])) changeNote(doc, key, { at: to });

@@ -1,10 +1,17 @@
 /** Edits of parameters. Values are JSON text, so that what a person types stays as typed. */
 
 import type * as Y from "yjs";
-import { actionKey, extraKey, parameterKey, pathOf, rootOf, type Side } from "../document-keys";
+import {
+  actionKey,
+  extraKey,
+  type ParameterSide,
+  parameterKey,
+  pathOf,
+  rootOf,
+} from "../document-keys";
 import type { JsonText, Key, Parameter } from "../model";
 import { asJsonText } from "../values";
-import { erase, graphOf, hasAction, put, together } from "./document-writes";
+import { asOneEdit, eraseKeys, graphNow, hasAction, writeKey } from "./document-writes";
 
 const FIELDS = { in: "input_parameters", out: "output_parameters" } as const;
 
@@ -15,7 +22,7 @@ const FIELDS = { in: "input_parameters", out: "output_parameters" } as const;
 export function setParameter(
   doc: Y.Doc,
   key: Key,
-  side: Side,
+  side: ParameterSide,
   path: string,
   change: (now: JsonText) => JsonText,
 ): boolean {
@@ -23,9 +30,9 @@ export function setParameter(
   const now = asJsonText(rootOf(doc, "actions").get(parameterKey(key, side, path)));
   const text = change(now ?? "null");
   if (asJsonText(text) === undefined) return false;
-  together(doc, () => {
-    put(doc, "actions", parameterKey(key, side, path), text);
-    erase(doc, "actions", extraKey(key, FIELDS[side]));
+  asOneEdit(doc, () => {
+    writeKey(doc, "actions", parameterKey(key, side, path), text);
+    eraseKeys(doc, "actions", extraKey(key, FIELDS[side]));
   });
   return true;
 }
@@ -34,25 +41,25 @@ export function setParameter(
 export function addParameter(
   doc: Y.Doc,
   key: Key,
-  side: Side,
+  side: ParameterSide,
   path: string,
   text: JsonText,
 ): boolean {
   if (!hasAction(doc, key) || exists(doc, key, side, path)) return false;
   if (asJsonText(text) === undefined) return false;
-  together(doc, () => {
+  asOneEdit(doc, () => {
     const paths = pathsOf(doc, key, side);
-    put(doc, "actions", parameterKey(key, side, path), text);
+    writeKey(doc, "actions", parameterKey(key, side, path), text);
     writePaths(doc, key, side, [...paths, path]);
   });
   return true;
 }
 
-export function removeParameter(doc: Y.Doc, key: Key, side: Side, path: string): boolean {
+export function removeParameter(doc: Y.Doc, key: Key, side: ParameterSide, path: string): boolean {
   if (!exists(doc, key, side, path)) return false;
-  together(doc, () => {
+  asOneEdit(doc, () => {
     const paths = pathsOf(doc, key, side).filter((other) => other !== path);
-    erase(doc, "actions", parameterKey(key, side, path));
+    eraseKeys(doc, "actions", parameterKey(key, side, path));
     writePaths(doc, key, side, paths);
   });
   return true;
@@ -62,46 +69,52 @@ export function removeParameter(doc: Y.Doc, key: Key, side: Side, path: string):
 export function renameParameter(
   doc: Y.Doc,
   key: Key,
-  side: Side,
+  side: ParameterSide,
   path: string,
   to: string,
 ): boolean {
   if (!exists(doc, key, side, path) || exists(doc, key, side, to)) return false;
-  together(doc, () => {
+  asOneEdit(doc, () => {
     const paths = pathsOf(doc, key, side).map((other) => (other === path ? to : other));
     const text = rootOf(doc, "actions").get(parameterKey(key, side, path));
-    put(doc, "actions", parameterKey(key, side, to), text);
-    erase(doc, "actions", parameterKey(key, side, path));
+    writeKey(doc, "actions", parameterKey(key, side, to), text);
+    eraseKeys(doc, "actions", parameterKey(key, side, path));
     writePaths(doc, key, side, paths);
   });
   return true;
 }
 
-function exists(doc: Y.Doc, key: Key, side: Side, path: string): boolean {
+function exists(doc: Y.Doc, key: Key, side: ParameterSide, path: string): boolean {
   return hasAction(doc, key) && rootOf(doc, "actions").has(parameterKey(key, side, path));
 }
 
-function pathsOf(doc: Y.Doc, key: Key, side: Side): string[] {
-  const action = graphOf(doc).actions.find((candidate) => candidate.key === key);
+function pathsOf(doc: Y.Doc, key: Key, side: ParameterSide): string[] {
+  const action = graphNow(doc).actions.find((candidate) => candidate.key === key);
   const parameters = side === "in" ? action?.inputs : action?.outputs;
   return (parameters ?? []).map((parameter) => parameter.path);
 }
 
-function writePaths(doc: Y.Doc, key: Key, side: Side, paths: readonly string[]): void {
-  put(doc, "actions", actionKey(key, side), JSON.stringify(paths));
-  erase(doc, "actions", extraKey(key, FIELDS[side]));
+function writePaths(doc: Y.Doc, key: Key, side: ParameterSide, paths: readonly string[]): void {
+  writeKey(doc, "actions", actionKey(key, side), JSON.stringify(paths));
+  eraseKeys(doc, "actions", extraKey(key, FIELDS[side]));
 }
 
 /** Writes the parameters of a new action. */
 export function writeParameters(
   doc: Y.Doc,
   key: Key,
-  side: Side,
+  side: ParameterSide,
   parameters: readonly Parameter[],
 ): void {
   if (parameters.length === 0) return;
-  for (const { path, text } of parameters) put(doc, "actions", parameterKey(key, side, path), text);
-  put(doc, "actions", actionKey(key, side), JSON.stringify(parameters.map(({ path }) => path)));
+  for (const { path, text } of parameters)
+    writeKey(doc, "actions", parameterKey(key, side, path), text);
+  writeKey(
+    doc,
+    "actions",
+    actionKey(key, side),
+    JSON.stringify(parameters.map(({ path }) => path)),
+  );
 }
 
 /** The parameters of a parsed `input_parameters` or `output_parameters` object. */

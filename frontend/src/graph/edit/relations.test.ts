@@ -1,13 +1,13 @@
 import { expect, test } from "vitest";
 import type * as Y from "yjs";
 import {
-  actionOf,
+  actionIn,
   arrows,
   copyOf,
   docWith,
   exchange,
-  graphOf,
-  relationOf,
+  graphIn,
+  relationIn,
   says,
   updatesOf,
 } from "../../testing/edited-graph";
@@ -44,16 +44,16 @@ test("a new arrow says what was drawn and nothing else", () => {
   const [doc, a, b, c] = docWith("A", "B", "C") as [Y.Doc, Key, Key, Key];
   const onFalse = connect(doc, a, b, "on_false");
   const onTrue = connect(doc, a, c, "on_true");
-  expect(says(relationOf(doc, onFalse))).toEqual(["on_false -> run"]);
-  expect(says(relationOf(doc, onTrue))).toEqual(["on_true -> run"]);
-  expect(relationOf(doc, onTrue)).toMatchObject({ parentOrder: 1, childOrder: 0, required: true });
+  expect(says(relationIn(doc, onFalse))).toEqual(["on_false -> run"]);
+  expect(says(relationIn(doc, onTrue))).toEqual(["on_true -> run"]);
+  expect(relationIn(doc, onTrue)).toMatchObject({ parentOrder: 1, childOrder: 0, required: true });
 });
 
 test("connecting two that are connected adds the outcome", () => {
   const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
   const id = connect(doc, a, b, "on_true");
   expect(connect(doc, a, b, "on_error")).toBe(id);
-  expect(says(relationOf(doc, id))).toEqual(["on_true -> run", "on_error -> run"]);
+  expect(says(relationIn(doc, id))).toEqual(["on_true -> run", "on_error -> run"]);
 });
 
 test("drawing clears leftovers of a relation that was there before", () => {
@@ -64,9 +64,9 @@ test("drawing clears leftovers of a relation that was there before", () => {
   setRequired(colleague, id, false);
   setRemap(colleague, id, "x", "y");
   exchange(doc, colleague);
-  expect(relationOf(doc, id)).toBeUndefined();
+  expect(relationIn(doc, id)).toBeUndefined();
   connect(doc, a, b, "on_false");
-  expect(relationOf(doc, id)).toMatchObject({ required: true, remap: [] });
+  expect(relationIn(doc, id)).toMatchObject({ required: true, remap: [] });
 });
 
 test("both of two people who connect the same pair are heard", () => {
@@ -75,8 +75,8 @@ test("both of two people who connect the same pair are heard", () => {
   const id = connect(doc, a, b, "on_true");
   connect(colleague, a, b, "on_error");
   exchange(doc, colleague);
-  expect(says(relationOf(doc, id))).toEqual(["on_true -> run", "on_error -> run"]);
-  expect(graphOf(doc)).toEqual(graphOf(colleague));
+  expect(says(relationIn(doc, id))).toEqual(["on_true -> run", "on_error -> run"]);
+  expect(graphIn(doc)).toEqual(graphIn(colleague));
 });
 
 test("nothing leads into the entry, out of the exit, from one to the other, or to nobody", () => {
@@ -90,7 +90,7 @@ test("nothing leads into the entry, out of the exit, from one to the other, or t
     ["x", a],
   ] as const)
     expect(connect(doc, parent, child)).toBeNull();
-  expect(graphOf(doc).relations).toEqual([]);
+  expect(graphIn(doc).relations).toEqual([]);
 });
 
 test("an entry says run and nothing else; an exit says after which outcomes", () => {
@@ -99,18 +99,18 @@ test("an entry says run and nothing else; an exit says after which outcomes", ()
   expect(setResponse(doc, entry, "on_false", "run")).toBe(false);
   const exit = setExit(doc, a, "on_false");
   setExit(doc, a, "on_true");
-  expect(says(relationOf(doc, entry))).toEqual(["on_true -> run"]);
-  expect(says(relationOf(doc, exit))).toEqual(["on_true -> run", "on_false -> run"]);
+  expect(says(relationIn(doc, entry))).toEqual(["on_true -> run"]);
+  expect(says(relationIn(doc, exit))).toEqual(["on_true -> run", "on_false -> run"]);
   expect(unsetEntry(doc, a) && unsetExit(doc, a)).toBe(true);
   expect(unsetExit(doc, a)).toBe(false);
-  expect(graphOf(doc).relations).toEqual([]);
+  expect(graphIn(doc).relations).toEqual([]);
 });
 
 test("a relation that only ignores is still a relation", () => {
   const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
   const id = connect(doc, a, b) as string;
   setResponse(doc, id, "on_true", "ignore");
-  expect(says(relationOf(doc, id))).toEqual([]);
+  expect(says(relationIn(doc, id))).toEqual([]);
 });
 
 test("a one-sided relation stays so until an edit needs the other side, or it is mirrored", () => {
@@ -119,15 +119,15 @@ test("a one-sided relation stays so until an edit needs the other side, or it is
   const set = (side: string) => doc.getMap("relations").set(`${id}|only`, side);
   set("children");
   setRemap(doc, id, "x", "y");
-  expect(relationOf(doc, id)?.only).toBe("children");
+  expect(relationIn(doc, id)?.only).toBe("children");
   setResponse(doc, id, "on_error", "stop");
-  expect(relationOf(doc, id)?.only).toBeNull();
+  expect(relationIn(doc, id)?.only).toBeNull();
   set("parents");
   setRemap(doc, id, "x", null);
-  expect(relationOf(doc, id)).toMatchObject({ only: null, remap: [] });
+  expect(relationIn(doc, id)).toMatchObject({ only: null, remap: [] });
   set("parents");
   mirrorRelation(doc, id);
-  expect(relationOf(doc, id)?.only).toBeNull();
+  expect(relationIn(doc, id)?.only).toBeNull();
 });
 
 test("an arrow led elsewhere keeps what it says", () => {
@@ -136,12 +136,12 @@ test("an arrow led elsewhere keeps what it says", () => {
   setRequired(doc, id, false);
   setRemap(doc, id, "x", "y");
   const moved = moveRelation(doc, id, { child: c });
-  expect(relationOf(doc, id)).toBeUndefined();
-  expect(relationOf(doc, moved)).toMatchObject({
+  expect(relationIn(doc, id)).toBeUndefined();
+  expect(relationIn(doc, moved)).toMatchObject({
     required: false,
     remap: [{ source: "x", target: "y" }],
   });
-  expect(says(relationOf(doc, moved))).toEqual(["on_error -> stop"]);
+  expect(says(relationIn(doc, moved))).toEqual(["on_error -> stop"]);
   connect(doc, a, b);
   expect(moveRelation(doc, moved as string, { child: b })).toBeNull();
   expect(arrows(doc)).toEqual(["A>B", "A>C"]);
@@ -153,9 +153,9 @@ test("an action put into an arrow takes over what it said, and its success leads
   connect(doc, a, c);
   expect(insertInto(doc, id, x)).toBe(true);
   expect(arrows(doc)).toEqual(["A>C", "A>X", "X>B"]);
-  expect(says(relationOf(doc, `${a}>${x}`))).toEqual(["on_false -> run"]);
-  expect(relationOf(doc, `${a}>${x}`)?.parentOrder).toBe(0);
-  expect(says(relationOf(doc, `${x}>${b}`))).toEqual(["on_true -> run"]);
+  expect(says(relationIn(doc, `${a}>${x}`))).toEqual(["on_false -> run"]);
+  expect(relationIn(doc, `${a}>${x}`)?.parentOrder).toBe(0);
+  expect(says(relationIn(doc, `${x}>${b}`))).toEqual(["on_true -> run"]);
 });
 
 test("disconnecting removes every listing of a pair", () => {
@@ -163,7 +163,7 @@ test("disconnecting removes every listing of a pair", () => {
   connect(doc, a, b);
   doc.getMap("relations").set(`${a}>${b};2|on_true`, "run");
   expect(disconnect(doc, a, b)).toBe(true);
-  expect(graphOf(doc).relations).toEqual([]);
+  expect(graphIn(doc).relations).toEqual([]);
 });
 
 test("edits of what a colleague deleted do nothing and say so", () => {
@@ -204,23 +204,23 @@ test("a ghost's arrows become those of the action that takes up its name, and st
   const cook = addAction(doc, { name: "Cook" });
   rename(doc, cook, "Bake");
   expect(arrows(doc)).toEqual(["A>Bake"]);
-  expect(actionOf(doc, ghost)).toBeUndefined();
-  expect(actionOf(doc, cook)?.instanceId).toBe(0);
+  expect(actionIn(doc, ghost)).toBeUndefined();
+  expect(actionIn(doc, cook)?.instanceId).toBe(0);
 });
 
 test("an arrow of a ghost that a colleague filled meanwhile can be edited as it is shown", () => {
   const [doc, a, ghost] = withGhost();
   doc.getMap("actions").set("CookCookCook", "Cook");
-  const [shown] = graphOf(doc).relations;
+  const [shown] = graphIn(doc).relations;
   expect(shown).toMatchObject({ parent: a, child: "CookCookCook" });
   expect(setResponse(doc, relationId(shown as Relation), "on_error", "stop")).toBe(true);
-  expect(says(graphOf(doc).relations[0])).toEqual(["on_error -> stop"]);
+  expect(says(graphIn(doc).relations[0])).toEqual(["on_error -> stop"]);
   expect([...doc.getMap("actions").keys()].some((key) => key.startsWith(ghost))).toBe(false);
 });
 
 test("a ghost can be made an action", () => {
   const [doc, , ghost] = withGhost();
   adoptGhost(doc, ghost, { type: "async", inputs: [{ path: "x", text: "1" }] });
-  expect(actionOf(doc, ghost)).toMatchObject({ missing: false, type: "async" });
+  expect(actionIn(doc, ghost)).toMatchObject({ missing: false, type: "async" });
   expect(arrows(doc)).toEqual(["A>Cook"]);
 });

@@ -2,18 +2,18 @@
 
 import type * as Y from "yjs";
 import { endsOf, relationId, rootOf } from "../document-keys";
-import { ENTRY, EXIT, type Key, type Precondition, type Response, spoken } from "../model";
+import { ENTRY, EXIT, type Key, type Precondition, type Response, spokenOutcomes } from "../model";
 import {
-  after,
-  erase,
+  asOneEdit,
+  eraseKeys,
   hasEnd,
   hasRelation,
-  keysOf,
+  keysOfOwner,
   moveKeys,
-  put,
-  relationOf,
-  settleGhosts,
-  together,
+  nextNumber,
+  numberGhosts,
+  relationNow,
+  writeKey,
 } from "./document-writes";
 import { keepingEnds } from "./ends";
 
@@ -30,7 +30,7 @@ export function connect(
   outcome: Precondition = "on_true",
   response: Response = "run",
 ): string | null {
-  return together(doc, () => keepingEnds(doc, () => draw(doc, parent, child, outcome, response)));
+  return asOneEdit(doc, () => keepingEnds(doc, () => draw(doc, parent, child, outcome, response)));
 }
 
 /** The arrow alone, as a part of an edit that keeps the ends itself. */
@@ -43,18 +43,18 @@ export function draw(
 ): string | null {
   const drawn = relationId({ parent, child });
   if (endsOf(drawn) === null || !hasEnd(doc, parent) || !hasEnd(doc, child)) return null;
-  return together(doc, () => {
-    settleGhosts(doc);
+  return asOneEdit(doc, () => {
+    numberGhosts(doc);
     const known = pairOf(doc, parent, child);
     const id = known ?? drawn;
     if (known === null) {
-      erase(doc, "relations", ...keysOf(doc, "relations", id));
-      put(doc, "relations", `${id}|po`, nextOf(doc, "po", "parent", parent));
-      put(doc, "relations", `${id}|co`, nextOf(doc, "co", "child", child));
+      eraseKeys(doc, "relations", ...keysOfOwner(doc, "relations", id));
+      writeKey(doc, "relations", `${id}|po`, nextOf(doc, "po", "parent", parent));
+      writeKey(doc, "relations", `${id}|co`, nextOf(doc, "co", "child", child));
     }
-    if (parent === ENTRY) put(doc, "relations", `${id}|on_true`, "run");
-    else put(doc, "relations", `${id}|${outcome}`, response);
-    erase(doc, "relations", `${id}|only`);
+    if (parent === ENTRY) writeKey(doc, "relations", `${id}|on_true`, "run");
+    else writeKey(doc, "relations", `${id}|${outcome}`, response);
+    eraseKeys(doc, "relations", `${id}|only`);
     forget(doc, id, "conditions", "parents");
     forgetSide(doc, id);
     return id;
@@ -76,28 +76,28 @@ function pairOf(doc: Y.Doc, parent: Key, child: Key): string | null {
 }
 
 function nextOf(doc: Y.Doc, field: "po" | "co", end: "parent" | "child", key: Key): number {
-  return after(doc, "relations", field, (head) => endsOf(head)?.[end] === key);
+  return nextNumber(doc, "relations", field, (head) => endsOf(head)?.[end] === key);
 }
 
 /** An imported value of a field that did not fit gives way. */
 function forget(doc: Y.Doc, id: string, field: string, side: "parents" | "children"): void {
-  erase(doc, "relations", `${id}|x/${side}/${field}`);
+  eraseKeys(doc, "relations", `${id}|x/${side}/${field}`);
 }
 
 /** An imported list that was none, on either side, gives way to a real relation. */
 function forgetSide(doc: Y.Doc, id: string): void {
   const ends = endsOf(id);
   if (ends === null) return;
-  if (ends.parent === ENTRY) erase(doc, "meta", "x/graph_entry");
-  else erase(doc, "actions", `${ends.parent}|x/children`);
-  if (ends.child === EXIT) erase(doc, "meta", "x/graph_exit");
-  else erase(doc, "actions", `${ends.child}|x/parents`);
+  if (ends.parent === ENTRY) eraseKeys(doc, "meta", "x/graph_entry");
+  else eraseKeys(doc, "actions", `${ends.parent}|x/children`);
+  if (ends.child === EXIT) eraseKeys(doc, "meta", "x/graph_exit");
+  else eraseKeys(doc, "actions", `${ends.child}|x/parents`);
 }
 
 /** One edit of a relation that exists: false when it does not. */
 function edit(doc: Y.Doc, id: string, write: () => void): boolean {
-  return together(doc, () => {
-    settleGhosts(doc);
+  return asOneEdit(doc, () => {
+    numberGhosts(doc);
     if (!hasRelation(doc, id)) return false;
     write();
     return true;
@@ -107,7 +107,7 @@ function edit(doc: Y.Doc, id: string, write: () => void): boolean {
 /** A field that lives on one side of the file needs that side to be written. */
 function needs(doc: Y.Doc, id: string, side: "parents" | "children"): void {
   const only = rootOf(doc, "relations").get(`${id}|only`);
-  if (only !== undefined && only !== side) erase(doc, "relations", `${id}|only`);
+  if (only !== undefined && only !== side) eraseKeys(doc, "relations", `${id}|only`);
 }
 
 /** What the child does after one outcome. An entry says `run` and nothing else. */
@@ -118,12 +118,12 @@ export function setResponse(
   response: Response,
 ): boolean {
   if (endsOf(id)?.parent === ENTRY) return false;
-  return together(doc, () => keepingEnds(doc, () => answer(doc, id, outcome, response)));
+  return asOneEdit(doc, () => keepingEnds(doc, () => answer(doc, id, outcome, response)));
 }
 
 function answer(doc: Y.Doc, id: string, outcome: Precondition, response: Response): boolean {
   return edit(doc, id, () => {
-    put(doc, "relations", `${id}|${outcome}`, response);
+    writeKey(doc, "relations", `${id}|${outcome}`, response);
     forget(doc, id, "conditions", "parents");
     needs(doc, id, "parents");
   });
@@ -132,8 +132,8 @@ function answer(doc: Y.Doc, id: string, outcome: Precondition, response: Respons
 /** Whether the child waits until this parent has reported. */
 export function setRequired(doc: Y.Doc, id: string, required: boolean): boolean {
   return edit(doc, id, () => {
-    if (required) erase(doc, "relations", `${id}|required`);
-    else put(doc, "relations", `${id}|required`, false);
+    if (required) eraseKeys(doc, "relations", `${id}|required`);
+    else writeKey(doc, "relations", `${id}|required`, false);
     forget(doc, id, "required", "parents");
     needs(doc, id, "parents");
   });
@@ -142,8 +142,8 @@ export function setRequired(doc: Y.Doc, id: string, required: boolean): boolean 
 /** Under which name an output of the parent reaches the child; null: under its own. */
 export function setRemap(doc: Y.Doc, id: string, source: string, target: string | null): boolean {
   return edit(doc, id, () => {
-    if (target === null) erase(doc, "relations", `${id}|remap/${source}`);
-    else put(doc, "relations", `${id}|remap/${source}`, target);
+    if (target === null) eraseKeys(doc, "relations", `${id}|remap/${source}`);
+    else writeKey(doc, "relations", `${id}|remap/${source}`, target);
     forget(doc, id, "remap", "children");
     needs(doc, id, "children");
   });
@@ -151,15 +151,15 @@ export function setRemap(doc: Y.Doc, id: string, source: string, target: string 
 
 /** Makes a relation that a file listed on one side only known to both. */
 export function mirrorRelation(doc: Y.Doc, id: string): boolean {
-  return edit(doc, id, () => erase(doc, "relations", `${id}|only`));
+  return edit(doc, id, () => eraseKeys(doc, "relations", `${id}|only`));
 }
 
 export function removeRelation(doc: Y.Doc, id: string): boolean {
-  return edit(doc, id, () => erase(doc, "relations", ...keysOf(doc, "relations", id)));
+  return edit(doc, id, () => eraseKeys(doc, "relations", ...keysOfOwner(doc, "relations", id)));
 }
 
 export function removeRelations(doc: Y.Doc, ids: Iterable<string>): void {
-  together(doc, () => {
+  asOneEdit(doc, () => {
     for (const id of ids) removeRelation(doc, id);
   });
 }
@@ -170,7 +170,7 @@ export function moveRelation(
   id: string,
   ends: { readonly parent?: Key; readonly child?: Key },
 ): string | null {
-  return together(doc, () => keepingEnds(doc, () => move(doc, id, ends)));
+  return asOneEdit(doc, () => keepingEnds(doc, () => move(doc, id, ends)));
 }
 
 function move(
@@ -178,8 +178,8 @@ function move(
   id: string,
   ends: { readonly parent?: Key; readonly child?: Key },
 ): string | null {
-  return together(doc, () => {
-    settleGhosts(doc);
+  return asOneEdit(doc, () => {
+    numberGhosts(doc);
     const old = endsOf(id);
     if (old === null || !hasRelation(doc, id)) return null;
     const parent = ends.parent ?? old.parent;
@@ -188,12 +188,13 @@ function move(
     if (to === id) return id;
     if ((old.parent === ENTRY) !== (parent === ENTRY) || endsOf(to) === null) return null;
     if (!hasEnd(doc, parent) || !hasEnd(doc, child) || pairOf(doc, parent, child)) return null;
-    erase(doc, "relations", ...keysOf(doc, "relations", to));
+    eraseKeys(doc, "relations", ...keysOfOwner(doc, "relations", to));
     if (parent !== old.parent)
-      put(doc, "relations", `${id}|po`, nextOf(doc, "po", "parent", parent));
-    if (child !== old.child) put(doc, "relations", `${id}|co`, nextOf(doc, "co", "child", child));
+      writeKey(doc, "relations", `${id}|po`, nextOf(doc, "po", "parent", parent));
+    if (child !== old.child)
+      writeKey(doc, "relations", `${id}|co`, nextOf(doc, "co", "child", child));
     moveKeys(doc, id, to);
-    erase(doc, "relations", `${to}|only`);
+    eraseKeys(doc, "relations", `${to}|only`);
     return to;
   });
 }
@@ -208,7 +209,7 @@ export function retarget(
   outcome: Precondition,
   to: { readonly parent?: Key; readonly child?: Key; readonly outcome?: Precondition },
 ): string | null {
-  return together(doc, () => keepingEnds(doc, () => led(doc, id, outcome, to)));
+  return asOneEdit(doc, () => keepingEnds(doc, () => led(doc, id, outcome, to)));
 }
 
 function led(
@@ -217,9 +218,9 @@ function led(
   outcome: Precondition,
   to: { readonly parent?: Key; readonly child?: Key; readonly outcome?: Precondition },
 ): string | null {
-  return together(doc, () => {
-    settleGhosts(doc);
-    const relation = relationOf(doc, id);
+  return asOneEdit(doc, () => {
+    numberGhosts(doc);
+    const relation = relationNow(doc, id);
     if (relation === undefined) return null;
     const { conditions } = relation;
     const response = conditions[outcome];
@@ -228,7 +229,7 @@ function led(
     const lands = parent === ENTRY ? "on_true" : (to.outcome ?? outcome);
     const same = parent === relation.parent && child === relation.child;
     if (same && lands === outcome) return id;
-    const alone = spoken(conditions).every((other) => other === outcome);
+    const alone = spokenOutcomes(conditions).every((other) => other === outcome);
     const moved = alone && !same ? move(doc, id, { parent, child }) : null;
     if (moved !== null) {
       if (lands !== outcome) {
@@ -247,32 +248,32 @@ function led(
 
 /** Changes the places of two of a parent's relations, in the order in which their ends are started. */
 export function swapOrder(doc: Y.Doc, ids: readonly string[], one: number, other: number): void {
-  together(doc, () => {
-    settleGhosts(doc);
+  asOneEdit(doc, () => {
+    numberGhosts(doc);
     const next = [...ids];
     [next[one], next[other]] = [ids[other] ?? "", ids[one] ?? ""];
     for (const [i, id] of next.entries()) {
-      if (hasRelation(doc, id)) put(doc, "relations", `${id}|po`, i);
+      if (hasRelation(doc, id)) writeKey(doc, "relations", `${id}|po`, i);
     }
   });
 }
 
 /** Puts an action into an arrow: it takes over what the arrow said, and its success leads on. */
 export function insertInto(doc: Y.Doc, id: string, key: Key): boolean {
-  return together(doc, () => keepingEnds(doc, () => putBetween(doc, id, key)));
+  return asOneEdit(doc, () => keepingEnds(doc, () => putBetween(doc, id, key)));
 }
 
 function putBetween(doc: Y.Doc, id: string, key: Key): boolean {
-  const relation = relationOf(doc, id);
+  const relation = relationNow(doc, id);
   if (relation === undefined || relation.parent === key || relation.child === key) return false;
   const onward = draw(doc, key, relation.child, "on_true", "run");
   if (onward === null) return false;
-  put(doc, "relations", `${onward}|co`, relation.childOrder);
-  if (!relation.required) put(doc, "relations", `${onward}|required`, false);
+  writeKey(doc, "relations", `${onward}|co`, relation.childOrder);
+  if (!relation.required) writeKey(doc, "relations", `${onward}|required`, false);
   const into = move(doc, id, { child: key });
   if (into === null) return removeRelation(doc, id);
-  put(doc, "relations", `${into}|po`, relation.parentOrder);
-  erase(doc, "relations", `${into}|required`);
+  writeKey(doc, "relations", `${into}|po`, relation.parentOrder);
+  eraseKeys(doc, "relations", `${into}|required`);
   return true;
 }
 
@@ -289,11 +290,11 @@ export const unsetExit = (doc: Y.Doc, key: Key): boolean => disconnect(doc, key,
 
 /** Removes every arrow from one to the other. */
 export function disconnect(doc: Y.Doc, parent: Key, child: Key): boolean {
-  return together(doc, () => {
-    settleGhosts(doc);
+  return asOneEdit(doc, () => {
+    numberGhosts(doc);
     let removed = false;
     for (let id = pairOf(doc, parent, child); id; id = pairOf(doc, parent, child)) {
-      erase(doc, "relations", ...keysOf(doc, "relations", id));
+      eraseKeys(doc, "relations", ...keysOfOwner(doc, "relations", id));
       removed = true;
     }
     return removed;

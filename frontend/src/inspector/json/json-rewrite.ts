@@ -2,8 +2,8 @@
 import type * as Y from "yjs";
 import type { KeyChange } from "../../api/graphs";
 import { endsOf, ROOTS, type Root, rootOf, splitKey } from "../../graph/document-keys";
-import { together } from "../../graph/edit/document-writes";
-import { same } from "../../graph/equal";
+import { asOneEdit } from "../../graph/edit/document-writes";
+import { isEqual } from "../../graph/equal";
 import { ENTRY, EXIT, type Graph, type Key } from "../../graph/model";
 
 const isRoot = (root: string): root is Root => ROOTS.some((known) => known === root);
@@ -13,18 +13,18 @@ export function collisions(doc: Y.Doc, changes: readonly KeyChange[]): KeyChange
   return changes.filter(({ root, key, before, after }) => {
     if (!isRoot(root)) return false;
     const now = rootOf(doc, root).get(key);
-    return !same(now, before) && !same(now, after);
+    return !isEqual(now, before) && !isEqual(now, after);
   });
 }
 
 /** Makes the changes as one edit, which one undo takes back. */
 export function rewrite(doc: Y.Doc, changes: readonly KeyChange[]): void {
-  together(doc, () => {
+  asOneEdit(doc, () => {
     for (const { root, key, after } of changes) {
       if (!isRoot(root)) continue;
       const map = rootOf(doc, root);
       if (after === undefined) map.delete(key);
-      else if (!same(map.get(key), after)) map.set(key, after);
+      else if (!isEqual(map.get(key), after)) map.set(key, after);
     }
   });
 }

@@ -3,7 +3,7 @@ import { ActionIcon, SegmentedControl, Select, Tooltip } from "@mantine/core";
 import { IconAdjustments, IconBackspace, IconLock } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import type { Side } from "../../graph/document-keys";
+import type { ParameterSide } from "../../graph/document-keys";
 import { setParameter } from "../../graph/edit";
 import type { Key, Parameter } from "../../graph/model";
 import { pathWords } from "../../graph/value-text";
@@ -14,7 +14,7 @@ import { complaint, type Field, fieldOf, shown, typed, withValue } from "./param
 
 interface Props {
   owner: Key;
-  side: Side;
+  side: ParameterSide;
   parameter: Parameter;
   /** What it is called within its group. */
   name: string;

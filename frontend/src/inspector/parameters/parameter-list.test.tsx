@@ -5,7 +5,7 @@ import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { type EditorContext, EditorReactContext } from "../../edit-actions/editor-context";
 import { addAction } from "../../graph/edit";
-import { graphOf } from "../../graph/edit/document-writes";
+import { graphNow } from "../../graph/edit/document-writes";
 import { RoomProvider, useGraph, useRoom } from "../../sync/use-room";
 import { FakeServer } from "../../testing/fake-server";
 import { Parameters } from "./parameter-list";
@@ -94,6 +94,6 @@ test("a field for a parameter's name keeps the caret while one thinks about the 
   act(() => void vi.advanceTimersByTime(2_000));
   expect(document.activeElement).toBe(field);
   act(() => field.blur());
-  const [action] = graphOf(server.doc).actions;
+  const [action] = graphNow(server.doc).actions;
   expect(action?.inputs.map(({ path }) => path)).toEqual(["wo"]);
 });

@@ -3,8 +3,8 @@ import { Button, Group, Select, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import type { Side } from "../../graph/document-keys";
-import { addParameter, together } from "../../graph/edit";
+import type { ParameterSide } from "../../graph/document-keys";
+import { addParameter, asOneEdit } from "../../graph/edit";
 import type { Action } from "../../graph/model";
 import { pathWords } from "../../graph/value-text";
 import { FieldOf } from "../fields/shared-field";
@@ -15,7 +15,7 @@ import { fresh, GROUPS, TYPES } from "./parameter-values";
 
 interface AddProps {
   action: Action;
-  side: Side;
+  side: ParameterSide;
   onDone: () => void;
 }
 
@@ -28,7 +28,7 @@ function AddParameter({ action, side, onDone }: AddProps) {
   const wrong = path === "" ? null : taken(list, path);
   const submit = () => {
     if (path === "" || wrong !== null) return;
-    together(doc, () => {
+    asOneEdit(doc, () => {
       for (const member of GROUPS[type] ?? [null]) {
         const full = member === null ? path : `${path}/${member}`;
         addParameter(doc, action.key, side, full, fresh(member === null ? type : "number"));
@@ -77,7 +77,7 @@ function AddParameter({ action, side, onDone }: AddProps) {
   );
 }
 
-export function Parameters({ action, side }: { action: Action; side: Side }) {
+export function Parameters({ action, side }: { action: Action; side: ParameterSide }) {
   const [adding, setAdding] = useState(false);
   const list = side === "in" ? action.inputs : action.outputs;
   const fields = ({ prefix, members }: Family) =>

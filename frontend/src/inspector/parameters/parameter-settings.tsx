@@ -2,7 +2,7 @@
 import { Autocomplete, Button, Group, Switch } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import type { Side } from "../../graph/document-keys";
+import type { ParameterSide } from "../../graph/document-keys";
 import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
 import type { Key, Parameter } from "../../graph/model";
 import { pathWords } from "../../graph/value-text";
@@ -21,7 +21,7 @@ import {
 
 interface Props {
   owner: Key;
-  side: Side;
+  side: ParameterSide;
   parameter: Parameter;
   others: readonly Parameter[];
   onClose: () => void;

@@ -7,7 +7,7 @@
  */
 
 import type { Awareness } from "y-protocols/awareness";
-import { same } from "../../graph/equal";
+import { isEqual } from "../../graph/equal";
 import type { Key, Position } from "../../graph/model";
 import { immediately, type Schedule } from "./frame-scheduler";
 
@@ -34,7 +34,7 @@ export interface SharedView {
 }
 
 export function isSameView(a: SharedView | null, b: SharedView | null): boolean {
-  return a === b || (a !== null && b !== null && same(a, b));
+  return a === b || (a !== null && b !== null && isEqual(a, b));
 }
 
 /** One other page. A person with two windows is here twice, with the same `id`. */
@@ -91,7 +91,7 @@ export function presenceOf(awareness: Awareness, soon: Schedule = immediately): 
     },
     tell(change) {
       const next = merge(mine, change);
-      if (same(mine, next)) return;
+      if (isEqual(mine, next)) return;
       mine = next;
       if (timer !== undefined) return;
       const wait = toldAt + INTERVAL_MS - performance.now();
@@ -119,7 +119,7 @@ function peopleOf(awareness: Awareness, before: readonly Participant[]): readonl
     const fresh = personOf(client, state);
     if (fresh === null) continue;
     const old = known.get(client);
-    people.push(old !== undefined && same(old, fresh) ? old : fresh);
+    people.push(old !== undefined && isEqual(old, fresh) ? old : fresh);
   }
   people.sort((a, b) => a.name.localeCompare(b.name) || a.client - b.client);
   const unchanged = people.length === before.length && people.every((p, i) => p === before[i]);
