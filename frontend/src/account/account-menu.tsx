@@ -17,7 +17,7 @@ import { sentence } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
 import { usePerson } from "../api/use-person";
-import { initials, personColor } from "../ui/name-colors";
+import { colorOfId, initials } from "../ui/name-colors";
 
 const schemes = [
   { value: "light", label: <IconSun size={15} aria-label="Light" /> },
@@ -57,7 +57,7 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
           aria-label={`You are ${person.name || "Guest"}. Name and appearance`}
           title={person.name || "Guest"}
         >
-          <Avatar size={28} radius="xl" variant="filled" color={personColor(person.id)}>
+          <Avatar size={28} radius="xl" variant="filled" color={colorOfId(person.id)}>
             <Text span size="xs" fw={650} c="var(--on-accent)" aria-hidden>
               {initials(person.name || "Guest")}
             </Text>

@@ -8,7 +8,7 @@ import {
   ROLE_WORDS,
   rememberName,
 } from "../api/session";
-import { Mark } from "../ui/top-bar";
+import { Logo } from "../ui/top-bar";
 import style from "./sign-in.module.css";
 import { useEntry } from "./use-sign-in-field";
 
@@ -27,7 +27,7 @@ export function Invitation({ link, invited, onOpen }: Props) {
   return (
     <main className={style.page}>
       <Paper className={style.card} withBorder radius="lg">
-        <Mark />
+        <Logo />
         <Title order={1} size="h3" mt="md">
           {invited.by === "" ? "You are invited" : `${invited.by} invites you`} as {invited.role}
         </Title>

@@ -1,7 +1,7 @@
 /** The page for somebody whom the server does not know: says how to get in. */
 import { Button, Paper, PasswordInput, Text, Title } from "@mantine/core";
 import { type Key, keyIn, openSession, type Person } from "../api/session";
-import { Mark } from "../ui/top-bar";
+import { Logo } from "../ui/top-bar";
 import style from "./sign-in.module.css";
 import { useEntry } from "./use-sign-in-field";
 
@@ -21,7 +21,7 @@ export function SignIn({ why, onOpen }: Props) {
   return (
     <main className={style.page}>
       <Paper className={style.card} withBorder radius="lg">
-        <Mark />
+        <Logo />
         <Title order={1} size="h3" mt="md">
           TeMoto Action Assistant
         </Title>

@@ -10,11 +10,11 @@ import { Refusal } from "../api/http";
 import { LiveProvider } from "../api/live/use-live";
 import { base } from "../api/page-url";
 import { usePerson } from "../api/use-person";
-import { actionCarrier } from "../canvas/action-drag";
+import { actionDrag } from "../canvas/action-drag";
 import { UnsureStartNotice } from "../runs/start/unanswered-start-notice";
 import { StopNotice } from "../runs/stop/stop-notice";
 import { LiveRegion } from "../ui/announcer";
-import { CarriedGhost } from "../ui/pointer-drag";
+import { DragPreview } from "../ui/pointer-drag";
 import { theme, variables } from "../ui/theme";
 import { DropFiles } from "./drop-files";
 import { GraphScreen } from "./graph-screen";
@@ -71,7 +71,7 @@ export function App() {
                 <ReviewDialog />
                 <StopNotice />
                 <UnsureStartNotice />
-                <CarriedGhost carrier={actionCarrier} />
+                <DragPreview carrier={actionDrag} />
                 <LiveRegion />
               </DropFiles>
             </Live>

@@ -8,7 +8,7 @@ import { ShareDialog } from "../account/share-dialog";
 import { useMay } from "../api/use-person";
 import { StopButton } from "../runs/stop/stop-button";
 import { type Crumb, TopBar } from "../ui/top-bar";
-import { useSteady } from "../ui/use-stable-callback";
+import { useStableCallback } from "../ui/use-stable-callback";
 import style from "./page-frame.module.css";
 
 interface Props {
@@ -55,8 +55,8 @@ const Way = memo(function Way({ to, icon: Icon, name, tight }: WayProps) {
 export function Bar({ crumbs, status, actions, start, graph, at }: Props) {
   const mayShare = useMay("share");
   const [sharing, setSharing] = useState(false);
-  const share = useSteady(() => setSharing(true));
-  const closeSharing = useSteady(() => setSharing(false));
+  const share = useStableCallback(() => setSharing(true));
+  const closeSharing = useStableCallback(() => setSharing(false));
   const tight = Boolean(start);
   return (
     <TopBar

@@ -6,10 +6,10 @@ import { cardLines, lineText } from "../graph/value-text";
 import { tookWords } from "../status/durations";
 import type { Progress } from "../status/progress";
 import { StateWord } from "../status/state-label";
-import { robotColor } from "../ui/name-colors";
+import { colorOfName } from "../ui/name-colors";
 import { stopwatch, useNow } from "../ui/times";
 import style from "./action-card.module.css";
-import { useIsDim, useTalk } from "./card-highlights";
+import { useIsDimmed, useOpenThreadCount } from "./card-highlights";
 import type { CardNode } from "./elements";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import { ProblemBadge } from "./problem-badge";
@@ -34,9 +34,9 @@ export const ActionCard = memo(function ActionCard({
 }: NodeProps<CardNode>) {
   const { action, progress, mark, other } = data;
   const lines = cardLines(action.inputs, 2);
-  const color = robotColor(action.actor);
-  const dim = useIsDim(action.actor);
-  const talk = useTalk(action.key);
+  const color = colorOfName(action.actor);
+  const dim = useIsDimmed(action.actor);
+  const talk = useOpenThreadCount(action.key);
   return (
     <div
       className={style.card}

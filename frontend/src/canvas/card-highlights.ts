@@ -2,27 +2,27 @@
 import { useSyncExternalStore } from "react";
 import type { Key } from "../graph/model";
 
-export interface Light {
+export interface CardHighlights {
   /** The robot whose actions stand out; null: all. The empty name is that of any robot. */
   readonly robot: string | null;
   /** Open threads by action. */
-  readonly talk: ReadonlyMap<Key, number>;
+  readonly openThreads: ReadonlyMap<Key, number>;
 }
 
-const ALL: Light = { robot: null, talk: new Map() };
+const ALL: CardHighlights = { robot: null, openThreads: new Map() };
 
 /** One for the page: there is one canvas. Cards listen for themselves, so that few draw again. */
-class Spotlight {
-  #now: Light = ALL;
+class CardHighlightStore {
+  #now: CardHighlights = ALL;
   #listeners = new Set<() => void>();
 
   subscribe = (listener: () => void): (() => void) => {
     this.#listeners.add(listener);
     return () => this.#listeners.delete(listener);
   };
-  now = (): Light => this.#now;
+  now = (): CardHighlights => this.#now;
 
-  set(change: Partial<Light>): void {
+  set(change: Partial<CardHighlights>): void {
     this.#now = { ...this.#now, ...change };
     for (const listener of [...this.#listeners]) listener();
   }
@@ -30,22 +30,25 @@ class Spotlight {
   reset = (): void => this.set(ALL);
 }
 
-export const spotlight = new Spotlight();
+export const cardHighlights = new CardHighlightStore();
 
 /** The robot whose actions stand out. */
-export function useRobotInLight(): string | null {
-  return useSyncExternalStore(spotlight.subscribe, () => spotlight.now().robot);
+export function useHighlightedRobot(): string | null {
+  return useSyncExternalStore(cardHighlights.subscribe, () => cardHighlights.now().robot);
 }
 
 /** Whether the actions of a robot are to step back. */
-export function useIsDim(robot: string): boolean {
-  return useSyncExternalStore(spotlight.subscribe, () => {
-    const lit = spotlight.now().robot;
+export function useIsDimmed(robot: string): boolean {
+  return useSyncExternalStore(cardHighlights.subscribe, () => {
+    const lit = cardHighlights.now().robot;
     return lit !== null && lit !== robot;
   });
 }
 
 /** How many open threads there are about an action. */
-export function useTalk(key: Key): number {
-  return useSyncExternalStore(spotlight.subscribe, () => spotlight.now().talk.get(key) ?? 0);
+export function useOpenThreadCount(key: Key): number {
+  return useSyncExternalStore(
+    cardHighlights.subscribe,
+    () => cardHighlights.now().openThreads.get(key) ?? 0,
+  );
 }

@@ -9,16 +9,16 @@ import type { Graph } from "../graph/model";
 import { followGraph } from "../graph/read";
 import { ActionCard } from "./action-card";
 import {
-  type Around,
   type Arrow,
-  aroundOf,
   type CanvasNode,
   type CardNode,
+  type CardSurroundings,
   edgesOf,
-  keep,
+  keepEqual,
   nodesOf,
+  surroundingsOf,
 } from "./elements";
-import { placesOf } from "./geometry/arrange";
+import { positionsOf } from "./geometry/arrange";
 
 const ACTIONS = 1000;
 
@@ -26,11 +26,11 @@ const ACTIONS = 1000;
 const { rendered } = vi.hoisted(() => ({ rendered: [] as string[] }));
 vi.mock("./card-highlights", async (original) => {
   const real = await original<typeof import("./card-highlights")>();
-  const useTalk = (key: string) => {
+  const useOpenThreadCount = (key: string) => {
     rendered.push(key);
-    return real.useTalk(key);
+    return real.useOpenThreadCount(key);
   };
-  return { ...real, useTalk };
+  return { ...real, useOpenThreadCount };
 });
 
 let root: Root;
@@ -57,9 +57,9 @@ function propsOf({ id, data, selected }: CardNode) {
 
 /** Draws the cards of a graph, and notes which of them React renders. */
 function draw(graph: Graph, others: ReadonlyMap<string, string> = new Map()): string[] {
-  const options = { places: placesOf(graph), selected: new Set<string>(), others };
+  const options = { places: positionsOf(graph), selected: new Set<string>(), others };
   const none = { progress: new Map(), marks: new Map(), measured: new Map() };
-  nodes = keep(nodes, nodesOf(graph, { ...options, ...none }, nodes));
+  nodes = keepEqual(nodes, nodesOf(graph, { ...options, ...none }, nodes));
   rendered.length = 0;
   act(() =>
     root.render(
@@ -112,16 +112,20 @@ test("of a thousand cards and their arrows only what somebody changed is made ag
     for (let n = 40; n < ACTIONS; n += 1) connect(doc, keys[n - 40] ?? "", keys[n] ?? "");
     return keys;
   });
-  const made = (before: { nodes: CanvasNode[]; edges: Arrow[]; around: Around | null }) => {
+  const made = (before: {
+    nodes: CanvasNode[];
+    edges: Arrow[];
+    around: CardSurroundings | null;
+  }) => {
     const graph = source.graph();
     const options = {
-      ...{ places: placesOf(graph), selected: new Set<string>() },
+      ...{ places: positionsOf(graph), selected: new Set<string>() },
       ...{ progress: new Map(), marks: new Map(), measured: new Map() },
     };
-    const around = aroundOf(graph, options, before.around);
+    const around = surroundingsOf(graph, options, before.around);
     return {
       nodes: nodesOf(graph, options, before.nodes),
-      edges: keep(before.edges, edgesOf(graph, options, around)),
+      edges: keepEqual(before.edges, edgesOf(graph, options, around)),
       around,
     };
   };

@@ -5,9 +5,16 @@ import { addAction, connect, moveActions, setEntry, setExit, setResponse } from 
 import { meaning } from "../graph/meaning";
 import { ENTRY, EXIT, type Graph } from "../graph/model";
 import { readGraph } from "../graph/read";
-import { answersOf, aroundOf, edgesOf, keep, type NodeOptions, nodesOf } from "./elements";
+import {
+  edgesOf,
+  keepEqual,
+  type NodeOptions,
+  nodesOf,
+  responsesOf,
+  surroundingsOf,
+} from "./elements";
 import { fromUmrf } from "./from-umrf";
-import { arrange, placesOf, unplaced } from "./geometry/arrange";
+import { arrange, positionsOf, unplaced } from "./geometry/arrange";
 
 function drawn(): { graph: Graph; doc: Y.Doc; a: string; b: string } {
   const doc = new Y.Doc();
@@ -25,7 +32,7 @@ function drawn(): { graph: Graph; doc: Y.Doc; a: string; b: string } {
 }
 
 const options = (graph: Graph): NodeOptions => ({
-  places: placesOf(graph),
+  places: positionsOf(graph),
   selected: new Set(),
   progress: new Map(),
   marks: new Map(),
@@ -34,7 +41,7 @@ const options = (graph: Graph): NodeOptions => ({
 
 test("each outcome that is answered gets its own arrow from its own handle", () => {
   const { graph, a, b } = drawn();
-  const around = aroundOf(graph, options(graph), null);
+  const around = surroundingsOf(graph, options(graph), null);
   const arrows = edgesOf(graph, options(graph), around).filter((edge) => edge.source === a);
   expect(arrows.map((edge) => [edge.sourceHandle, edge.target])).toEqual([
     ["on_true", b],
@@ -47,7 +54,7 @@ test("each outcome that is answered gets its own arrow from its own handle", () 
 test("outcomes with the same response are said together", () => {
   const { graph, a } = drawn();
   const relation = graph.relations.find(({ parent }) => parent === a);
-  expect(relation && answersOf(relation)).toEqual([
+  expect(relation && responsesOf(relation)).toEqual([
     { outcomes: ["on_true", "on_false"], response: "run" },
     { outcomes: ["on_error"], response: "bypass" },
   ]);
@@ -56,11 +63,11 @@ test("outcomes with the same response are said together", () => {
 test("what did not change is not drawn again", () => {
   const { graph, doc, a } = drawn();
   const before = nodesOf(graph, options(graph));
-  expect(keep(before, nodesOf(graph, options(graph)))).toBe(before);
-  moveActions(doc, unplaced(graph, placesOf(graph)));
+  expect(keepEqual(before, nodesOf(graph, options(graph)))).toBe(before);
+  moveActions(doc, unplaced(graph, positionsOf(graph)));
   addAction(doc, { name: "Third", position: [900, 900] });
   const next = readGraph(mapsOf(doc));
-  const after = keep(before, nodesOf(next, options(next)));
+  const after = keepEqual(before, nodesOf(next, options(next)));
   expect(after).not.toBe(before);
   const card = (nodes: typeof before) => nodes.find(({ id }) => id === a);
   expect(card(after)?.position).toEqual(card(before)?.position);
@@ -81,7 +88,7 @@ test("what has a place keeps it when something without one appears", () => {
       action.key === a ? { ...action, position: [1000, 500] as const } : action,
     ),
   };
-  const places = placesOf(placed);
+  const places = positionsOf(placed);
   expect(places.get(a)).toEqual([1000, 500]);
   expect(places.get(ENTRY)?.[1]).toBeLessThan(500);
 });

@@ -14,25 +14,25 @@ import {
   spokenOutcomes,
 } from "../graph/model";
 import type { Progress } from "../status/progress";
-import { CARD, PILL, type Places } from "./geometry/arrange";
-import { type Box, laneBack, laneFor, MOST_CARDS } from "./geometry/detours";
+import { CARD, PILL, type Positions } from "./geometry/arrange";
+import { laneBack, laneFor, MOST_CARDS, type Rectangle } from "./geometry/detours";
 import {
   alongCurve,
   alongLane,
   anchorOf,
+  type LabelRequest,
   placeLabels,
   sizeOf,
-  type Wish,
 } from "./geometry/label-places";
 import { type NoteNode, noteNodes } from "./note-nodes";
 import { OUTCOMES, outcomeWord } from "./outcome";
-import { type Mark, type Marks, markWords } from "./problem-marks";
+import { type ProblemMark, type ProblemMarks, problemMarkWords } from "./problem-marks";
 
 export type CardNode = Node<
   {
     action: Action;
     progress: Progress | null;
-    mark: Mark | null;
+    mark: ProblemMark | null;
     /** The colour of somebody else who has it selected. */
     other: string | null;
   },
@@ -41,7 +41,7 @@ export type CardNode = Node<
 export type EndNode = Node<{ end: "entry" | "exit"; progress: null }, "end">;
 export type CanvasNode = CardNode | EndNode | NoteNode;
 
-export interface Answer {
+export interface OutcomeResponse {
   readonly outcomes: readonly Precondition[];
   readonly response: Response;
 }
@@ -52,9 +52,9 @@ export type Arrow = Edge<
     outcome: Precondition;
     response: Response;
     /** What the whole relation says; only the first arrow of a relation carries the label. */
-    answers: readonly Answer[] | null;
+    answers: readonly OutcomeResponse[] | null;
     /** What is wrong with the relation; on its first arrow. */
-    mark: Mark | null;
+    mark: ProblemMark | null;
     optional: boolean;
     lead: boolean;
     /** The x of the lane on which it goes round cards; null: straight down. */
@@ -62,19 +62,19 @@ export type Arrow = Edge<
     entry: boolean;
     lit: boolean;
     /** Where the label stands; null: in the middle of the way. */
-    label: Label | null;
+    label: ArrowLabel | null;
   },
   "outcome"
 >;
 
-export interface Label {
+export interface ArrowLabel {
   readonly x: number;
   readonly y: number;
-  readonly anchor: Wish["anchor"];
+  readonly anchor: LabelRequest["anchor"];
 }
 
 /** The outcomes that get the same response, together, in the fixed order of outcomes. */
-export function answersOf(relation: Relation): Answer[] {
+export function responsesOf(relation: Relation): OutcomeResponse[] {
   const answers: { outcomes: Precondition[]; response: Response }[] = [];
   for (const outcome of OUTCOMES) {
     const response = relation.conditions[outcome];
@@ -87,10 +87,10 @@ export function answersOf(relation: Relation): Answer[] {
 }
 
 export interface NodeOptions {
-  places: Places;
+  places: Positions;
   selected: ReadonlySet<string>;
   progress: ReadonlyMap<Key, Progress>;
-  marks: Marks;
+  marks: ProblemMarks;
   others?: ReadonlyMap<Key, string>;
   measured: ReadonlyMap<Key, { width?: number; height?: number }>;
   /** A note as it is while somebody drags its edges. */
@@ -165,8 +165,8 @@ function isLit(relation: Relation, outcome: Precondition, options: ArrowOptions)
 }
 
 /** Where cards stand. Empty when there are too many to look for ways round them. */
-function boxesOf(graph: Graph, options: NodeOptions): Map<Key, Box> {
-  const boxes = new Map<Key, Box>();
+function boxesOf(graph: Graph, options: NodeOptions): Map<Key, Rectangle> {
+  const boxes = new Map<Key, Rectangle>();
   if (graph.actions.length > MOST_CARDS) return boxes;
   const put = (key: Key, size: { width: number; height: number }) => {
     const at = options.places.get(key);
@@ -180,18 +180,22 @@ function boxesOf(graph: Graph, options: NodeOptions): Map<Key, Box> {
 }
 
 /** Where on the lower edge of a card an arrow begins, from its left. */
-export function shareOf(entry: boolean, outcome: Precondition): number {
+export function outcomeOffset(entry: boolean, outcome: Precondition): number {
   return entry ? 0.5 : 0.14 + 0.24 * OUTCOMES.indexOf(outcome);
 }
 
 const LANE_WIDTH = 9; // px between the lanes of one relation's outcomes
 
-function laneOf(relation: Relation, outcome: Precondition, boxes: Map<Key, Box>): number | null {
+function laneOf(
+  relation: Relation,
+  outcome: Precondition,
+  boxes: Map<Key, Rectangle>,
+): number | null {
   const from = boxes.get(relation.parent);
   const to = boxes.get(relation.child);
   if (!from || !to || relation.parent === relation.child) return null;
   const at = OUTCOMES.indexOf(outcome);
-  const share = shareOf(relation.parent === ENTRY, outcome);
+  const share = outcomeOffset(relation.parent === ENTRY, outcome);
   const start = { x: from.x + from.width * share, y: from.y + from.height };
   const others = [...boxes]
     .filter(([key]) => key !== relation.parent && key !== relation.child)
@@ -206,7 +210,7 @@ function cardWords(action: Action, { progress, marks }: NodeOptions): string {
   const robot = action.actor === "" ? "" : `, robot ${action.actor}`;
   const state = progress.get(action.key)?.word;
   const now = state === undefined ? "" : `, ${state}`;
-  return `${action.name} ${action.instanceId}${robot}${now}${markWords(marks.get(action.key))}`;
+  return `${action.name} ${action.instanceId}${robot}${now}${problemMarkWords(marks.get(action.key))}`;
 }
 
 type Names = ReadonlyMap<Key, string>;
@@ -227,12 +231,16 @@ function arrowWords(relation: Relation, outcome: Precondition, names: Names): st
 }
 
 /** What arrows have to know of cards: the same as before when it says the same. */
-export interface Around {
-  readonly boxes: Map<Key, Box>;
+export interface CardSurroundings {
+  readonly boxes: Map<Key, Rectangle>;
   readonly names: Names;
 }
 
-export function aroundOf(graph: Graph, options: NodeOptions, before: Around | null): Around {
+export function surroundingsOf(
+  graph: Graph,
+  options: NodeOptions,
+  before: CardSurroundings | null,
+): CardSurroundings {
   const names = namesOf(graph);
   const boxes = boxesOf(graph, options);
   const same = before !== null && alikeMaps(before.names, names) && alikeMaps(before.boxes, boxes);
@@ -248,7 +256,11 @@ function alikeMaps<T>(a: ReadonlyMap<Key, T>, b: ReadonlyMap<Key, T>): boolean {
   return true;
 }
 
-function arrowsOf(relation: Relation, options: ArrowOptions, { boxes, names }: Around): Arrow[] {
+function arrowsOf(
+  relation: Relation,
+  options: ArrowOptions,
+  { boxes, names }: CardSurroundings,
+): Arrow[] {
   const id = relationId(relation);
   const outcomes = spokenOutcomes(relation.conditions);
   const shown: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
@@ -258,7 +270,7 @@ function arrowsOf(relation: Relation, options: ArrowOptions, { boxes, names }: A
   return shown.map((outcome, i) => ({
     id: `${id}|${outcome}`,
     type: "outcome",
-    ariaLabel: arrowWords(relation, outcome, names) + markWords(i === 0 ? mark : null),
+    ariaLabel: arrowWords(relation, outcome, names) + problemMarkWords(i === 0 ? mark : null),
     source: relation.parent,
     target: relation.child,
     sourceHandle: entry ? "start" : outcome,
@@ -270,7 +282,7 @@ function arrowsOf(relation: Relation, options: ArrowOptions, { boxes, names }: A
       relation: id,
       outcome,
       response: relation.conditions[outcome],
-      answers: i === 0 && !entry ? answersOf(relation) : null,
+      answers: i === 0 && !entry ? responsesOf(relation) : null,
       mark: i === 0 ? mark : null,
       optional: !relation.required,
       lead: i === 0,
@@ -285,7 +297,7 @@ function arrowsOf(relation: Relation, options: ArrowOptions, { boxes, names }: A
 export function edgesOf(
   { relations }: Pick<Graph, "relations">,
   options: ArrowOptions,
-  around: Around,
+  around: CardSurroundings,
 ): Arrow[] {
   const arrows = relations
     .filter(({ parent, child }) => around.names.has(parent) && around.names.has(child))
@@ -294,7 +306,7 @@ export function edgesOf(
 }
 
 /** The same arrows with places for their labels. */
-function labelled(arrows: Arrow[], boxes: Map<Key, Box>): Arrow[] {
+function labelled(arrows: Arrow[], boxes: Map<Key, Rectangle>): Arrow[] {
   const wishes = arrows.flatMap((arrow) => wishOf(arrow, arrows, boxes) ?? []);
   const places = placeLabels(wishes, [...boxes.values()]);
   const anchors = new Map(wishes.map(({ id, anchor }) => [id, anchor]));
@@ -307,7 +319,11 @@ function labelled(arrows: Arrow[], boxes: Map<Key, Box>): Arrow[] {
   });
 }
 
-function wishOf(arrow: Arrow, arrows: readonly Arrow[], boxes: Map<Key, Box>): Wish | null {
+function wishOf(
+  arrow: Arrow,
+  arrows: readonly Arrow[],
+  boxes: Map<Key, Rectangle>,
+): LabelRequest | null {
   const { data, source, target } = arrow;
   const [from, to] = [boxes.get(source), boxes.get(target)];
   if (!data || (!data.answers && !data.mark) || !from || !to || source === target) return null;
@@ -321,8 +337,8 @@ function wishOf(arrow: Arrow, arrows: readonly Arrow[], boxes: Map<Key, Box>): W
   // The label speaks for all arrows of its relation: it stands between them.
   const shares = arrows
     .filter((other) => other.data?.relation === data.relation && other.data.lane === null)
-    .map((other) => shareOf(other.data?.entry === true, other.data?.outcome ?? "on_true"));
-  const lead = shareOf(data.entry, data.outcome);
+    .map((other) => outcomeOffset(other.data?.entry === true, other.data?.outcome ?? "on_true"));
+  const lead = outcomeOffset(data.entry, data.outcome);
   const mean = shares.reduce((sum, share) => sum + share, 0) / Math.max(1, shares.length);
   const start = {
     x: from.x + from.width * (data.lane === null ? mean : lead),
@@ -341,7 +357,7 @@ function wishOf(arrow: Arrow, arrows: readonly Arrow[], boxes: Map<Key, Box>): W
 }
 
 /** `next`, with every element of `before` that says the same in its place. */
-export function keep<T extends { id: string; data?: object }>(
+export function keepEqual<T extends { id: string; data?: object }>(
   before: readonly T[],
   next: T[],
 ): T[] {

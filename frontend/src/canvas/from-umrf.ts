@@ -17,11 +17,11 @@ import {
   type Response,
 } from "../graph/model";
 
-type Fields = Record<string, unknown>;
+type JsonObject = Record<string, unknown>;
 
-const object = (value: unknown): Fields =>
-  typeof value === "object" && value !== null && !Array.isArray(value) ? (value as Fields) : {};
-const list = (value: unknown): Fields[] => (Array.isArray(value) ? value.map(object) : []);
+const object = (value: unknown): JsonObject =>
+  typeof value === "object" && value !== null && !Array.isArray(value) ? (value as JsonObject) : {};
+const list = (value: unknown): JsonObject[] => (Array.isArray(value) ? value.map(object) : []);
 const text = (value: unknown): string => (typeof value === "string" ? value : "");
 const whole = (value: unknown): number => (typeof value === "number" ? value : 0);
 
@@ -30,7 +30,7 @@ function position(value: unknown): Position | null {
   return typeof x === "number" && typeof y === "number" ? [x, y] : null;
 }
 
-function action(fields: Fields): Action {
+function action(fields: JsonObject): Action {
   const gui = object(fields.gui_attributes);
   const name = text(fields.name);
   const instanceId = whole(fields.instance_id);
@@ -83,7 +83,8 @@ export function fromUmrf(umrf: unknown): Graph {
   const raw = list(root.actions);
   const actions = raw.map(action);
   const byName = new Map<string, Key>(actions.map((a) => [`${a.name}_${a.instanceId}`, a.key]));
-  const keyOf = (fields: Fields) => byName.get(`${text(fields.name)}_${whole(fields.instance_id)}`);
+  const keyOf = (fields: JsonObject) =>
+    byName.get(`${text(fields.name)}_${whole(fields.instance_id)}`);
   const relations = new Map<string, Relation>();
   const put = (relation: Omit<Relation, "listing">) => {
     let listing = 0;

@@ -10,13 +10,13 @@ import { useMemo, useState } from "react";
 import type { Graph, Key } from "../graph/model";
 import type { Progress } from "../status/progress";
 import { ActionCard } from "./action-card";
-import { aroundOf, type CanvasNode, edgesOf, nodesOf } from "./elements";
+import { type CanvasNode, edgesOf, nodesOf, surroundingsOf } from "./elements";
 import { EndPill } from "./end-pill";
-import { placesOf } from "./geometry/arrange";
+import { positionsOf } from "./geometry/arrange";
 import { NoteCard } from "./note-card";
 import { notePlaces } from "./note-nodes";
 import { ArrowTips, OutcomeArrow } from "./outcome-arrow";
-import { NO_MARKS } from "./problem-marks";
+import { NO_PROBLEM_MARKS } from "./problem-marks";
 import "./canvas.css";
 
 export const nodeTypes: NodeTypes = { action: ActionCard, end: EndPill, note: NoteCard };
@@ -34,14 +34,14 @@ interface Props {
 
 export function GraphView({ graph, progress, selected = NONE, label, onSelect }: Props) {
   const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
-  const places = useMemo(() => new Map([...placesOf(graph), ...notePlaces(graph)]), [graph]);
+  const places = useMemo(() => new Map([...positionsOf(graph), ...notePlaces(graph)]), [graph]);
   const options = useMemo(
-    () => ({ places, selected, progress, marks: NO_MARKS, measured }),
+    () => ({ places, selected, progress, marks: NO_PROBLEM_MARKS, measured }),
     [places, selected, progress, measured],
   );
   const nodes = useMemo(() => nodesOf(graph, options), [graph, options]);
   const edges = useMemo(
-    () => edgesOf(graph, options, aroundOf(graph, options, null)),
+    () => edgesOf(graph, options, surroundingsOf(graph, options, null)),
     [graph, options],
   );
   return (

@@ -9,7 +9,7 @@ import { noteColor } from "./note-colors";
 import type { NoteNode } from "./note-nodes";
 
 /** How notes are changed; without one they are only shown. */
-export interface NoteDesk {
+export interface NoteEditing {
   /** The note whose text is being written. */
   readonly editing: string | null;
   /** The only thing that is chosen. */
@@ -21,9 +21,9 @@ export interface NoteDesk {
   remove(key: string): void;
 }
 
-export const NoteDeskContext = createContext<NoteDesk | null>(null);
+export const NoteEditingContext = createContext<NoteEditing | null>(null);
 
-function Writing({ note, desk }: { note: Note; desk: NoteDesk }) {
+function Writing({ note, desk }: { note: Note; desk: NoteEditing }) {
   const field = useRef<HTMLTextAreaElement>(null);
   useEffect(() => {
     field.current?.focus({ preventScroll: true });
@@ -57,7 +57,7 @@ function Writing({ note, desk }: { note: Note; desk: NoteDesk }) {
   );
 }
 
-function Tools({ note, desk }: { note: Note; desk: NoteDesk }) {
+function Tools({ note, desk }: { note: Note; desk: NoteEditing }) {
   return (
     <NodeToolbar
       isVisible={desk.alone === note.key}
@@ -89,7 +89,7 @@ function Tools({ note, desk }: { note: Note; desk: NoteDesk }) {
 }
 
 export const NoteCard = memo(function NoteCard({ data, selected }: NodeProps<NoteNode>) {
-  const desk = use(NoteDeskContext);
+  const desk = use(NoteEditingContext);
   const { note } = data;
   const editing = desk?.editing === note.key;
   const empty = note.kind === "frame" ? "Frame" : "Note";

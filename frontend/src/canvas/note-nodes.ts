@@ -2,12 +2,12 @@
 import type { Node } from "@xyflow/react";
 import { type Note, notesOf } from "../graph/edit/notes";
 import type { Graph, Key } from "../graph/model";
-import type { Places } from "./geometry/arrange";
+import type { Positions } from "./geometry/arrange";
 
 export type NoteNode = Node<{ note: Note }, "note">;
 
 interface Options {
-  places: Places;
+  places: Positions;
   selected: ReadonlySet<string>;
   measured: ReadonlyMap<Key, { width?: number; height?: number }>;
   resized?: Note | null;
@@ -44,6 +44,6 @@ export function noteNodes(graph: Graph, options: Options) {
   };
 }
 
-export function notePlaces(graph: Graph): Places {
+export function notePlaces(graph: Graph): Positions {
   return new Map(notesOf(graph).map(({ key, at }) => [key, at]));
 }

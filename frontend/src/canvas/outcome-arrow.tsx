@@ -1,17 +1,17 @@
 /** An arrow from one outcome to what answers it, with the relation's answers in words. */
 import { BaseEdge, EdgeLabelRenderer, type EdgeProps, useStoreApi } from "@xyflow/react";
 import { memo } from "react";
-import type { Answer, Arrow } from "./elements";
-import { lineOf } from "./geometry/arrow-path";
+import type { Arrow, OutcomeResponse } from "./elements";
+import { arrowPathOf } from "./geometry/arrow-path";
 import { OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import style from "./outcome-arrow.module.css";
 import { ProblemBadge } from "./problem-badge";
 
-export function answerWords(answer: Answer): string {
+export function responseWords(answer: OutcomeResponse): string {
   return `${answer.outcomes.map((outcome) => outcomeWord[outcome]).join(", ")} → ${answer.response}`;
 }
 
-function AnswerLine({ answer, optional }: { answer: Answer; optional: boolean }) {
+function AnswerLine({ answer, optional }: { answer: OutcomeResponse; optional: boolean }) {
   return (
     <span className={style.answer}>
       {answer.outcomes.map((outcome) => (
@@ -33,7 +33,7 @@ const SHIFTS = { left: "-10px", middle: "-50%", right: "calc(-100% + 10px)" } as
 export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) {
   const { id, data, selected } = props;
   const store = useStoreApi();
-  const { path, ...middle } = lineOf(props, data?.lane ?? null);
+  const { path, ...middle } = arrowPathOf(props, data?.lane ?? null);
   if (!data) return null;
   const { x, y, anchor } = data.label ?? middle;
   const color = data.entry
@@ -88,7 +88,7 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
 });
 
 /** Only `true → run`: what most arrows say, so it may be quiet. */
-function isPlain(answers: readonly Answer[]): boolean {
+function isPlain(answers: readonly OutcomeResponse[]): boolean {
   const [only] = answers;
   return answers.length === 1 && only?.response === "run" && only.outcomes.join() === "on_true";
 }

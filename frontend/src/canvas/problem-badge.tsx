@@ -1,9 +1,9 @@
 /** A mark on a card or an arrow: how many problems, and why as a tooltip. */
 import { IconAlertTriangleFilled } from "@tabler/icons-react";
 import style from "./problem-badge.module.css";
-import { countWords, type Mark } from "./problem-marks";
+import { countWords, type ProblemMark } from "./problem-marks";
 
-export function ProblemBadge({ mark, on }: { mark: Mark; on: "card" | "arrow" }) {
+export function ProblemBadge({ mark, on }: { mark: ProblemMark; on: "card" | "arrow" }) {
   const count = mark.error + mark.warning;
   return (
     <span

@@ -2,7 +2,7 @@
 import type { Problem } from "../api/graphs";
 
 /** The problems of one card or arrow. */
-export interface Mark {
+export interface ProblemMark {
   readonly error: number;
   readonly warning: number;
   /** Code and message of each, the errors first, one a line. */
@@ -10,12 +10,12 @@ export interface Mark {
 }
 
 /** By `aid` or relation id: what the canvas has no place for stands in the list only. */
-export type Marks = ReadonlyMap<string, Mark>;
+export type ProblemMarks = ReadonlyMap<string, ProblemMark>;
 
-export const NO_MARKS: Marks = new Map();
+export const NO_PROBLEM_MARKS: ProblemMarks = new Map();
 
 /** Where on the canvas a problem is: a relation, else an action; null: the graph as a whole. */
-export function placeOf({ where }: Problem): string | null {
+export function markedKeyOf({ where }: Problem): string | null {
   return where.relation ?? where.aid ?? null;
 }
 
@@ -25,12 +25,12 @@ export function bySeverity(problems: readonly Problem[]): Problem[] {
   return [...problems].sort((a, b) => rank(a) - rank(b));
 }
 
-export function marksOf(problems: readonly Problem[]): Marks {
-  const marks = new Map<string, Mark>();
+export function problemMarksOf(problems: readonly Problem[]): ProblemMarks {
+  const marks = new Map<string, ProblemMark>();
   for (const problem of bySeverity(problems)) {
     const line = `${problem.code}: ${problem.message}`;
     const others = (problem.also ?? []).map(({ relation, aid }) => relation ?? aid ?? null);
-    for (const place of new Set([placeOf(problem), ...others])) {
+    for (const place of new Set([markedKeyOf(problem), ...others])) {
       if (place === null) continue;
       const { error = 0, warning = 0, reasons = "" } = marks.get(place) ?? {};
       marks.set(place, {
@@ -44,7 +44,7 @@ export function marksOf(problems: readonly Problem[]): Marks {
 }
 
 /** "2 errors, 1 warning". */
-export function countWords({ error, warning }: Pick<Mark, "error" | "warning">): string {
+export function countWords({ error, warning }: Pick<ProblemMark, "error" | "warning">): string {
   const parts: string[] = [];
   if (error > 0) parts.push(error === 1 ? "1 error" : `${error} errors`);
   if (warning > 0) parts.push(warning === 1 ? "1 warning" : `${warning} warnings`);
@@ -52,6 +52,6 @@ export function countWords({ error, warning }: Pick<Mark, "error" | "warning">):
 }
 
 /** The mark as the end of an accessible name; empty without one. */
-export function markWords(mark: Mark | null | undefined): string {
+export function problemMarkWords(mark: ProblemMark | null | undefined): string {
   return mark ? `. ${countWords(mark)}. ${mark.reasons.replaceAll("\n", " ")}` : "";
 }

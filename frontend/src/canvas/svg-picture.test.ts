@@ -6,8 +6,8 @@ import { mapsOf } from "../graph/document-keys";
 import { addAction, connect, setEntry, setExit } from "../graph/edit";
 import { writeNote } from "../graph/edit/notes";
 import { readGraph } from "../graph/read";
-import { placesOf } from "./geometry/arrange";
-import { pictureOf } from "./svg-picture";
+import { positionsOf } from "./geometry/arrange";
+import { svgPictureOf } from "./svg-picture";
 
 function drawn(name: string, robot: string, text: string) {
   const doc = new Y.Doc();
@@ -22,9 +22,9 @@ function drawn(name: string, robot: string, text: string) {
   setExit(doc, b);
   writeNote(doc, { kind: "note", at: [0, 0], size: [160, 60], text, color: "red" });
   const graph = readGraph(mapsOf(doc));
-  return pictureOf(
+  return svgPictureOf(
     graph,
-    placesOf(graph),
+    positionsOf(graph),
     new Map(),
     (token) => `#${token.length}${token.length}0`,
   );

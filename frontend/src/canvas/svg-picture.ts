@@ -3,15 +3,22 @@
 import { type Note, notesOf } from "../graph/edit/notes";
 import type { Graph, Key, Position, Precondition } from "../graph/model";
 import { cardLines, lineText } from "../graph/value-text";
-import { robotColor } from "../ui/name-colors";
-import { type Arrow, aroundOf, type CanvasNode, edgesOf, nodesOf, shareOf } from "./elements";
+import { colorOfName } from "../ui/name-colors";
+import {
+  type Arrow,
+  type CanvasNode,
+  edgesOf,
+  nodesOf,
+  outcomeOffset,
+  surroundingsOf,
+} from "./elements";
 import { CARD, PILL, type Sizes } from "./geometry/arrange";
-import { lineOf } from "./geometry/arrow-path";
+import { arrowPathOf } from "./geometry/arrow-path";
 import { noteColor } from "./note-colors";
 import { OUTCOMES, outcomeColor, outcomeWord } from "./outcome";
-import { NO_MARKS } from "./problem-marks";
+import { NO_PROBLEM_MARKS } from "./problem-marks";
 
-export interface Picture {
+export interface SvgPicture {
   readonly svg: string;
   readonly width: number;
   readonly height: number;
@@ -40,12 +47,12 @@ function fitted(text: string, width: number, letter: number): string {
 }
 
 /** `color` answers the value of a token, `--ink` say. */
-export function pictureOf(
+export function svgPictureOf(
   graph: Graph,
   places: ReadonlyMap<Key, Position>,
   sizes: Sizes,
   color: (token: string) => string,
-): Picture {
+): SvgPicture {
   return new Painter(graph, places, sizes, color).picture();
 }
 
@@ -68,15 +75,15 @@ class Painter {
       places: new Map(places),
       selected: new Set<string>(),
       progress: new Map(),
-      marks: NO_MARKS,
+      marks: NO_PROBLEM_MARKS,
       measured: sizes,
     };
     this.nodes = nodesOf(graph, options);
-    this.edges = edgesOf(graph, options, aroundOf(graph, options, null));
+    this.edges = edgesOf(graph, options, surroundingsOf(graph, options, null));
     this.notes = notesOf(graph);
   }
 
-  picture(): Picture {
+  picture(): SvgPicture {
     const parts = [
       ...this.notes.filter(({ kind }) => kind === "frame").map((note) => this.frame(note)),
       ...this.edges.map((edge) => this.arrow(edge)),
@@ -139,7 +146,7 @@ class Painter {
   private card({ id, position: { x, y }, data }: Extract<CanvasNode, { type?: "action" }>): string {
     const { action } = data;
     const { width, height } = this.size(id, "action");
-    const robot = this.paint(robotColor(action.actor));
+    const robot = this.paint(colorOfName(action.actor));
     const ink = `fill="${this.paint("--ink")}"`;
     const dash = action.missing ? ` stroke-dasharray="5 4"` : "";
     const lines = cardLines(action.inputs, 2).map((line, i) =>
@@ -214,7 +221,7 @@ class Painter {
     const target = this.size(to.id, to.type ?? "");
     const below = data.entry ? 7 : 11;
     const ends = {
-      sourceX: from.position.x + source.width * shareOf(data.entry, data.outcome),
+      sourceX: from.position.x + source.width * outcomeOffset(data.entry, data.outcome),
       sourceY: from.position.y + source.height + below,
       targetX: to.position.x + target.width / 2,
       targetY: to.position.y - 7,
@@ -225,7 +232,7 @@ class Painter {
     const dash = data.entry || data.response === "run" ? "" : ` stroke-dasharray="6 4"`;
     const { targetX: x, targetY: y } = ends;
     return (
-      `<path d="${lineOf(ends, data.lane).path}" fill="none" stroke="${color}" stroke-width="1.8"${dash}/>` +
+      `<path d="${arrowPathOf(ends, data.lane).path}" fill="none" stroke="${color}" stroke-width="1.8"${dash}/>` +
       `<path d="M${x - 4.5} ${y - 7}L${x} ${y + 1}L${x + 4.5} ${y - 7}Z" fill="${color}"/>`
     );
   }

@@ -9,7 +9,7 @@ import { beginThread, deleteMessage, reply, resolve, type Thread } from "../grap
 import type { Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import { Empty } from "../ui/empty";
-import { initials, personColor } from "../ui/name-colors";
+import { colorOfId, initials } from "../ui/name-colors";
 import { ago, useNow } from "../ui/times";
 import style from "./comments.module.css";
 
@@ -73,14 +73,14 @@ function Write({ label, button, onSay, autoFocus = false, onCancel }: WriteProps
   );
 }
 
-interface CardProps {
+interface ThreadCardProps {
   thread: Thread;
   /** Names the action; absent where that is known. */
   place: string | null;
   onPlace: () => void;
 }
 
-function ThreadCard({ thread, place, onPlace }: CardProps) {
+function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
   const { doc, mayEdit } = useEditorContext();
   const { person } = usePerson();
   const now = useNow(30_000);
@@ -97,7 +97,7 @@ function ThreadCard({ thread, place, onPlace }: CardProps) {
         <article className={style.message} key={message.id}>
           <span
             className={style.face}
-            style={{ background: personColor(message.author.id) }}
+            style={{ background: colorOfId(message.author.id) }}
             aria-hidden
           >
             {initials(message.author.name || "Guest")}

@@ -1,6 +1,6 @@
 /** The threads of the open graph, kept in step with the document. */
 import { useEffect, useMemo, useRef, useSyncExternalStore } from "react";
-import { spotlight } from "../canvas/card-highlights";
+import { cardHighlights } from "../canvas/card-highlights";
 import { rootOf } from "../graph/document-keys";
 import { openThreadCounts, readThreads, type Thread } from "../graph/edit/comments";
 import { useRoom } from "../sync/use-room";
@@ -29,7 +29,7 @@ export function useThreads(): readonly Thread[] {
 }
 
 /** Cards show how many open threads there are about them. */
-export function useTalkOnCards(threads: readonly Thread[]): void {
-  useEffect(() => spotlight.set({ talk: openThreadCounts(threads) }), [threads]);
-  useEffect(() => spotlight.reset, []);
+export function useOpenThreadsOnCards(threads: readonly Thread[]): void {
+  useEffect(() => cardHighlights.set({ openThreads: openThreadCounts(threads) }), [threads]);
+  useEffect(() => cardHighlights.reset, []);
 }

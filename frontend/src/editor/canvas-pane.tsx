@@ -3,18 +3,18 @@ import { Button, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
-import type { Marks } from "../canvas/problem-marks";
+import type { ProblemMarks } from "../canvas/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import type { Key, Position } from "../graph/model";
-import { Robots } from "../outline/robot-filter";
+import { RobotFilter } from "../outline/robot-filter";
 import { FollowFrame } from "../people/people";
 import { useFollowedView } from "../people/use-followed-view";
 import type { Progress } from "../status/progress";
 import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
-import { Canvas } from "./canvas/editable-canvas";
-import { useCanvas } from "./canvas/use-canvas-elements";
-import { useView } from "./canvas/use-viewport";
+import { EditableCanvas } from "./canvas/editable-canvas";
+import { useCanvasElements } from "./canvas/use-canvas-elements";
+import { useViewport } from "./canvas/use-viewport";
 import style from "./canvas-pane.module.css";
 import { DryRunBar } from "./dry-run-bar";
 import { Toolbar } from "./menus/toolbar";
@@ -25,7 +25,7 @@ interface Props {
   me: string;
   canvasHandle: EditorState["canvasHandle"];
   progress: ReadonlyMap<Key, Progress>;
-  marks: Marks;
+  marks: ProblemMarks;
   compact: boolean;
   phone: boolean;
   /** The run that goes, if one does: the view follows it. */
@@ -55,7 +55,7 @@ function Inside({
   // The canvas keeps up with the hands of others; what stands beside it comes after.
   const context = useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
   const arrived = useLinkPart(({ seq }) => seq > 0);
-  const canvas = useCanvas({
+  const canvas = useCanvasElements({
     me,
     graph: context.graph,
     selection: context.selection,
@@ -67,7 +67,7 @@ function Inside({
   const frame = useRef<HTMLDivElement>(null);
   const pointer = useRef<Position | null>(null);
   const begun = arrived && context.graph.actions.length > 0;
-  const { view, lost, onPanned, onFollow } = useView({
+  const { view, lost, onPanned, onFollow } = useViewport({
     flow,
     frame,
     places,
@@ -89,7 +89,7 @@ function Inside({
   return (
     <div className={style.whole}>
       <div className={style.stage} ref={frame} data-dry={context.dryRun ? true : undefined}>
-        <Canvas
+        <EditableCanvas
           context={context}
           canvas={canvas}
           me={me}
@@ -132,7 +132,7 @@ function Inside({
         )}
         {!compact && (
           <div className={style.robots}>
-            <Robots />
+            <RobotFilter />
           </div>
         )}
         <FollowFrame me={me} />

@@ -5,9 +5,9 @@ import { IconLayoutSidebar, IconLayoutSidebarRight } from "@tabler/icons-react";
 import { type ReactNode, useCallback, useMemo, useState, useSyncExternalStore } from "react";
 import type { Script } from "../api/dry-runs";
 import { type Problems, useProblems } from "../api/graphs";
-import { actionCarrier } from "../canvas/action-drag";
-import { marksOf } from "../canvas/problem-marks";
-import { useTalkOnCards, useThreads } from "../comments/use-threads";
+import { actionDrag } from "../canvas/action-drag";
+import { problemMarksOf } from "../canvas/problem-marks";
+import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
 import {
   addActionAt,
@@ -132,7 +132,7 @@ export function Editor(props: Props) {
     defaultValue: false,
     getInitialValueInEffect: false,
   });
-  const carrying = useSyncExternalStore(actionCarrier.subscribe, actionCarrier.now) !== null;
+  const carrying = useSyncExternalStore(actionDrag.subscribe, actionDrag.now) !== null;
   const [side, setSide] = useState<Side>("library");
   const onPanel = useCallback((next: Panel) => {
     const outline = next === "outline";
@@ -155,9 +155,9 @@ export function Editor(props: Props) {
   } = useEditor(id, onPanel);
   const link = useThrottledLink();
   const problems = useProblems(id, link.seq).data;
-  const marks = useMemo(() => marksOf(problems?.problems ?? []), [problems]);
+  const marks = useMemo(() => problemMarksOf(problems?.problems ?? []), [problems]);
   const threads = useThreads();
-  useTalkOnCards(threads);
+  useOpenThreadsOnCards(threads);
   useRemoteEditAnnouncements(context.graph, link.seq > 0);
   useRunAnnouncements(context.graph, progress);
   useShortcuts(context);

@@ -1,7 +1,7 @@
 /** Taking a graph away as a file: UMRF as the server writes it, or a picture of the canvas. */
 import { notifications } from "@mantine/notifications";
 import { here } from "../api/page-url";
-import { pictureOf } from "../canvas/svg-picture";
+import { svgPictureOf } from "../canvas/svg-picture";
 import type { EditorContext, ExportFormat } from "../edit-actions/editor-context";
 
 const LARGEST = 8_000; // px of a PNG's longer side; browsers refuse much more
@@ -59,7 +59,7 @@ export async function takeAway(context: EditorContext, format: ExportFormat): Pr
   }
   try {
     const colors = getComputedStyle(document.documentElement);
-    const picture = pictureOf(context.graph, context.positions(), context.sizes(), (token) =>
+    const picture = svgPictureOf(context.graph, context.positions(), context.sizes(), (token) =>
       colors.getPropertyValue(token).trim(),
     );
     const { svg, width, height } = picture;

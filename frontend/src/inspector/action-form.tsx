@@ -5,7 +5,7 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import { adoptGhost, rename, setField } from "../graph/edit";
 import type { Action, Graph } from "../graph/model";
 import { DraftInput } from "../ui/draft-input";
-import { robotColor } from "../ui/name-colors";
+import { colorOfName } from "../ui/name-colors";
 import { Arrows } from "./arrow-list";
 import { FieldOf } from "./fields/shared-field";
 import style from "./inspector.module.css";
@@ -75,7 +75,7 @@ export function ActionForm({ action }: { action: Action }) {
           leftSection={
             <i
               className={style.robot}
-              style={{ background: robotColor(action.actor) }}
+              style={{ background: colorOfName(action.actor) }}
               aria-hidden
             />
           }

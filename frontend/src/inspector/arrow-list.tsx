@@ -2,7 +2,7 @@
 import { ActionIcon, Button, Select, Tooltip } from "@mantine/core";
 import { IconPlus, IconX } from "@tabler/icons-react";
 import { useState } from "react";
-import { answersOf } from "../canvas/elements";
+import { responsesOf } from "../canvas/elements";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
@@ -13,7 +13,7 @@ import style from "./inspector.module.css";
 
 function Line({ relation, context }: { relation: Relation; context: EditorContext }) {
   const id = relationId(relation);
-  const answers = answersOf(relation);
+  const answers = responsesOf(relation);
   return (
     <li className={style.arrow}>
       <button type="button" className={style.arrowText} onClick={() => context.select([id])}>

@@ -3,7 +3,7 @@ import { ActionIcon, Button, Tooltip } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
 import type { Problem, Problems } from "../api/graphs";
-import { bySeverity, placeOf } from "../canvas/problem-marks";
+import { bySeverity, markedKeyOf } from "../canvas/problem-marks";
 import { copyLinkTo } from "../edit-actions/clipboard";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { linkToProblem } from "../edit-actions/graph-links";
@@ -42,7 +42,7 @@ function tellNothing(): void {
 
 function ProblemItem({ problem, jumps }: { problem: Problem; jumps: boolean }) {
   const context = useEditorContext();
-  const place = placeOf(problem);
+  const place = markedKeyOf(problem);
   const words = placeWords(context.graph, place);
   const fix = fixOf(problem);
   const severity = problem.severity === "error" ? "Error" : "Warning";
@@ -96,7 +96,7 @@ function Items({ problems, jumps }: { problems: readonly Problem[]; jumps: boole
     <ul className={style.items}>
       {problems.map((problem, i) => (
         <ProblemItem
-          key={`${problem.code} ${problem.where.path ?? ""} ${placeOf(problem) ?? i}`}
+          key={`${problem.code} ${problem.where.path ?? ""} ${markedKeyOf(problem) ?? i}`}
           problem={problem}
           jumps={jumps}
         />
@@ -109,7 +109,7 @@ function Items({ problems, jumps }: { problems: readonly Problem[]; jumps: boole
 export function ProblemsHere({ problems }: { problems: Problems | undefined }) {
   const { selection } = useEditorContext();
   const here = bySeverity(problems?.problems ?? []).filter((problem) => {
-    const place = placeOf(problem);
+    const place = markedKeyOf(problem);
     return place !== null && selection.has(place);
   });
   if (here.length === 0 || selection.size > 1) return null;

@@ -10,7 +10,7 @@ import { type Run, useRuns } from "../api/runs";
 import { endWords, runWord } from "../status/progress";
 import { StateWord } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import { initials, personColor, robotColor } from "../ui/name-colors";
+import { colorOfId, colorOfName, initials } from "../ui/name-colors";
 import { ago, instant, useNow } from "../ui/times";
 import style from "./graph-cards.module.css";
 import { GraphMenu } from "./graph-menu";
@@ -51,7 +51,7 @@ function People({ people }: { people: NonNullable<GraphSummary["people"]> }) {
     <span className={style.people} title={`Now here: ${names}`}>
       <span className="visually-hidden">Now here: {names}</span>
       {people.slice(0, FEW).map(({ id, name }) => (
-        <i key={id} style={{ background: personColor(id) }} aria-hidden>
+        <i key={id} style={{ background: colorOfId(id) }} aria-hidden>
           {initials(name || "Guest")}
         </i>
       ))}
@@ -84,7 +84,7 @@ function GraphCard({ graph, names, last }: CardProps) {
             <p className={style.marks}>
               {robots.slice(0, FEW).map((robot) => (
                 <span key={robot} className={style.robot}>
-                  <i style={{ background: robotColor(robot) }} aria-hidden />
+                  <i style={{ background: colorOfName(robot) }} aria-hidden />
                   <span className="visually-hidden">robot </span>
                   {robot}
                 </span>

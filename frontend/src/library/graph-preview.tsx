@@ -6,23 +6,23 @@ import { fromUmrf } from "../canvas/from-umrf";
 import { arrange } from "../canvas/geometry/arrange";
 import { outcomeColor } from "../canvas/outcome";
 import { ENTRY, EXIT, type Graph, spokenOutcomes } from "../graph/model";
-import { robotColor } from "../ui/name-colors";
+import { colorOfName } from "../ui/name-colors";
 
 const MARGIN = 26;
 const CARD = { width: 150, height: 84 } as const;
 const PILL = { width: 44, height: 44 } as const;
 
-interface Box {
+interface MiniatureBox {
   x: number;
   y: number;
   width: number;
   height: number;
 }
 
-function boxes(graph: Graph): Map<string, Box> {
+function boxes(graph: Graph): Map<string, MiniatureBox> {
   const keys = [ENTRY, ...graph.actions.map((action) => action.key), EXIT];
   const sizes = new Map(keys.map((key) => [key, key === ENTRY || key === EXIT ? PILL : CARD]));
-  const found = new Map<string, Box>();
+  const found = new Map<string, MiniatureBox>();
   for (const [key, [x, y]] of arrange(graph, sizes, "LR")) {
     found.set(key, { x, y, ...(sizes.get(key) ?? CARD) });
   }
@@ -85,7 +85,7 @@ export function Miniature({ graph }: { graph: Graph }) {
                   width={7}
                   height={box.height - 36}
                   rx={3}
-                  style={{ fill: robotColor(action.actor) }}
+                  style={{ fill: colorOfName(action.actor) }}
                 />
                 <rect
                   x={box.x + 32}

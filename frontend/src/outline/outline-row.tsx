@@ -9,7 +9,7 @@ import {
   IconPlayerPlay,
 } from "@tabler/icons-react";
 import { memo, useId, useState } from "react";
-import { useTalk } from "../canvas/card-highlights";
+import { useOpenThreadCount } from "../canvas/card-highlights";
 import { noteColor } from "../canvas/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import type { Note } from "../graph/edit/notes";
@@ -17,7 +17,7 @@ import { cardLines, lineText } from "../graph/value-text";
 import { moreOf } from "../status/durations";
 import type { Progress } from "../status/progress";
 import { StateWord } from "../status/state-label";
-import { robotColor } from "../ui/name-colors";
+import { colorOfName } from "../ui/name-colors";
 import style from "./outline.module.css";
 import { type RowAction, rowActionsOf } from "./row-actions";
 import { type Change, RowEdit } from "./row-edit";
@@ -46,7 +46,7 @@ export interface Hands {
 }
 
 function Talk({ of }: { of: string }) {
-  const count = useTalk(of);
+  const count = useOpenThreadCount(of);
   if (count === 0) return null;
   return (
     <span className={style.talk} title={`${count} open comments`}>
@@ -161,7 +161,7 @@ const noteWord = ({ kind }: Note) => (kind === "frame" ? "Frame" : "Note");
 
 function colorOf(row: Row): string {
   if (row.kind === "note") return noteColor[row.note.color];
-  return row.kind === "action" ? robotColor(row.action.actor) : "transparent";
+  return row.kind === "action" ? colorOfName(row.action.actor) : "transparent";
 }
 
 function labelOf(row: Row, name: string): string {

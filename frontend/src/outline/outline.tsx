@@ -7,7 +7,7 @@
 import { Button, Kbd } from "@mantine/core";
 import { IconListTree, IconPlus } from "@tabler/icons-react";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
-import { useRobotInLight } from "../canvas/card-highlights";
+import { useHighlightedRobot } from "../canvas/card-highlights";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { ENTRY, type Key } from "../graph/model";
 import type { Progress } from "../status/progress";
@@ -16,7 +16,7 @@ import { Empty } from "../ui/empty";
 import { useIsPhone } from "../ui/use-screen-size";
 import style from "./outline.module.css";
 import { type Hands, OutlineRow } from "./outline-row";
-import { Robots } from "./robot-filter";
+import { RobotFilter } from "./robot-filter";
 import { moveRow, type RowAction, removeRow, rowActionFor } from "./row-actions";
 import type { Change } from "./row-edit";
 import { namesOf, type Row, rowsOf, subjectOf } from "./rows";
@@ -70,7 +70,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   const context = useEditorContext();
   const { graph, selection, select, setPanel, mayEdit } = context;
   const phone = useIsPhone();
-  const robot = useRobotInLight();
+  const robot = useHighlightedRobot();
   const { isOpen, flip } = useOpen(graph.actions.length);
   const rows = useMemo(() => {
     const all = rowsOf(graph, isOpen);
@@ -184,7 +184,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   return (
     <div className={style.outline}>
       <div className={style.robots}>
-        <Robots />
+        <RobotFilter />
       </div>
       {rows.length === 1 && graph.actions.length === 0 && (
         <Empty icon={<IconListTree size={22} />} title="Nothing here yet">

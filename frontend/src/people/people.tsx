@@ -2,22 +2,22 @@
 import { Tooltip } from "@mantine/core";
 import { ViewportPortal } from "@xyflow/react";
 import type { CSSProperties } from "react";
-import { CARD, type Places, type Sizes } from "../canvas/geometry/arrange";
+import { CARD, type Positions, type Sizes } from "../canvas/geometry/arrange";
 import { splitKey } from "../graph/document-keys";
 import type { Participant } from "../sync/presence/presence";
 import { useFollowing, usePeople } from "../sync/use-room";
-import { colorsOf, initials } from "../ui/name-colors";
+import { distinctColors, initials } from "../ui/name-colors";
 import style from "./people.module.css";
 
 const MOST = 4;
 
-export function nameOf(person: { readonly name: string }): string {
+export function personName(person: { readonly name: string }): string {
   return person.name || "Guest";
 }
 
 /** A name as it is written, whatever its direction does to what stands beside it. */
 function Name({ of }: { of: { readonly name: string } }) {
-  return <bdi className={style.name}>{nameOf(of)}</bdi>;
+  return <bdi className={style.name}>{personName(of)}</bdi>;
 }
 
 /** Each person once, however many windows they have. */
@@ -34,8 +34,8 @@ export function People({ me }: { me: string }) {
   const others = onePerId(leader ? [...people, leader] : people);
   if (others.length === 0) return null;
   const shown = others.slice(0, MOST);
-  const colors = colorsOf([me, ...others.map((person) => person.id)]);
-  const names = others.map(nameOf).join(", ");
+  const colors = distinctColors([me, ...others.map((person) => person.id)]);
+  const names = others.map(personName).join(", ");
   return (
     <div className={style.people}>
       <span className="visually-hidden">Also here: {names}</span>
@@ -55,10 +55,10 @@ export function People({ me }: { me: string }) {
               className={style.face}
               style={colored(colors.get(person.id))}
               aria-pressed={followed}
-              aria-label={`Follow ${nameOf(person)}`}
+              aria-label={`Follow ${personName(person)}`}
               onClick={() => follow(followed ? null : person.client)}
             >
-              {initials(nameOf(person))}
+              {initials(personName(person))}
             </button>
           </Tooltip>
         );
@@ -78,7 +78,7 @@ export function FollowFrame({ me }: { me: string }) {
   const people = usePeople();
   const leader = people.find(({ client }) => client === whom);
   if (leader === undefined) return null;
-  const color = colorsOf([me, ...people.map((person) => person.id)]).get(leader.id);
+  const color = distinctColors([me, ...people.map((person) => person.id)]).get(leader.id);
   return (
     <div className={style.frame} style={colored(color)}>
       <span className={style.followed} role="status">
@@ -93,7 +93,7 @@ export function FollowFrame({ me }: { me: string }) {
 
 export function Cursors({ me }: { me: string }) {
   const people = usePeople();
-  const colors = colorsOf([me, ...people.map((person) => person.id)]);
+  const colors = distinctColors([me, ...people.map((person) => person.id)]);
   return (
     <ViewportPortal>
       {people.map((person) => {
@@ -128,12 +128,12 @@ export function Cursors({ me }: { me: string }) {
 
 interface AtCardsProps {
   me: string;
-  places: Places;
+  places: Positions;
   sizes: Sizes;
 }
 
 /** Small initials at the cards of which somebody has a field under their caret. */
-export function AtCards({ me, places, sizes }: AtCardsProps) {
+export function PeopleAtCards({ me, places, sizes }: AtCardsProps) {
   const people = usePeople();
   const at = new Map<string, Participant[]>();
   for (const person of people) {
@@ -141,7 +141,7 @@ export function AtCards({ me, places, sizes }: AtCardsProps) {
     if (person.id !== me && places.has(head)) at.set(head, [...(at.get(head) ?? []), person]);
   }
   if (at.size === 0) return null;
-  const colors = colorsOf([me, ...people.map((person) => person.id)]);
+  const colors = distinctColors([me, ...people.map((person) => person.id)]);
   return (
     <ViewportPortal>
       {[...at].map(([key, editors]) => {
@@ -154,7 +154,7 @@ export function AtCards({ me, places, sizes }: AtCardsProps) {
             style={{ transform: `translate(${right}px, ${y}px) translate(-100%, -50%)` }}
           >
             {onePerId(editors).map((person) => (
-              <Initial key={person.id} person={person} color={colors.get(person.id)} />
+              <PersonSign key={person.id} person={person} color={colors.get(person.id)} />
             ))}
           </div>
         );
@@ -169,11 +169,15 @@ interface InitialProps {
 }
 
 /** A person as a small round sign. */
-export function Initial({ person, color }: InitialProps) {
+export function PersonSign({ person, color }: InitialProps) {
   return (
-    <span className={style.initial} style={colored(color)} title={`${nameOf(person)} is writing`}>
-      <span aria-hidden>{initials(nameOf(person))}</span>
-      <span className="visually-hidden">{nameOf(person)} is writing</span>
+    <span
+      className={style.initial}
+      style={colored(color)}
+      title={`${personName(person)} is writing`}
+    >
+      <span aria-hidden>{initials(personName(person))}</span>
+      <span className="visually-hidden">{personName(person)} is writing</span>
     </span>
   );
 }

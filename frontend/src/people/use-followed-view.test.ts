@@ -1,6 +1,6 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { lookingAt, viewOf } from "./use-followed-view";
+import { viewOf, viewportOnto } from "./use-followed-view";
 
 const size = fc.record({
   width: fc.integer({ min: 200, max: 3000 }),
@@ -15,7 +15,7 @@ const viewport = fc.record({
 test("who has a frame of the same size sees exactly the same", () => {
   fc.assert(
     fc.property(viewport, size, (theirs, frame) => {
-      const mine = lookingAt(viewOf(theirs, frame), frame);
+      const mine = viewportOnto(viewOf(theirs, frame), frame);
       expect(mine.zoom).toBeCloseTo(theirs.zoom, 5);
       expect(Math.abs(mine.x - theirs.x)).toBeLessThan(2.3);
       expect(Math.abs(mine.y - theirs.y)).toBeLessThan(2.3);
@@ -27,7 +27,7 @@ test("whatever the size of one's own frame, all they see is in it, around its mi
   fc.assert(
     fc.property(viewport, size, size, (theirs, their, my) => {
       const view = viewOf(theirs, their);
-      const mine = lookingAt(view, my);
+      const mine = viewportOnto(view, my);
       expect(mine.zoom).toBeLessThanOrEqual(view.zoom);
       const left = view.x * mine.zoom + mine.x;
       const right = (view.x + their.width / view.zoom) * mine.zoom + mine.x;

@@ -11,13 +11,13 @@ const GLIDE = 120; // ms; views come at most every 50 ms
 /** What Esc leaves first. */
 const OWN_ESCAPE = "input, textarea, select, [role=dialog], [role=menu], [role=listbox]";
 
-interface Size {
+interface ViewSize {
   readonly width: number;
   readonly height: number;
 }
 
 /** What is seen through a frame of this size, to tell the others. */
-export function viewOf({ x, y, zoom }: Viewport, { width, height }: Size): SharedView {
+export function viewOf({ x, y, zoom }: Viewport, { width, height }: ViewSize): SharedView {
   return {
     x: Math.round(-x / zoom),
     y: Math.round(-y / zoom),
@@ -28,7 +28,7 @@ export function viewOf({ x, y, zoom }: Viewport, { width, height }: Size): Share
 }
 
 /** How to look so that all they see is seen in a frame of this size, with their middle in its middle. */
-export function lookingAt(view: SharedView, { width, height }: Size): Viewport {
+export function viewportOnto(view: SharedView, { width, height }: ViewSize): Viewport {
   const theirs = { width: view.width ?? width, height: view.height ?? height };
   const zoom = view.zoom * Math.min(1, width / theirs.width, height / theirs.height);
   const middle = {
@@ -38,7 +38,7 @@ export function lookingAt(view: SharedView, { width, height }: Size): Viewport {
   return { x: width / 2 - middle.x * zoom, y: height / 2 - middle.y * zoom, zoom };
 }
 
-interface Given {
+interface FollowedViewInput {
   flow: ReactFlowInstance<CanvasNode, Arrow>;
   frame: RefObject<HTMLDivElement | null>;
   view: BenchView;
@@ -47,11 +47,11 @@ interface Given {
 }
 
 /** Tells what is seen here, and follows. What the person does to the view ends that. */
-export function useFollowedView({ flow, frame, view: own, onPanned }: Given) {
+export function useFollowedView({ flow, frame, view: own, onPanned }: FollowedViewInput) {
   const { presence, following } = useRoom();
   const { whom, follow } = useFollowing();
   const view = useSyncExternalStore(following.onChange, following.view);
-  const sizeOf = useCallback((): Size | null => {
+  const sizeOf = useCallback((): ViewSize | null => {
     const room = frame.current;
     return room && { width: room.clientWidth, height: room.clientHeight };
   }, [frame]);
@@ -74,7 +74,7 @@ export function useFollowedView({ flow, frame, view: own, onPanned }: Given) {
     const size = sizeOf();
     if (view === null || size === null) return;
     presence.tell({ view });
-    void flow.setViewport(lookingAt(view, size), { duration: GLIDE });
+    void flow.setViewport(viewportOnto(view, size), { duration: GLIDE });
   }, [view, flow, presence, sizeOf]);
 
   useEffect(() => {

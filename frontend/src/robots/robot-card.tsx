@@ -9,7 +9,7 @@ import { useHeard, useLive } from "../api/live/use-live";
 import { forgetRobot, type Registration, type Robot } from "../api/robots";
 import { useMay } from "../api/use-person";
 import { EngineWord } from "../status/engine-label";
-import { robotColor } from "../ui/name-colors";
+import { colorOfName } from "../ui/name-colors";
 import { ago, clock, instant, useNow } from "../ui/times";
 import { KnownHere } from "./indexed-actions";
 import style from "./robot-card.module.css";
@@ -121,7 +121,7 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
     n === null ? `${what}s` : `${n} ${what}${n === 1 ? "" : "s"}`;
   return (
     <article className={style.card} aria-label={robot.name}>
-      <i className={style.stripe} style={{ background: robotColor(robot.name) }} aria-hidden />
+      <i className={style.stripe} style={{ background: colorOfName(robot.name) }} aria-hidden />
       <header className={style.head}>
         <h3 className={style.name}>{robot.name}</h3>
         <EngineWord robot={robot} />

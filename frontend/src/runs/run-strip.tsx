@@ -12,7 +12,7 @@ import { endWords, runWord } from "../status/progress";
 import { StateWord } from "../status/state-label";
 import { Timeline } from "../status/timeline";
 import { lanesOf } from "../status/timeline-lanes";
-import { robotColor } from "../ui/name-colors";
+import { colorOfName } from "../ui/name-colors";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";
 import { PauseButton } from "./pause-button";
 import style from "./run-strip.module.css";
@@ -76,7 +76,7 @@ function Whose({ run, going, onChoose }: Pick<Props, "going" | "onChoose"> & { r
 function Robot({ name }: { name: string }) {
   return (
     <span className={style.robot}>
-      <i style={{ background: robotColor(name) }} aria-hidden /> {name}
+      <i style={{ background: colorOfName(name) }} aria-hidden /> {name}
     </span>
   );
 }

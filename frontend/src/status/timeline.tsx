@@ -1,7 +1,7 @@
 /** Lanes of a run over time: one for each action, with what is not known left hatched. */
 import { Fragment, type PointerEvent, useEffect, useRef } from "react";
 import type { Run, Visit } from "../api/runs";
-import { robotColor } from "../ui/name-colors";
+import { colorOfName } from "../ui/name-colors";
 import { duration, instant } from "../ui/times";
 import { moreOf } from "./durations";
 import { begun, ended, progressOf, type Tone } from "./progress";
@@ -156,7 +156,7 @@ function LaneRow({ run, lane, axis, unsure, selected, onPick }: RowProps) {
         onClick={() => lane.aid && onPick?.(lane.aid)}
         title={lane.name}
       >
-        <i style={{ background: robotColor(lane.robot) }} aria-hidden />
+        <i style={{ background: colorOfName(lane.robot) }} aria-hidden />
         <span>{lane.robot === "" ? lane.name : `${lane.robot} · ${lane.name}`}</span>
       </button>
       <div className={style.track} aria-hidden>

@@ -7,16 +7,16 @@ function hash(text: string): number {
   return h >>> 0;
 }
 
-export function robotColor(name: string): string {
+export function colorOfName(name: string): string {
   return name === "" ? "var(--ink4)" : `var(--robot-${hash(name) % COLOURS})`;
 }
 
-export function personColor(id: string): string {
+export function colorOfId(id: string): string {
   return `var(--robot-${hash(id) % COLOURS})`;
 }
 
 /** A colour for each of the people in one place, each their own as long as colours last. */
-export function colorsOf(ids: readonly string[]): Map<string, string> {
+export function distinctColors(ids: readonly string[]): Map<string, string> {
   const colors = new Map<string, string>();
   const taken = new Set<number>();
   for (const id of [...new Set(ids)].sort()) {

@@ -2,31 +2,31 @@
 import { type PointerEvent as ReactPointerEvent, useEffect, useSyncExternalStore } from "react";
 import style from "./pointer-drag.module.css";
 
-export interface Carried<T> {
-  readonly load: T;
+export interface DraggedItem<T> {
+  readonly payload: T;
   readonly label: string;
   readonly x: number;
   readonly y: number;
 }
 
-type Taker<T> = (carried: Carried<T>) => void;
+type DropHandler<T> = (draggedItem: DraggedItem<T>) => void;
 
 const THRESHOLD = 6; // px until a press becomes a drag
 
 /** One carrier for each kind of load. */
-export class Carrier<T> {
-  #now: Carried<T> | null = null;
+export class PointerDrag<T> {
+  #now: DraggedItem<T> | null = null;
   #listeners = new Set<() => void>();
-  #taker: Taker<T> | null = null;
+  #taker: DropHandler<T> | null = null;
 
   subscribe = (listener: () => void): (() => void) => {
     this.#listeners.add(listener);
     return () => this.#listeners.delete(listener);
   };
-  now = (): Carried<T> | null => this.#now;
+  now = (): DraggedItem<T> | null => this.#now;
 
   /** Who takes what is dropped; answers how to stop taking. */
-  onDrop(taker: Taker<T>): () => void {
+  onDrop(taker: DropHandler<T>): () => void {
     this.#taker = taker;
     return () => {
       if (this.#taker === taker) this.#taker = null;
@@ -42,7 +42,7 @@ export class Carrier<T> {
       const far = Math.hypot(move.clientX - x0, move.clientY - y0) > THRESHOLD;
       if (this.#now === null && !far) return;
       move.preventDefault();
-      this.#set({ load, label, x: move.clientX, y: move.clientY });
+      this.#set({ payload: load, label, x: move.clientX, y: move.clientY });
     };
     const end = (drop: boolean) => (up: PointerEvent | KeyboardEvent) => {
       if ("pointerId" in up && up.pointerId !== id) return;
@@ -51,11 +51,11 @@ export class Carrier<T> {
       window.removeEventListener("pointerup", onUp);
       window.removeEventListener("pointercancel", onCancel);
       window.removeEventListener("keydown", onCancel);
-      const carried = this.#now;
+      const draggedItem = this.#now;
       this.#set(null);
-      if (drop && carried) {
+      if (drop && draggedItem) {
         swallowClick();
-        this.#taker?.(carried);
+        this.#taker?.(draggedItem);
       }
     };
     const onUp = end(true);
@@ -66,7 +66,7 @@ export class Carrier<T> {
     window.addEventListener("keydown", onCancel);
   }
 
-  #set(next: Carried<T> | null): void {
+  #set(next: DraggedItem<T> | null): void {
     this.#now = next;
     for (const listener of this.#listeners) listener();
   }
@@ -80,21 +80,21 @@ function swallowClick(): void {
 }
 
 /** What is carried, under the pointer. */
-export function CarriedGhost<T>({ carrier }: { carrier: Carrier<T> }) {
-  const carried = useSyncExternalStore(carrier.subscribe, carrier.now);
-  const active = carried !== null;
+export function DragPreview<T>({ carrier }: { carrier: PointerDrag<T> }) {
+  const draggedItem = useSyncExternalStore(carrier.subscribe, carrier.now);
+  const active = draggedItem !== null;
   useEffect(() => {
     document.body.classList.toggle(style.carrying ?? "", active);
     return () => document.body.classList.remove(style.carrying ?? "");
   }, [active]);
-  if (carried === null) return null;
+  if (draggedItem === null) return null;
   return (
     <div
       className={style.ghost}
-      style={{ transform: `translate(${carried.x - 104}px, ${carried.y - 24}px)` }}
+      style={{ transform: `translate(${draggedItem.x - 104}px, ${draggedItem.y - 24}px)` }}
       aria-hidden
     >
-      {carried.label}
+      {draggedItem.label}
     </div>
   );
 }

@@ -23,7 +23,7 @@ interface Props {
   stop: ReactNode;
 }
 
-export function Mark() {
+export function Logo() {
   return <img src={here("/mark.svg")} alt="" width={24} height={24} className={style.mark} />;
 }
 
@@ -42,7 +42,7 @@ export function TopBar({ crumbs, status, actions, account, start, stop }: Props)
         Skip to the content
       </button>
       <Link to="/" className={style.home} aria-label="All graphs">
-        <Mark />
+        <Logo />
       </Link>
       <nav className={style.crumbs} aria-label="Where you are">
         {crumbs.map((crumb, i) => (

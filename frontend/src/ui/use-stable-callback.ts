@@ -2,7 +2,7 @@
 import { useCallback, useLayoutEffect, useRef } from "react";
 
 /** The same function as long as the component is there. It does what the last one given does. */
-export function useSteady<A extends unknown[], R>(
+export function useStableCallback<A extends unknown[], R>(
   callback: (...given: A) => R,
 ): (...given: A) => R {
   const latest = useRef(callback);

@@ -1,6 +1,6 @@
 /** Aligning, distributing, and tidying a part: from where things stand to where they shall. Pure. */
 import type { Graph, Key, Position } from "../../graph/model";
-import { arrange, type Places, type Sizes } from "./arrange";
+import { arrange, type Positions, type Sizes } from "./arrange";
 
 export interface Block {
   readonly key: Key;
@@ -15,7 +15,7 @@ export type Align = "left" | "center" | "right" | "top" | "middle" | "bottom";
 const right = (block: Block) => block.x + block.width;
 const bottom = (block: Block) => block.y + block.height;
 
-export function align(blocks: readonly Block[], how: Align): Places {
+export function align(blocks: readonly Block[], how: Align): Positions {
   const left = Math.min(...blocks.map(({ x }) => x));
   const top = Math.min(...blocks.map(({ y }) => y));
   const far = Math.max(...blocks.map(right));
@@ -41,7 +41,7 @@ export function align(blocks: readonly Block[], how: Align): Places {
 }
 
 /** Equal gaps between neighbours; the outermost stay. */
-export function distribute(blocks: readonly Block[], axis: "x" | "y"): Places {
+export function distribute(blocks: readonly Block[], axis: "x" | "y"): Positions {
   const size = (block: Block) => (axis === "x" ? block.width : block.height);
   const middle = (block: Block) => block[axis] + size(block) / 2;
   const sorted = [...blocks].sort((a, b) => middle(a) - middle(b) || (a.key < b.key ? -1 : 1));
@@ -49,7 +49,7 @@ export function distribute(blocks: readonly Block[], axis: "x" | "y"): Places {
   if (!first || !last || sorted.length < 3) return new Map();
   const inner = sorted.slice(1, -1).reduce((sum, block) => sum + size(block), 0);
   const gap = (last[axis] - first[axis] - size(first) - inner) / (sorted.length - 1);
-  const places: Places = new Map();
+  const places: Positions = new Map();
   let next = first[axis];
   for (const block of sorted) {
     const at = block === last ? last[axis] : Math.round(next);
@@ -65,7 +65,7 @@ export function tidied(
   keys: ReadonlySet<Key>,
   places: ReadonlyMap<Key, Position>,
   sizes: Sizes,
-): Places {
+): Positions {
   const part: Graph = {
     ...graph,
     actions: graph.actions.filter(({ key }) => keys.has(key)),

@@ -11,7 +11,7 @@ export interface Size {
   readonly height: number;
 }
 export type Sizes = ReadonlyMap<Key, Size>;
-export type Places = Map<Key, Position>;
+export type Positions = Map<Key, Position>;
 
 function sizeOf(key: Key, sizes: Sizes): Size {
   return sizes.get(key) ?? (key === ENTRY || key === EXIT ? PILL : CARD);
@@ -22,7 +22,7 @@ export function arrange(
   graph: Graph,
   sizes: Sizes = new Map(),
   direction: "TB" | "LR" = "TB",
-): Places {
+): Positions {
   const dagre = new Dagre({ multigraph: true });
   dagre.setGraph({ rankdir: direction, nodesep: 56, ranksep: 108, marginx: 0, marginy: 0 });
   dagre.setDefaultEdgeLabel(() => ({}));
@@ -33,7 +33,7 @@ export function arrange(
     dagre.setEdge(parent, child, { weight: parent === ENTRY ? 3 : 1 }, String(i));
   });
   layout(dagre);
-  const places: Places = new Map();
+  const places: Positions = new Map();
   for (const key of keys) {
     const { x = 0, y = 0 } = dagre.node(key);
     const { width, height } = sizeOf(key, sizes);
@@ -43,7 +43,7 @@ export function arrange(
 }
 
 /** How far the fresh places of what stands already are from where it stands. */
-function offset(known: Places, fresh: Places): Position {
+function offset(known: Positions, fresh: Positions): Position {
   let [dx, dy, n] = [0, 0, 0];
   for (const [key, [x, y]] of known) {
     const at = fresh.get(key);
@@ -55,8 +55,8 @@ function offset(known: Places, fresh: Places): Position {
   return n === 0 ? [0, 0] : [Math.round(dx / n), Math.round(dy / n)];
 }
 
-function knownPlaces(graph: Graph): Places {
-  const known: Places = new Map();
+function knownPlaces(graph: Graph): Positions {
+  const known: Positions = new Map();
   for (const { key, position } of graph.actions) if (position) known.set(key, position);
   if (graph.entryPosition) known.set(ENTRY, graph.entryPosition);
   if (graph.exitPosition) known.set(EXIT, graph.exitPosition);
@@ -80,7 +80,7 @@ export function unplaced(graph: Graph, places: ReadonlyMap<Key, Position>): [Key
 }
 
 /** The middle of what an end is tied to; before anything is, it stays over the first action. */
-function middle(graph: Graph, end: Key, places: Places): number {
+function middle(graph: Graph, end: Key, places: Positions): number {
   const tied = graph.relations.flatMap((r) =>
     end === ENTRY && r.parent === ENTRY
       ? [r.child]
@@ -95,10 +95,10 @@ function middle(graph: Graph, end: Key, places: Places): number {
 }
 
 /** Where everything stands. What has a place keeps it. */
-export function placesOf(graph: Graph, sizes: Sizes = new Map()): Places {
+export function positionsOf(graph: Graph, sizes: Sizes = new Map()): Positions {
   const known = knownPlaces(graph);
   if (known.size === 0) return arrange(graph, sizes);
-  const places: Places = new Map(known);
+  const places: Positions = new Map(known);
   if (graph.actions.some((action) => !known.has(action.key))) {
     const fresh = arrange(graph, sizes);
     const [dx, dy] = offset(known, fresh);

@@ -2,14 +2,14 @@
 import { getBezierPath, Position } from "@xyflow/react";
 import { anchorOf } from "./label-places";
 
-export interface Line {
+export interface ArrowPath {
   readonly path: string;
   readonly x: number;
   readonly y: number;
   readonly anchor: "left" | "middle" | "right";
 }
 
-export interface Ends {
+export interface ArrowEnds {
   readonly sourceX: number;
   readonly sourceY: number;
   readonly targetX: number;
@@ -17,7 +17,7 @@ export interface Ends {
 }
 
 /** Back up on a lane beside the cards, so that loops can be told from the way down. */
-function backwards(sx: number, sy: number, tx: number, ty: number, side: number): Line {
+function backwards(sx: number, sy: number, tx: number, ty: number, side: number): ArrowPath {
   const [low, high] = [sy + 30, ty - 30];
   const out = Math.sign(side - sx) || 1;
   const back = Math.sign(tx - side) || -1;
@@ -30,7 +30,7 @@ function backwards(sx: number, sy: number, tx: number, ty: number, side: number)
 }
 
 /** Down a lane beside the cards that stand in the way. */
-function round(sx: number, sy: number, tx: number, ty: number, lane: number): Line {
+function round(sx: number, sy: number, tx: number, ty: number, lane: number): ArrowPath {
   const out = Math.sign(lane - sx) || 1;
   const back = Math.sign(tx - lane) || -1;
   const [high, low] = [sy + 26, ty - 26];
@@ -44,7 +44,10 @@ function round(sx: number, sy: number, tx: number, ty: number, lane: number): Li
 }
 
 /** The way of an arrow; `lane` is the x of its lane, null where the way down is free. */
-export function lineOf({ sourceX, sourceY, targetX, targetY }: Ends, lane: number | null): Line {
+export function arrowPathOf(
+  { sourceX, sourceY, targetX, targetY }: ArrowEnds,
+  lane: number | null,
+): ArrowPath {
   const from = sourceY + 1;
   const to = targetY - 2;
   if (to < from + 8) {

@@ -1,13 +1,13 @@
 /** Ways round: an arrow that would pass behind cards gets a lane beside them. Pure. */
 
-export interface Box {
+export interface Rectangle {
   readonly x: number;
   readonly y: number;
   readonly width: number;
   readonly height: number;
 }
 
-export interface Point {
+export interface LanePoint {
   readonly x: number;
   readonly y: number;
 }
@@ -17,12 +17,12 @@ const SAMPLES = 14;
 /** Above this many cards nobody can follow single arrows anyway, and looking takes too long. */
 export const MOST_CARDS = 160;
 
-function contains(box: Box, { x, y }: Point): boolean {
+function contains(box: Rectangle, { x, y }: LanePoint): boolean {
   return x > box.x - 6 && x < box.x + box.width + 6 && y > box.y - 4 && y < box.y + box.height + 4;
 }
 
 /** The points of the curve from an outcome down to an input. */
-function curve(from: Point, to: Point): Point[] {
+function curve(from: LanePoint, to: LanePoint): LanePoint[] {
   const bend = Math.max(24, (to.y - from.y) * 0.5);
   return Array.from({ length: SAMPLES }, (_, i) => {
     const t = (i + 1) / (SAMPLES + 1);
@@ -39,7 +39,7 @@ function curve(from: Point, to: Point): Point[] {
  * The x of the lane for an arrow that leads back up: through the gap when the cards stand side by
  * side, else round the left of everything on the way.
  */
-export function laneBack(from: Box, to: Box, others: readonly Box[]): number {
+export function laneBack(from: Rectangle, to: Rectangle, others: readonly Rectangle[]): number {
   if (from.x + from.width < to.x) return (from.x + from.width + to.x) / 2;
   if (to.x + to.width < from.x) return (to.x + to.width + from.x) / 2;
   const between = others.filter(
@@ -53,7 +53,11 @@ export function laneBack(from: Box, to: Box, others: readonly Box[]): number {
 }
 
 /** The x of the lane for an arrow from `from` down to `to`; null when its way is free. */
-export function laneFor(from: Point, to: Point, others: readonly Box[]): number | null {
+export function laneFor(
+  from: LanePoint,
+  to: LanePoint,
+  others: readonly Rectangle[],
+): number | null {
   if (to.y < from.y + 8) return null;
   const points = curve(from, to);
   const hit = others.filter((box) => points.some((point) => contains(box, point)));

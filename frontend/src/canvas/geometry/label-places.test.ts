@@ -1,7 +1,14 @@
 import { expect, test } from "vitest";
-import { alongCurve, alongLane, boxAt, placeLabels, sizeOf, type Wish } from "./label-places";
+import {
+  alongCurve,
+  alongLane,
+  boxAt,
+  type LabelRequest,
+  placeLabels,
+  sizeOf,
+} from "./label-places";
 
-const wish = (id: string, from: number, to: number): Wish => ({
+const wish = (id: string, from: number, to: number): LabelRequest => ({
   id,
   width: 120,
   height: 19,
@@ -34,7 +41,7 @@ test("a label keeps off a card that stands beside its way", () => {
 });
 
 test("a label on a lane hangs beside it and has the whole lane to choose from", () => {
-  const one: Wish = { ...wish("a", 0, 0), anchor: "left", points: alongLane(300, 0, 400) };
+  const one: LabelRequest = { ...wish("a", 0, 0), anchor: "left", points: alongLane(300, 0, 400) };
   const point = placeLabels([one], []).get("a");
   expect(point).toEqual({ x: 300, y: 200 });
   expect(point && boxAt(point, one).x).toBe(290);

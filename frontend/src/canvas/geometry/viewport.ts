@@ -1,8 +1,8 @@
 /** Where to look: views of the canvas that keep text readable. Pure. */
-import type { Places, Sizes } from "./arrange";
+import type { Positions, Sizes } from "./arrange";
 import { CARD } from "./arrange";
 
-export interface Box {
+export interface Bounds {
   readonly x: number;
   readonly y: number;
   readonly width: number;
@@ -10,13 +10,13 @@ export interface Box {
 }
 
 /** The canvas' offset in px, and its zoom. */
-export interface Looking {
+export interface Viewport {
   readonly x: number;
   readonly y: number;
   readonly zoom: number;
 }
 
-interface Room {
+interface FrameSize {
   readonly width: number;
   readonly height: number;
 }
@@ -28,7 +28,7 @@ export const READABLE = { desktop: 0.75, phone: 0.6 } as const;
 const LEAST = 0.08;
 
 /** The box round everything that stands somewhere; null while nothing does. */
-export function boundsOf(places: Places, sizes: Sizes): Box | null {
+export function boundsOf(places: Positions, sizes: Sizes): Bounds | null {
   let box: [number, number, number, number] | null = null;
   for (const [key, [x, y]] of places) {
     const { width, height } = sizes.get(key) ?? CARD;
@@ -43,14 +43,14 @@ export function boundsOf(places: Places, sizes: Sizes): Box | null {
   return box && { x: box[0], y: box[1], width: box[2] - box[0], height: box[3] - box[1] };
 }
 
-function zoomFor(box: Box, room: Room): number {
+function zoomFor(box: Bounds, room: FrameSize): number {
   const across = (room.width - 2 * MARGIN.side) / Math.max(1, box.width);
   const down = (room.height - MARGIN.top - MARGIN.bottom) / Math.max(1, box.height);
   return Math.max(LEAST, Math.min(1, across, down));
 }
 
 /** All of it, however small that is. */
-export function whole(box: Box, room: Room): Looking {
+export function wholeViewport(box: Bounds, room: FrameSize): Viewport {
   const zoom = zoomFor(box, room);
   const free = room.height - MARGIN.top - MARGIN.bottom;
   return {
@@ -64,8 +64,13 @@ export function whole(box: Box, room: Room): Looking {
  * All of it where it can be read so, else its top at the smallest readable zoom. What is too wide
  * is centred on `top`, the entry, as far as its edges allow.
  */
-export function readable(box: Box, room: Room, top: number, least: number): Looking {
-  if (zoomFor(box, room) >= least) return whole(box, room);
+export function readableViewport(
+  box: Bounds,
+  room: FrameSize,
+  top: number,
+  least: number,
+): Viewport {
+  if (zoomFor(box, room) >= least) return wholeViewport(box, room);
   const free = room.width - 2 * MARGIN.side;
   const [left, right] = [
     MARGIN.side - box.x * least,
@@ -83,7 +88,7 @@ export function readable(box: Box, room: Room, top: number, least: number): Look
 const AIR = { x: 40, y: 56 } as const; // px kept round what is brought into view
 
 /** The nearest view, at the same zoom, that shows a box; null when it is in view already. */
-export function bring(box: Box, room: Room, now: Looking): Looking | null {
+export function viewportShowing(box: Bounds, room: FrameSize, now: Viewport): Viewport | null {
   const dx = shift(box.x * now.zoom + now.x, box.width * now.zoom, room.width, AIR.x);
   const low = room.height - MARGIN.bottom;
   const dy = shift(box.y * now.zoom + now.y, box.height * now.zoom, low, AIR.y);
@@ -99,13 +104,13 @@ function shift(from: number, size: number, length: number, air: number): number 
 }
 
 /** Whether a box can be shown whole at a zoom. */
-export function fits(box: Box, room: Room, zoom: number): boolean {
+export function fitsAt(box: Bounds, room: FrameSize, zoom: number): boolean {
   const high = room.height - MARGIN.top - MARGIN.bottom;
   return box.width * zoom <= room.width && box.height * zoom <= high;
 }
 
 /** The same view, but for what nobody can see. */
-export function alike(a: Looking, b: Looking): boolean {
+export function isSameViewport(a: Viewport, b: Viewport): boolean {
   const near = (x: number, y: number) => Math.abs(x - y) < 2;
   return near(a.x, b.x) && near(a.y, b.y) && Math.abs(a.zoom - b.zoom) < 0.005;
 }

@@ -13,11 +13,11 @@ import {
   useStoreApi,
 } from "@xyflow/react";
 import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
-import { actionCarrier } from "../../canvas/action-drag";
+import { actionDrag } from "../../canvas/action-drag";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { CARD } from "../../canvas/geometry/arrange";
 import { edgeTypes, nodeTypes } from "../../canvas/graph-view";
-import { type NoteDesk, NoteDeskContext } from "../../canvas/note-card";
+import { type NoteEditing, NoteEditingContext } from "../../canvas/note-card";
 import { noteColor } from "../../canvas/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { ArrowTips } from "../../canvas/outcome-arrow";
@@ -26,15 +26,15 @@ import { asOneEdit, insertInto, removeNotes } from "../../graph/edit";
 import { changeNote } from "../../graph/edit/notes";
 import type { Position } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
-import { AtCards, Cursors } from "../../people/people";
+import { Cursors, PeopleAtCards } from "../../people/people";
 import { useRoom } from "../../sync/use-room";
-import { robotColor } from "../../ui/name-colors";
-import { useSteady } from "../../ui/use-stable-callback";
+import { colorOfName } from "../../ui/name-colors";
+import { useStableCallback } from "../../ui/use-stable-callback";
 import style from "./editable-canvas.module.css";
 import { arrowAt } from "./hit-test";
-import type { useCanvas } from "./use-canvas-elements";
+import type { useCanvasElements } from "./use-canvas-elements";
 import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
-import { usePress } from "./use-context-menu";
+import { useContextMenu } from "./use-context-menu";
 import { usePinch, ZOOM } from "./use-pinch";
 
 // What React Flow gets anew, it hands on to all that is drawn.
@@ -46,7 +46,7 @@ const MAP_SIZE = { width: 132, height: 92 };
 
 interface Props {
   context: EditorContext;
-  canvas: ReturnType<typeof useCanvas>;
+  canvas: ReturnType<typeof useCanvasElements>;
   me: string;
   /** There is room for a map. */
   map: boolean;
@@ -90,22 +90,22 @@ function mapColor(node: CanvasNode): string {
     return `color-mix(in srgb, ${noteColor[node.data.note.color]} ${part}%, transparent)`;
   }
   const robot = node.type === "action" ? node.data.action.actor : "";
-  return robot === "" ? "var(--line2)" : robotColor(robot);
+  return robot === "" ? "var(--line2)" : colorOfName(robot);
 }
 
 /** How notes are changed from the canvas itself. */
 function useNoteDesk(
   context: EditorContext,
   writing: string | null,
-  setResized: NoteDesk["resizing"],
+  setResized: NoteEditing["resizing"],
 ) {
   const [only, ...others] = context.selection;
   const alone = only !== undefined && others.length === 0 ? only : null;
   const { doc, openOverlay: open, select, mayEdit } = context;
-  const change = useSteady<Parameters<NoteDesk["change"]>, void>((key, change) => {
+  const change = useStableCallback<Parameters<NoteEditing["change"]>, void>((key, change) => {
     changeNote(doc, key, change);
   });
-  return useMemo<NoteDesk | null>(() => {
+  return useMemo<NoteEditing | null>(() => {
     if (!mayEdit) return null;
     return {
       editing: writing,
@@ -127,41 +127,41 @@ function useHands(
   connecting: ReturnType<typeof useConnecting>,
 ) {
   return {
-    onNodeDrag: useSteady(canvas.onDrag),
-    onNodeDragStop: useSteady(canvas.onDragStop),
-    onSelectionDrag: useSteady((event: MouseEvent, nodes: CanvasNode[]) => {
+    onNodeDrag: useStableCallback(canvas.onDrag),
+    onNodeDragStop: useStableCallback(canvas.onDragStop),
+    onSelectionDrag: useStableCallback((event: MouseEvent, nodes: CanvasNode[]) => {
       if (nodes[0]) canvas.onDrag(event, nodes[0], nodes);
     }),
-    onSelectionDragStop: useSteady((event: MouseEvent, nodes: CanvasNode[]) => {
+    onSelectionDragStop: useStableCallback((event: MouseEvent, nodes: CanvasNode[]) => {
       if (nodes[0]) canvas.onDragStop(event, nodes[0], nodes);
     }),
-    onConnect: useSteady(({ source, target, sourceHandle }: Connection) =>
+    onConnect: useStableCallback(({ source, target, sourceHandle }: Connection) =>
       connecting.draw(source, target, outcomeOf(sourceHandle)),
     ),
-    onConnectEnd: useSteady(connecting.onConnectEnd),
-    onReconnect: useSteady(connecting.onReconnect),
-    onReconnectStart: useSteady(connecting.onReconnectStart),
-    onReconnectEnd: useSteady(connecting.onReconnectEnd),
-    onEdgeClick: useSteady((event: MouseEvent, edge: Arrow) => {
+    onConnectEnd: useStableCallback(connecting.onConnectEnd),
+    onReconnect: useStableCallback(connecting.onReconnect),
+    onReconnectStart: useStableCallback(connecting.onReconnectStart),
+    onReconnectEnd: useStableCallback(connecting.onReconnectEnd),
+    onEdgeClick: useStableCallback((event: MouseEvent, edge: Arrow) => {
       const id = edge.data?.relation;
       if (id) context.select(event.shiftKey ? [...context.selection, id] : [id]);
     }),
-    onNodeClick: useSteady((event: MouseEvent) => {
+    onNodeClick: useStableCallback((event: MouseEvent) => {
       if (connecting.onClick(event)) return;
       const onNote = (event.target as Element).closest(".react-flow__node-note") !== null;
       if (!onNote && context.tool === "pan") context.setPanel("details");
     }),
-    onPaneClick: useSteady((event: MouseEvent) => {
+    onPaneClick: useStableCallback((event: MouseEvent) => {
       if (!connecting.onClick(event)) context.select([]);
     }),
     // A move without an event is the page's own.
-    onMoveStart: useSteady((event: Event | null) => {
+    onMoveStart: useStableCallback((event: Event | null) => {
       if (event !== null) onPanned();
     }),
   };
 }
 
-export function Canvas({ context, canvas, me, map, onPanned, pointer, writing }: Props) {
+export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, writing }: Props) {
   const { presence } = useRoom();
   const { flow, setOver } = canvas;
   const frame = useRef<HTMLDivElement>(null);
@@ -171,7 +171,7 @@ export function Canvas({ context, canvas, me, map, onPanned, pointer, writing }:
 
   useEffect(
     () =>
-      actionCarrier.onDrop(({ load, x, y }) => {
+      actionDrag.onDrop(({ payload: load, x, y }) => {
         const box = frame.current?.getBoundingClientRect();
         if (!box || x < box.left || x > box.right || y < box.top || y > box.bottom) return;
         if (!context.mayEdit) return;
@@ -190,9 +190,9 @@ export function Canvas({ context, canvas, me, map, onPanned, pointer, writing }:
   // What is carried over an arrow goes into it.
   useEffect(
     () =>
-      actionCarrier.subscribe(() => {
-        const carried = actionCarrier.now();
-        setOver(carried ? arrowAt([carried.x, carried.y]) : null);
+      actionDrag.subscribe(() => {
+        const draggedItem = actionDrag.now();
+        setOver(draggedItem ? arrowAt([draggedItem.x, draggedItem.y]) : null);
       }),
     [setOver],
   );
@@ -203,7 +203,7 @@ export function Canvas({ context, canvas, me, map, onPanned, pointer, writing }:
   };
   const connecting = useConnecting(context, openAddAt);
   const hands = useHands({ context, canvas, onPanned }, connecting);
-  const press = usePress(context);
+  const press = useContextMenu(context);
   const pinch = usePinch(context, onPanned);
   const desk = useNoteDesk(context, writing, canvas.setResized);
   const onDoubleClick = (event: MouseEvent) => {
@@ -248,7 +248,7 @@ export function Canvas({ context, canvas, me, map, onPanned, pointer, writing }:
         presence.tell({ cursor: undefined });
       }}
     >
-      <NoteDeskContext value={desk}>
+      <NoteEditingContext value={desk}>
         <ReactFlow<CanvasNode, Arrow>
           nodes={canvas.nodes}
           edges={canvas.edges}
@@ -285,7 +285,7 @@ export function Canvas({ context, canvas, me, map, onPanned, pointer, writing }:
           <ArrowTips />
           <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
           <Cursors me={me} />
-          <AtCards me={me} places={canvas.places} sizes={canvas.sizes} />
+          <PeopleAtCards me={me} places={canvas.places} sizes={canvas.sizes} />
           {map && (
             <MiniMap<CanvasNode>
               position="top-right"
@@ -298,7 +298,7 @@ export function Canvas({ context, canvas, me, map, onPanned, pointer, writing }:
             />
           )}
         </ReactFlow>
-      </NoteDeskContext>
+      </NoteEditingContext>
       {connecting.pending && (
         <PendingHint
           context={context}

@@ -15,27 +15,27 @@ import {
   useState,
 } from "react";
 import {
-  type Around,
   type Arrow,
-  aroundOf,
   type CanvasNode,
+  type CardSurroundings,
   edgesOf,
-  keep,
+  keepEqual,
   nodesOf,
+  surroundingsOf,
 } from "../../canvas/elements";
-import { type Places, placesOf, unplaced } from "../../canvas/geometry/arrange";
+import { type Positions, positionsOf, unplaced } from "../../canvas/geometry/arrange";
 import { notePlaces } from "../../canvas/note-nodes";
-import type { Marks } from "../../canvas/problem-marks";
+import type { ProblemMarks } from "../../canvas/problem-marks";
 import { asOneEdit, insertInto, moveActions } from "../../graph/edit";
 import { type Note, notesOf, placeNotes, withContents } from "../../graph/edit/notes";
 import type { Graph, Key, Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 import type { Participant } from "../../sync/presence/presence";
 import { usePeople, useRoom } from "../../sync/use-room";
-import { colorsOf } from "../../ui/name-colors";
+import { distinctColors } from "../../ui/name-colors";
 import { arrowAt, pointOf } from "./hit-test";
 
-export interface Size {
+export interface MeasuredSize {
   readonly width: number;
   readonly height: number;
 }
@@ -44,27 +44,27 @@ export interface Size {
 interface Drawn {
   readonly nodes: CanvasNode[];
   readonly edges: Arrow[];
-  readonly around: Around | null;
+  readonly around: CardSurroundings | null;
 }
 
-interface Given {
+interface CanvasElementsInput {
   me: string;
   graph: Graph;
   selection: ReadonlySet<string>;
   select: (ids: Iterable<string>) => void;
   progress: ReadonlyMap<Key, Progress>;
-  marks: Marks;
+  marks: ProblemMarks;
 }
 
 /** Where everything stands while people drag it. */
 export function dragged(
-  places: Places,
+  places: Positions,
   people: readonly Participant[],
-  own: Places | null,
-): Places {
+  own: Positions | null,
+): Positions {
   const drags = people.flatMap((person) => person.presence.drag ?? []);
   if (drags.length === 0 && own === null) return places;
-  const moved: Places = new Map(places);
+  const moved: Positions = new Map(places);
   for (const { ids, dx, dy } of drags) {
     for (const id of ids) {
       const at = places.get(id);
@@ -95,17 +95,24 @@ export function selectionAfter(
   return same ? before : next;
 }
 
-export function useCanvas({ me, graph, selection, select, progress, marks }: Given) {
+export function useCanvasElements({
+  me,
+  graph,
+  selection,
+  select,
+  progress,
+  marks,
+}: CanvasElementsInput) {
   const { doc, presence } = useRoom();
   const people = usePeople();
   const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
   const store = useStoreApi();
-  const [sizes, setSizes] = useState<ReadonlyMap<Key, Size>>(new Map());
-  const [drag, setDrag] = useState<Places | null>(null);
+  const [sizes, setSizes] = useState<ReadonlyMap<Key, MeasuredSize>>(new Map());
+  const [drag, setDrag] = useState<Positions | null>(null);
   const [resized, setResized] = useState<Note | null>(null);
   const [over, setOver] = useState<string | null>(null);
   const rest = useMemo(
-    () => new Map([...placesOf(graph, sizes), ...notePlaces(graph)]),
+    () => new Map([...positionsOf(graph, sizes), ...notePlaces(graph)]),
     [graph, sizes],
   );
   const places = useMemo(() => dragged(rest, people, drag), [rest, people, drag]);
@@ -114,7 +121,7 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
 
   const drawn = useRef<Drawn>({ nodes: [], edges: [], around: null });
   const others = useMemo(() => {
-    const colors = colorsOf([me, ...people.map((person) => person.id)]);
+    const colors = distinctColors([me, ...people.map((person) => person.id)]);
     return new Map(
       people.flatMap((person) =>
         person.presence.selection.map((key) => [key, colors.get(person.id) ?? ""] as const),
@@ -132,12 +139,16 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
   );
   const nodes = useMemo(() => {
     const before = drawn.current.nodes;
-    return keep(before, nodesOf(graph, options, before));
+    return keepEqual(before, nodesOf(graph, options, before));
   }, [graph, options]);
-  const around = useMemo(() => aroundOf(graph, options, drawn.current.around), [graph, options]);
+  const around = useMemo(
+    () => surroundingsOf(graph, options, drawn.current.around),
+    [graph, options],
+  );
   const { relations } = graph;
   const edges = useMemo(
-    () => keep(drawn.current.edges, edgesOf({ relations }, { selected, progress, marks }, around)),
+    () =>
+      keepEqual(drawn.current.edges, edgesOf({ relations }, { selected, progress, marks }, around)),
     [relations, selected, progress, marks, around],
   );
   useEffect(() => {
@@ -167,7 +178,7 @@ export function useCanvas({ me, graph, selection, select, progress, marks }: Giv
       if (moves.length > 0) {
         const { graph, rest, sizes } = now.current;
         setDrag((before) => {
-          const next: Places = new Map(before);
+          const next: Positions = new Map(before);
           for (const move of moves) {
             if (move.type !== "position" || !move.position) continue;
             next.set(move.id, [round(move.position.x), round(move.position.y)]);

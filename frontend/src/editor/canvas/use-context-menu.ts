@@ -15,7 +15,7 @@ export function openMenuAt(context: EditorContext, screen: Position): void {
   context.openOverlay({ kind: "menu", screen });
 }
 
-export function usePress(context: EditorContext) {
+export function useContextMenu(context: EditorContext) {
   const now = useRef(context);
   now.current = context;
   const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);

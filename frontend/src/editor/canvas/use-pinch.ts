@@ -13,14 +13,14 @@ interface Pair {
   readonly apart: number;
 }
 
-interface Looking {
+interface PinchedView {
   readonly x: number;
   readonly y: number;
   readonly zoom: number;
 }
 
 /** The view that keeps under two fingers what was under them; `corner`: of the canvas on screen. */
-export function pinched(view: Looking, from: Pair, to: Pair, corner: Position): Looking {
+export function pinched(view: PinchedView, from: Pair, to: Pair, corner: Position): PinchedView {
   const wanted = (view.zoom * to.apart) / Math.max(1, from.apart);
   const zoom = Math.min(ZOOM.most, Math.max(ZOOM.least, wanted));
   const under = (i: 0 | 1, at: number) => (from.middle[i] - corner[i] - at) / view.zoom;
@@ -43,7 +43,7 @@ export function usePinch(context: EditorContext, onPanned: () => void) {
   now.current = { bench: context, onPanned };
   const fingers = useRef(new Map<number, Position>());
   const chosen = useRef<ReadonlySet<string>>(new Set());
-  const begun = useRef<{ pair: Pair; view: Looking; corner: Position } | null>(null);
+  const begun = useRef<{ pair: Pair; view: PinchedView; corner: Position } | null>(null);
   return useMemo(() => {
     const at = (event: PointerEvent): Position => [event.clientX, event.clientY];
     return {

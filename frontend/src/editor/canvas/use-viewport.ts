@@ -2,25 +2,25 @@
 import type { ReactFlowInstance } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
-import { CARD, type Places, type Sizes } from "../../canvas/geometry/arrange";
+import { CARD, type Positions, type Sizes } from "../../canvas/geometry/arrange";
 import {
-  alike,
   boundsOf,
-  bring,
-  fits,
-  type Looking,
+  fitsAt,
+  isSameViewport,
   READABLE,
-  readable,
-  whole,
+  readableViewport,
+  type Viewport,
+  viewportShowing,
+  wholeViewport,
 } from "../../canvas/geometry/viewport";
 import type { CanvasView } from "../../edit-actions/editor-context";
 import { ENTRY, type Key, type Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 
-interface Given {
+interface ViewportInput {
   flow: ReactFlowInstance<CanvasNode, Arrow>;
   frame: RefObject<HTMLDivElement | null>;
-  places: Places;
+  places: Positions;
   sizes: Sizes;
   phone: boolean;
   /** The graph has been heard of and has something to show. */
@@ -62,24 +62,24 @@ export function running(progress: ReadonlyMap<Key, Progress>): Key[] {
     .map(([key]) => key);
 }
 
-export function useView(given: Given) {
+export function useViewport(given: ViewportInput) {
   const { flow, frame, places, sizes, phone, begun, progress, run, pointer } = given;
   const now = useRef({ places, sizes });
   now.current = { places, sizes };
   const least = phone ? READABLE.phone : READABLE.desktop;
 
   // What was fitted stays fitted while the canvas changes its size, until somebody moves the view.
-  const fitted = useRef<Looking | null>(null);
+  const fitted = useRef<Viewport | null>(null);
   const showAll = useCallback(
     (duration: number) => {
       const [box, room] = [boundsOf(now.current.places, now.current.sizes), frame.current];
       if (box === null || room === null) return;
       const size = { width: room.clientWidth, height: room.clientHeight };
       const [x] = now.current.places.get(ENTRY) ?? [box.x + (box.width - CARD.width) / 2];
-      const first = readable(box, size, x + CARD.width / 2, least);
+      const first = readableViewport(box, size, x + CARD.width / 2, least);
       // Pressed once more, it shows the rest too.
-      const again = duration > 0 && alike(first, flow.getViewport());
-      const next = again ? whole(box, size) : first;
+      const again = duration > 0 && isSameViewport(first, flow.getViewport());
+      const next = again ? wholeViewport(box, size) : first;
       fitted.current = again ? null : next;
       void flow.setViewport(next, { duration: glide(duration) });
     },
@@ -101,7 +101,7 @@ export function useView(given: Given) {
     const room = frame.current;
     if (room === null) return;
     const watch = new ResizeObserver(() => {
-      if (fitted.current && alike(fitted.current, flow.getViewport())) showAll(0);
+      if (fitted.current && isSameViewport(fitted.current, flow.getViewport())) showAll(0);
     });
     watch.observe(room);
     return () => watch.disconnect();
@@ -109,7 +109,7 @@ export function useView(given: Given) {
 
   const show = useCallback(
     (keys: readonly Key[], goal: "near" | "middle" | "whole") => {
-      const some: Places = new Map();
+      const some: Positions = new Map();
       for (const key of keys) {
         const at = now.current.places.get(key);
         if (at) some.set(key, at);
@@ -117,16 +117,17 @@ export function useView(given: Given) {
       const [box, room] = [boundsOf(some, now.current.sizes), frame.current];
       if (box === null || room === null) return;
       const size = { width: room.clientWidth, height: room.clientHeight };
-      const here: Looking = flow.getViewport();
+      const here: Viewport = flow.getViewport();
       if (goal === "whole") {
-        void flow.setViewport(whole(box, size), { duration: glide(250) });
+        void flow.setViewport(wholeViewport(box, size), { duration: glide(250) });
         return;
       }
       const zoom = goal === "middle" ? Math.max(here.zoom, least) : here.zoom;
-      const next = fits(box, size, zoom)
-        ? (bring(box, size, { ...here, zoom }) ?? (zoom === here.zoom ? null : { ...here, zoom }))
+      const next = fitsAt(box, size, zoom)
+        ? (viewportShowing(box, size, { ...here, zoom }) ??
+          (zoom === here.zoom ? null : { ...here, zoom }))
         : goal === "middle"
-          ? whole(box, size)
+          ? wholeViewport(box, size)
           : null;
       if (next !== null) void flow.setViewport(next, { duration: glide(250) });
     },
@@ -143,7 +144,7 @@ export function useView(given: Given) {
         const room = frame.current;
         if (room === null) return;
         const size = { width: room.clientWidth, height: room.clientHeight };
-        const next = bring({ x, y, ...CARD }, size, flow.getViewport());
+        const next = viewportShowing({ x, y, ...CARD }, size, flow.getViewport());
         if (next !== null) void flow.setViewport(next, { duration: glide(200) });
       },
       middle: (): Position => {

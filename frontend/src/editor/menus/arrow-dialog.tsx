@@ -9,7 +9,7 @@ import { endsOf } from "../../graph/document-keys";
 import { asOneEdit, connect, moveRelation } from "../../graph/edit";
 import { ENTRY, EXIT, type Key, type Precondition } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
-import { robotColor } from "../../ui/name-colors";
+import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
 import style from "./arrow-dialog.module.css";
 
@@ -28,7 +28,7 @@ function ends(context: EditorContext, end: typeof ENTRY | typeof EXIT, near: Key
         id: key,
         label: `${name} ${instanceId}`,
         ...(actor === "" ? {} : { sub: actor }),
-        icon: <IconSquareRounded size={16} aria-hidden style={{ color: robotColor(actor) }} />,
+        icon: <IconSquareRounded size={16} aria-hidden style={{ color: colorOfName(actor) }} />,
       }),
     ),
     end === ENTRY

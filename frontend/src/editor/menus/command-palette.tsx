@@ -8,7 +8,7 @@ import { EDIT_ACTIONS } from "../../edit-actions/all";
 import { isEnabled, labelOf } from "../../edit-actions/edit-action";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { FirstShortcut } from "../../edit-actions/shortcut-keys";
-import { robotColor } from "../../ui/name-colors";
+import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
 
 const MOST = 60;
@@ -44,7 +44,7 @@ function actionOptions({ graph }: EditorContext): Option[] {
     sub: [actor, description].filter(Boolean).join(" · "),
     also: "go to action",
     group: "Actions of this graph",
-    icon: <IconSquareRounded size={16} aria-hidden style={{ color: robotColor(actor) }} />,
+    icon: <IconSquareRounded size={16} aria-hidden style={{ color: colorOfName(actor) }} />,
   }));
 }
 

@@ -26,12 +26,12 @@ import {
 } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { FirstShortcut } from "../../edit-actions/shortcut-keys";
-import { useSteady } from "../../ui/use-stable-callback";
+import { useStableCallback } from "../../ui/use-stable-callback";
 import style from "./toolbar.module.css";
 
 function Tool({ editAction, pressed }: { editAction: EditAction; pressed?: boolean }) {
   const context = useEditorContext();
-  const run = useSteady(() => editAction.run(context));
+  const run = useStableCallback(() => editAction.run(context));
   const parts = {
     label: labelOf(editAction, context),
     disabled: !isEnabled(editAction, context),

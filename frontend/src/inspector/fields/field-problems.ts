@@ -1,7 +1,7 @@
 /** Which field of a form a problem is about, so that it is marked there. */
 import { createContext } from "react";
 import type { Problem } from "../../api/graphs";
-import { bySeverity, placeOf } from "../../canvas/problem-marks";
+import { bySeverity, markedKeyOf } from "../../canvas/problem-marks";
 
 /** The problems of the open graph, for the fields of its forms. */
 export const ProblemsContext = createContext<readonly Problem[]>([]);
@@ -37,6 +37,6 @@ export function fieldOfProblem({ where }: Problem): string | null {
 /** What is wrong with one field of one thing, the errors first. */
 export function problemsAt(problems: readonly Problem[], of: string, field: string): Problem[] {
   return bySeverity(problems).filter(
-    (problem) => (placeOf(problem) ?? "graph") === of && fieldOfProblem(problem) === field,
+    (problem) => (markedKeyOf(problem) ?? "graph") === of && fieldOfProblem(problem) === field,
   );
 }

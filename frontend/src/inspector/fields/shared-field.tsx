@@ -1,9 +1,9 @@
 /** A field that several people may write in: who has the caret there, and what is wrong there. */
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { type FocusEvent, type ReactNode, use, useEffect, useRef } from "react";
-import { Initial, onePerId } from "../../people/people";
+import { onePerId, PersonSign } from "../../people/people";
 import { useEditors, usePeople, useRoom } from "../../sync/use-room";
-import { colorsOf } from "../../ui/name-colors";
+import { distinctColors } from "../../ui/name-colors";
 import { ProblemsContext, problemsAt } from "./field-problems";
 import style from "./shared-field.module.css";
 
@@ -64,11 +64,11 @@ function Writers({ id }: { id: string }) {
 }
 
 function Signs({ writers }: { writers: ReturnType<typeof useEditors> }) {
-  const colors = colorsOf(usePeople().map((person) => person.id));
+  const colors = distinctColors(usePeople().map((person) => person.id));
   return (
     <span className={style.signs}>
       {writers.map((writer) => (
-        <Initial key={writer.client} person={writer} color={colors.get(writer.id)} />
+        <PersonSign key={writer.client} person={writer} color={colors.get(writer.id)} />
       ))}
     </span>
   );

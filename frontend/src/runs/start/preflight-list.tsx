@@ -3,7 +3,7 @@ import { Loader } from "@mantine/core";
 import { IconAlertTriangle, IconCheck, IconX } from "@tabler/icons-react";
 import type { Item, Preflight } from "../../api/robots";
 import { SIMULATOR } from "../../api/robots";
-import { robotColor } from "../../ui/name-colors";
+import { colorOfName } from "../../ui/name-colors";
 import style from "./preflight-list.module.css";
 
 const WAITING: Readonly<Record<string, string>> = {
@@ -60,7 +60,7 @@ export function PreflightList({ engine, alone, look }: Props) {
     <div className={style.engine}>
       {!alone && (
         <h4 className={style.name}>
-          <i style={{ background: robotColor(engine) }} aria-hidden /> {engine}
+          <i style={{ background: colorOfName(engine) }} aria-hidden /> {engine}
         </h4>
       )}
       <ul className={style.list} aria-label={`Looked at on ${engine}`}>

@@ -11,7 +11,7 @@ import type { Run } from "../../api/runs";
 import { useMay } from "../../api/use-person";
 import { EngineWord } from "../../status/engine-label";
 import { HoldButton } from "../../ui/hold-button";
-import { robotColor } from "../../ui/name-colors";
+import { colorOfName } from "../../ui/name-colors";
 import { PreflightList } from "./preflight-list";
 import style from "./start-dialog.module.css";
 import { rememberEngines, useStart } from "./use-start";
@@ -69,7 +69,7 @@ function Choice(props: { robot: Robot; on: boolean; may: boolean; onToggle: () =
         disabled={off}
         onChange={onToggle}
       />
-      <i className={style.stripe} style={{ background: robotColor(robot.name) }} aria-hidden />
+      <i className={style.stripe} style={{ background: colorOfName(robot.name) }} aria-hidden />
       <span className={style.name}>{robot.simulated ? "Simulator" : robot.name}</span>
       {robot.simulated ? (
         <span className={style.quiet}>nothing moves</span>

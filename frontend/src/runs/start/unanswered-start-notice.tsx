@@ -7,7 +7,7 @@ import { useLive } from "../../api/live/use-live";
 import { SIMULATOR } from "../../api/robots";
 import { findStart, type Run, type StartFound } from "../../api/runs";
 import { runWord } from "../../status/progress";
-import { robotColor } from "../../ui/name-colors";
+import { colorOfName } from "../../ui/name-colors";
 import style from "./unanswered-start-notice.module.css";
 import { type SentStart, unsureStarts } from "./unanswered-starts";
 
@@ -39,7 +39,7 @@ export function unknownWords(
 function Found({ run }: { run: Run }) {
   return (
     <p className={style.found}>
-      <i style={{ background: robotColor(run.engine) }} aria-hidden />
+      <i style={{ background: colorOfName(run.engine) }} aria-hidden />
       <span>
         Started after all: <Link to={`/runs/${run.id}`}>run {run.number}</Link> on{" "}
         {run.simulated ? "the simulator" : run.engine}, {runWord(run).word}.
