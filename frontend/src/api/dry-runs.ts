@@ -49,25 +49,25 @@ export interface Command {
   readonly verb: "stop" | "pause" | "resume";
 }
 
-export interface Rehearsal {
+export interface DryRunResult {
   readonly seq: number;
   readonly trace: readonly TraceEvent[];
   /** There is more than is told. */
   readonly cut: boolean;
 }
 
-export interface Wanted {
+export interface DryRunRequest {
   readonly seq: number;
   readonly script: Script;
   readonly commands: readonly Command[];
 }
 
 /** Plays the moment `seq`; null while nobody wants to see it. The last answer stays until the next. */
-export function useRehearsal(graph: string, wanted: Wanted | null) {
+export function useDryRunResult(graph: string, wanted: DryRunRequest | null) {
   return useQuery({
     queryKey: ["rehearsal", graph, wanted],
     queryFn: ({ signal }) =>
-      ask<Rehearsal>(`/api/graphs/${encodeURIComponent(graph)}/rehearsal`, {
+      ask<DryRunResult>(`/api/graphs/${encodeURIComponent(graph)}/rehearsal`, {
         method: "POST",
         body: wanted,
         signal,

@@ -25,7 +25,7 @@ export interface Frame {
 }
 
 /** Something that happened around the actions: a wish, a message sent, a silence, a proof. */
-export interface FilmMark {
+export interface ReplayMark {
   seq: number;
   at: string;
   kind: string;
@@ -35,14 +35,14 @@ export interface FilmMark {
 }
 
 /** A page of a run's film: `base` after `after` events, then the frames of the next ones. */
-export interface Film {
+export interface Replay {
   run: string;
   after: number;
   newest: number;
   base: Run | null;
   frames: Frame[];
   chapters: { after: number; at: string }[];
-  marks: FilmMark[];
+  marks: ReplayMark[];
 }
 
 export interface RunMarks {
@@ -65,18 +65,18 @@ export interface Cause {
   quote: string;
 }
 
-export interface Field {
+export interface ComparedField {
   field: string;
   before: unknown;
   after: unknown;
 }
 
-export interface Change {
+export interface ComparedChange {
   change: "added" | "removed" | "changed";
-  fields: Field[];
+  fields: ComparedField[];
 }
 
-export interface Step {
+export interface ComparedStep {
   action: string;
   aid: string | null;
   visit: number;
@@ -92,13 +92,13 @@ export interface Comparison {
   same_graph: boolean;
   same_engine: boolean;
   graph: {
-    fields: Field[];
-    actions: (Change & { aid: string; name: string })[];
-    relations: (Change & { parent: string; child: string })[];
+    fields: ComparedField[];
+    actions: (ComparedChange & { aid: string; name: string })[];
+    relations: (ComparedChange & { parent: string; child: string })[];
   };
-  steps: Step[];
+  steps: ComparedStep[];
   left_out: number;
-  parting: { step: Step; text: string; messages_a: string[]; messages_b: string[] } | null;
+  parting: { step: ComparedStep; text: string; messages_a: string[]; messages_b: string[] } | null;
   text: string;
 }
 
@@ -151,7 +151,7 @@ export interface RunFilter {
   until: string;
 }
 
-export const EVERYTHING: RunFilter = {
+export const NO_FILTER: RunFilter = {
   text: "",
   graph: "",
   robot: "",
@@ -207,11 +207,16 @@ export function listRuns(
   return ask(`${runner}/api/runs?${query}`, signal ? { signal } : {});
 }
 
-export function useFilm(runner: string | undefined, run: string, after: number, asked: boolean) {
+export function useReplayData(
+  runner: string | undefined,
+  run: string,
+  after: number,
+  asked: boolean,
+) {
   return useQuery({
     queryKey: ["runs", "film", run, after],
     queryFn: ({ signal }) =>
-      ask<Film>(`${runner}${path(run)}/film?after=${after}`, { signal, patience: 60_000 }),
+      ask<Replay>(`${runner}${path(run)}/film?after=${after}`, { signal, patience: 60_000 }),
     enabled: asked && runner !== undefined,
   });
 }
@@ -221,18 +226,18 @@ export function useCauses(runner: string | undefined, run: Run) {
   return useQuery({
     queryKey: ["runs", "causes", run.id, run.state, run.alarms.length],
     queryFn: ({ signal }) => ask<Cause[]>(`${runner}${path(run.id)}/causes`, { signal }),
-    enabled: runner !== undefined && wentWrong(run),
+    enabled: runner !== undefined && needsExplanation(run),
   });
 }
 
 /** Whether there is something to explain. */
-export function wentWrong(run: Run): boolean {
+export function needsExplanation(run: Run): boolean {
   if (run.state === "finished") return run.result !== "on_true";
   return run.ended_at !== null || run.state === "unknown" || run.alarms.length > 0;
 }
 
 /** Takes in the recorded runs that the product brings along; their ids. */
-export function takeInExamples(runner: string): Promise<string[]> {
+export function importExamples(runner: string): Promise<string[]> {
   return ask(`${runner}/api/examples`, { method: "POST", body: {} });
 }
 
@@ -274,24 +279,24 @@ export function useStatistics(runner: string | undefined, graph: string) {
   });
 }
 
-export type Fault = "error" | "false" | "hang" | "init_error";
+export type InjectedFault = "error" | "false" | "hang" | "init_error";
 
 /** What a run did, as a script for the simulator; with `fault` one action fails at its last visit. */
-export function scriptOf(
+export function recordedScriptOf(
   runner: string,
   run: string,
-  fault?: { action: string; fault: Fault },
+  fault?: { action: string; fault: InjectedFault },
 ): Promise<{ behaviours: unknown; doubts: { action: string; text: string }[] }> {
   const query = fault ? `?${new URLSearchParams({ ...fault })}` : "";
   return ask(`${runner}${path(run)}/script${query}`);
 }
 
 /** The same for another version of the graph; `umrf` is JSON text. */
-export function fittedScriptOf(
+export function recordedScriptFor(
   runner: string,
   run: string,
   umrf: string,
-  fault?: { action: string; fault: Fault },
+  fault?: { action: string; fault: InjectedFault },
 ): Promise<{ behaviours: unknown; doubts: { action: string; text: string }[] }> {
   const head = JSON.stringify({ ...fault });
   const body = `${head.slice(0, -1)}${fault ? "," : ""}"umrf":${umrf}}`;
@@ -299,7 +304,7 @@ export function fittedScriptOf(
 }
 
 /** Runs that one request has started together with this one. */
-export function useMates(runner: string | undefined, run: Run) {
+export function useRunsOfSameStart(runner: string | undefined, run: Run) {
   const around = (ms: number) => new Date(Date.parse(run.requested_at) + ms).toISOString();
   return useQuery({
     queryKey: ["runs", "mates", run.id],

@@ -13,7 +13,7 @@ import { Sidebar } from "../library/sidebar";
 import { LiveWord } from "../runs/connection-status";
 import { DraftWord } from "../runs/draft-status";
 import { RunStrip } from "../runs/run-strip";
-import { RecordRehearsed } from "../runs/start/record-dry-run";
+import { RecordDryRun } from "../runs/start/record-dry-run";
 import { StartControl } from "../runs/start/start-control";
 import { progressByAid } from "../status/progress";
 import { roomUrl } from "../sync/room-connection";
@@ -118,7 +118,7 @@ function Inside({ id }: { id: string }) {
       }
       record={(shown, script, onStarted) =>
         mayStart && (
-          <RecordRehearsed
+          <RecordDryRun
             graph={id}
             seq={shown.seq}
             obstacle={shown.obstacle}

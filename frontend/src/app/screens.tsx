@@ -3,7 +3,7 @@ import { useLocation } from "wouter";
 import { useVersions } from "../api/graphs";
 import { Home } from "../library/home";
 import { ComparePage } from "../review/compare-page";
-import type { StartAgain } from "../review/run/run-menu";
+import type { RepeatActions } from "../review/run/run-menu";
 import { RunPage } from "../review/run/run-page";
 import { RunsPage } from "../review/runs-page";
 import { StatisticsPage } from "../review/statistics-page";
@@ -49,7 +49,7 @@ export function RunScreen({ id }: { id: string }) {
 }
 
 /** A run once more: looked at, held, recorded like every other start. */
-function Again({ engines, onClose, ...what }: StartAgain & { onClose: () => void }) {
+function Again({ engines, onClose, ...what }: RepeatActions & { onClose: () => void }) {
   const [, go] = useLocation();
   const versions = useVersions(what.graph).data ?? [];
   return (

@@ -4,7 +4,7 @@ import type { TraceEvent } from "../api/dry-runs";
 import { mapsOf } from "../graph/document-keys";
 import { addAction, connect, setEntry, setExit } from "../graph/edit";
 import { readGraph } from "../graph/read";
-import { momentsOf, sightingAt, wordsOf } from "./playback";
+import { momentsOf, momentWords, playbackStateAt } from "./playback";
 import { commandsOf, decide, NOTHING_DECIDED, scriptOf } from "./script";
 
 const doc = new Y.Doc();
@@ -47,15 +47,15 @@ test("a moment is all that happens at one time, and only where something can be 
 
 test("each moment shows what runs, how it ended, and says it in words", () => {
   const [first, second, third] = momentsOf(trace);
-  const seen = sightingAt(trace, second?.to ?? 0, graph);
-  expect(seen.going).toEqual([{ key: b, node: "Grip_0", call: 0, since: 1000 }]);
+  const seen = playbackStateAt(trace, second?.to ?? 0, graph);
+  expect(seen.running).toEqual([{ key: b, node: "Grip_0", call: 0, since: 1000 }]);
   expect(seen.progress.get(a)).toMatchObject({ tone: "true", word: "true", took: 1000 });
   expect(seen.progress.get(b)).toMatchObject({ tone: "run", word: "running", visits: 1 });
-  expect(second && wordsOf(trace, second, first?.to ?? 0)).toEqual([
+  expect(second && momentWords(trace, second, first?.to ?? 0)).toEqual([
     "Look_0 ends true",
     "Grip_0 runs",
   ]);
-  expect(third && wordsOf(trace, third, second?.to ?? 0)).toEqual([
+  expect(third && momentWords(trace, third, second?.to ?? 0)).toEqual([
     "Grip_0 ends with an error",
     "The graph halts: nothing runs and no exit was reached",
   ]);

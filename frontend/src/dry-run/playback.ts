@@ -5,29 +5,29 @@ import { fullName, type Graph, type Key } from "../graph/model";
 import type { Progress, Tone } from "../status/progress";
 
 /** All that happens at one time. */
-export interface Moment {
+export interface PlaybackMoment {
   readonly at: number; // ms since the start
   /** The events before `to` have happened. */
   readonly to: number;
 }
 
 /** An action that runs, in its visit number `call`, counted from 0. */
-export interface Going {
+export interface RunningAction {
   readonly key: Key;
   readonly node: string;
   readonly call: number;
   readonly since: number;
 }
 
-export interface Sighting {
+export interface PlaybackState {
   readonly progress: ReadonlyMap<Key, Progress>;
-  readonly going: readonly Going[];
+  readonly running: readonly RunningAction[];
   /** The graph's state, RUNNING say; empty before it has one. */
   readonly state: string;
 }
 
 /** Moments at which something can be seen to happen. */
-export function momentsOf(trace: readonly TraceEvent[]): Moment[] {
+export function momentsOf(trace: readonly TraceEvent[]): PlaybackMoment[] {
   const moments: { at: number; to: number; seen: boolean }[] = [];
   for (const [i, event] of trace.entries()) {
     const last = moments.at(-1);
@@ -40,7 +40,7 @@ export function momentsOf(trace: readonly TraceEvent[]): Moment[] {
   return moments.filter(({ seen }) => seen).map(({ at, to }) => ({ at, to }));
 }
 
-interface Visit {
+interface PlayedVisit {
   state: string;
   result: string | null;
   since: number;
@@ -61,7 +61,7 @@ const tones: Readonly<Record<string, Tone>> = {
   on_stopped: "stopped",
 };
 
-function progressOf(visit: Visit, over: boolean): Progress {
+function progressOf(visit: PlayedVisit, over: boolean): Progress {
   const { tone, word } = wordOf(visit, over);
   return {
     tone,
@@ -75,7 +75,7 @@ function progressOf(visit: Visit, over: boolean): Progress {
   };
 }
 
-function wordOf({ state, result }: Visit, over: boolean): { tone: Tone; word: string } {
+function wordOf({ state, result }: PlayedVisit, over: boolean): { tone: Tone; word: string } {
   switch (state) {
     case "RUNNING":
       return { tone: "run", word: over ? "still runs" : "running" };
@@ -97,13 +97,13 @@ function wordOf({ state, result }: Visit, over: boolean): { tone: Tone; word: st
 }
 
 /** What there is to see after the first `to` events. */
-export function sightingAt(
+export function playbackStateAt(
   trace: readonly TraceEvent[],
   to: number,
   graph: Graph,
   keys = keysByName(graph),
-): Sighting {
-  const visits = new Map<string, Visit>();
+): PlaybackState {
+  const visits = new Map<string, PlayedVisit>();
   let state = "";
   for (const event of trace.slice(0, to)) {
     if (event.graph !== graph.name) continue;
@@ -135,7 +135,7 @@ export function sightingAt(
   }
   const over = ENDED.has(state);
   const progress = new Map<Key, Progress>();
-  const going: Going[] = [];
+  const going: RunningAction[] = [];
   for (const [node, key] of keys) {
     const visit = visits.get(node) ?? { ...WAITING };
     progress.set(key, progressOf(visit, over));
@@ -143,17 +143,24 @@ export function sightingAt(
       going.push({ key, node, call: visit.visits - 1, since: visit.since });
     }
   }
-  return { progress, going, state };
+  return { progress, running: going, state };
 }
 
 const HELD = new Set(["PAUSED", "PAUSE_REQUESTED"]);
 const ENDED = new Set(["FINISHED", "HALTED", "STOPPED", "ERROR"]);
-const WAITING: Visit = { state: "", result: null, since: 0, took: null, visits: 0, message: null };
+const WAITING: PlayedVisit = {
+  state: "",
+  result: null,
+  since: 0,
+  took: null,
+  visits: 0,
+  message: null,
+};
 
 /** What happens at one moment, in short sentences; what matters most comes first. */
-export function wordsOf(
+export function momentWords(
   trace: readonly TraceEvent[],
-  moment: Moment,
+  moment: PlaybackMoment,
   before: number,
   nameOf: (node: string) => string = (node) => node,
 ): string[] {

@@ -1,9 +1,9 @@
 /** What a person has decided in a dry-run, as the script that the simulator plays. Pure. */
 import type { Behaviour, Command, Script } from "../api/dry-runs";
-import type { Going } from "./playback";
+import type { RunningAction } from "./playback";
 
-export type Choice = "on_true" | "on_false" | "on_error";
-export type FaultKind = "error" | "never" | "exception" | "deaf" | "stop";
+export type DecidedOutcome = "on_true" | "on_false" | "on_error";
+export type DecidedFaultKind = "error" | "never" | "exception" | "deaf" | "stop";
 
 /** How one visit of an action ends. */
 export interface Decision {
@@ -12,22 +12,22 @@ export interface Decision {
   /** When the visit began, and when it was decided; ms since the start. */
   readonly since: number;
   readonly at: number;
-  readonly outcome: Choice;
+  readonly outcome: DecidedOutcome;
 }
 
 /** What goes wrong: an action that does not do as it should, or somebody who presses Stop. */
-export type Fault =
-  | { readonly kind: Exclude<FaultKind, "stop">; readonly node: string }
+export type DecidedFault =
+  | { readonly kind: Exclude<DecidedFaultKind, "stop">; readonly node: string }
   | { readonly kind: "stop"; readonly at: number };
 
-export interface Decided {
+export interface Decisions {
   readonly decisions: readonly Decision[];
-  readonly fault: Fault | null;
+  readonly fault: DecidedFault | null;
 }
 
-export const NOTHING_DECIDED: Decided = { decisions: [], fault: null };
+export const NOTHING_DECIDED: Decisions = { decisions: [], fault: null };
 
-export const faultWords: Readonly<Record<FaultKind, string>> = {
+export const faultWords: Readonly<Record<DecidedFaultKind, string>> = {
   error: "Ends with an error",
   never: "Never ends",
   exception: "Cannot be loaded (exception)",
@@ -41,7 +41,12 @@ const SOON = 100; // ms from a decision to the end that it decides
  * Decides how a visit ends. What was decided at later times is forgotten: from here on the task
  * takes another way.
  */
-export function decide(before: Decided, going: Going, outcome: Choice, at: number): Decided {
+export function decide(
+  before: Decisions,
+  going: RunningAction,
+  outcome: DecidedOutcome,
+  at: number,
+): Decisions {
   const { node, call, since } = going;
   const earlier = before.decisions.filter(
     (other) => other.at <= at && !(other.node === node && other.call === call),
@@ -50,7 +55,7 @@ export function decide(before: Decided, going: Going, outcome: Choice, at: numbe
   return { decisions: [...earlier, { node, call, since, at, outcome }], fault };
 }
 
-const faulty: Readonly<Record<Exclude<FaultKind, "stop">, Behaviour>> = {
+const faulty: Readonly<Record<Exclude<DecidedFaultKind, "stop">, Behaviour>> = {
   error: { result: "on_error", message: "injected fault" },
   never: { never: true },
   exception: { init_error: true, message: "injected fault" },
@@ -58,7 +63,7 @@ const faulty: Readonly<Record<Exclude<FaultKind, "stop">, Behaviour>> = {
 };
 
 /** One behaviour for each call; the last repeats, so what nobody decided comes last. */
-export function scriptOf({ decisions, fault }: Decided): Script {
+export function scriptOf({ decisions, fault }: Decisions): Script {
   const calls = new Map<string, Behaviour[]>();
   const usual = (node: string): Behaviour =>
     fault !== null && fault.kind !== "stop" && fault.node === node ? faulty[fault.kind] : {};
@@ -78,6 +83,6 @@ export function scriptOf({ decisions, fault }: Decided): Script {
   };
 }
 
-export function commandsOf({ fault }: Decided): Command[] {
+export function commandsOf({ fault }: Decisions): Command[] {
   return fault?.kind === "stop" ? [{ at_ms: fault.at + 1, verb: "stop" }] : [];
 }

@@ -1,32 +1,38 @@
 /** The state of a dry-run: what is played, where in it one is, and what was decided. */
 import { useCallback, useEffect, useMemo, useState } from "react";
-import { useRehearsal } from "../api/dry-runs";
+import { useDryRunResult } from "../api/dry-runs";
 import type { Graph, Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import type { Progress } from "../status/progress";
-import { keysByName, momentsOf, type Sighting, sightingAt, wordsOf } from "./playback";
 import {
-  type Choice,
+  keysByName,
+  momentsOf,
+  momentWords,
+  type PlaybackState,
+  playbackStateAt,
+} from "./playback";
+import {
   commandsOf,
-  type Decided,
+  type DecidedFault,
+  type DecidedOutcome,
+  type Decisions,
   decide,
-  type Fault,
   NOTHING_DECIDED,
   scriptOf,
 } from "./script";
 
-export const SPEEDS = [0.5, 1, 4, 16] as const;
+export const DRY_RUN_SPEEDS = [0.5, 1, 4, 16] as const;
 
 export interface DryRun {
   readonly moments: readonly { readonly at: number }[];
   /** The moment that is shown. */
   readonly index: number;
-  readonly sighting: Sighting;
+  readonly sighting: PlaybackState;
   /** What happens at this moment. */
   readonly words: readonly string[];
   readonly playing: boolean;
   readonly speed: number;
-  readonly decided: Decided;
+  readonly decided: Decisions;
   /** Still being worked out. */
   readonly busy: boolean;
   readonly failed: Error | null;
@@ -35,14 +41,14 @@ export interface DryRun {
   play(on: boolean): void;
   setSpeed(speed: number): void;
   /** How the running action ends: the one given, else the first. */
-  choose(outcome: Choice, key?: Key): void;
-  inject(fault: Fault | null): void;
+  choose(outcome: DecidedOutcome, key?: Key): void;
+  inject(fault: DecidedFault | null): void;
   /** From the start, as if nothing had been decided. */
   restart(): void;
   close(): void;
 }
 
-const EMPTY: Sighting = { progress: new Map<Key, Progress>(), going: [], state: "" };
+const EMPTY: PlaybackState = { progress: new Map<Key, Progress>(), running: [], state: "" };
 
 /** Null while no dry-run is open. `seq` is the moment of the graph that the page shows. */
 export function useDryRun(id: string, graph: Graph, seq: number) {
@@ -56,7 +62,7 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
     () => (open ? { seq, script: scriptOf(decided), commands: commandsOf(decided) } : null),
     [open, seq, decided],
   );
-  const { data, isPlaceholderData, error } = useRehearsal(id, wanted);
+  const { data, isPlaceholderData, error } = useDryRunResult(id, wanted);
   const busy = data === undefined || isPlaceholderData;
   const trace = useMemo(() => data?.trace ?? [], [data]);
   const moments = useMemo(() => momentsOf(trace), [trace]);
@@ -72,7 +78,7 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
   const index = Math.max(0, found);
   const sighting = useMemo(() => {
     const moment = moments[index];
-    return moment ? sightingAt(trace, moment.to, graph, keysByName(graph)) : EMPTY;
+    return moment ? playbackStateAt(trace, moment.to, graph, keysByName(graph)) : EMPTY;
   }, [trace, moments, index, graph]);
   const words = useMemo(() => {
     const moment = moments[index];
@@ -81,7 +87,7 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
       const key = keys.get(node);
       return key === undefined ? node : endName(graph, key);
     };
-    return moment ? wordsOf(trace, moment, moments[index - 1]?.to ?? 0, nameOf) : [];
+    return moment ? momentWords(trace, moment, moments[index - 1]?.to ?? 0, nameOf) : [];
   }, [trace, moments, index, graph]);
 
   const go = useCallback(
@@ -91,8 +97,8 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
   usePlaying({ on: open && playing && !busy, moments, index, speed, go, play });
 
   const choose = useCallback(
-    (outcome: Choice, key?: Key) => {
-      const going = sighting.going.find((each) => each.key === key) ?? sighting.going[0];
+    (outcome: DecidedOutcome, key?: Key) => {
+      const going = sighting.running.find((each) => each.key === key) ?? sighting.running[0];
       const now = moments[index]?.at;
       if (!going || now === undefined) return;
       setDecided((before) => decide(before, going, outcome, now));
@@ -101,7 +107,7 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
     [sighting, moments, index],
   );
   const inject = useCallback(
-    (fault: Fault | null) => {
+    (fault: DecidedFault | null) => {
       setDecided((before) => ({ ...before, fault }));
       const now = moments[index]?.at;
       if (fault?.kind === "stop" && now !== undefined) setGoal(now);

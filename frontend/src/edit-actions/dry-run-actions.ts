@@ -9,7 +9,7 @@ import {
   IconPlayerTrackPrev,
   IconX,
 } from "@tabler/icons-react";
-import type { Choice } from "../dry-run/script";
+import type { DecidedOutcome } from "../dry-run/script";
 import type { EditAction } from "./edit-action";
 import type { EditorContext } from "./editor-context";
 
@@ -77,7 +77,7 @@ export const restart: EditAction = {
 };
 
 const choice = (
-  outcome: Choice,
+  outcome: DecidedOutcome,
   label: string,
   shortcut: string,
   icon: EditAction["icon"],
@@ -87,9 +87,9 @@ const choice = (
   label,
   shortcuts: [shortcut],
   icon,
-  enabled: (context) => (context.dryRun?.sighting.going.length ?? 0) > 0,
+  enabled: (context) => (context.dryRun?.sighting.running.length ?? 0) > 0,
   run: ({ dryRun: run, selection }) => {
-    const chosen = run?.sighting.going.find(({ key }) => selection.has(key));
+    const chosen = run?.sighting.running.find(({ key }) => selection.has(key));
     run?.choose(outcome, chosen?.key);
   },
 });

@@ -158,7 +158,7 @@ const NOTHING: ReadonlyMap<Key, Progress> = new Map();
 /** What begins to run in a dry-run comes into view. */
 function useDryRunInView(context: EditorContext): void {
   const { dryRun, positions: places, view } = context;
-  const keys = dryRun?.sighting.going.map(({ key }) => key).join(" ") ?? "";
+  const keys = dryRun?.sighting.running.map(({ key }) => key).join(" ") ?? "";
   // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
   useEffect(() => {
     const [first] = keys.split(" ");

@@ -12,9 +12,9 @@ import {
 import type { ReactNode } from "react";
 import { sentence } from "../api/http";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
-import type { Going } from "../dry-run/playback";
-import { type FaultKind, faultWords } from "../dry-run/script";
-import { type DryRun, SPEEDS } from "../dry-run/use-dry-run";
+import type { RunningAction } from "../dry-run/playback";
+import { type DecidedFaultKind, faultWords } from "../dry-run/script";
+import { DRY_RUN_SPEEDS, type DryRun } from "../dry-run/use-dry-run";
 import * as editActions from "../edit-actions/dry-run-actions";
 import type { EditAction } from "../edit-actions/edit-action";
 import { labelOf } from "../edit-actions/edit-action";
@@ -64,14 +64,16 @@ function time(ms: number): string {
 }
 
 /** The action whose end is to be chosen: the selected one if it runs. */
-export function asked(context: EditorContext, run: DryRun): Going | undefined {
-  return run.sighting.going.find(({ key }) => context.selection.has(key)) ?? run.sighting.going[0];
+export function asked(context: EditorContext, run: DryRun): RunningAction | undefined {
+  return (
+    run.sighting.running.find(({ key }) => context.selection.has(key)) ?? run.sighting.running[0]
+  );
 }
 
 function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
   const going = asked(context, run);
   if (!going) return null;
-  const others = run.sighting.going.length > 1;
+  const others = run.sighting.running.length > 1;
   return (
     // biome-ignore lint/a11y/useSemanticElements: a fieldset cannot be laid out as a row everywhere
     <div
@@ -84,7 +86,7 @@ function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
           size="xs"
           w={150}
           aria-label="Which running action"
-          data={run.sighting.going.map(({ key }) => ({
+          data={run.sighting.running.map(({ key }) => ({
             value: key,
             label: endName(context.graph, key),
           }))}
@@ -113,7 +115,12 @@ function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
   );
 }
 
-const OF_ACTIONS = ["error", "never", "exception", "deaf"] as const satisfies readonly FaultKind[];
+const OF_ACTIONS = [
+  "error",
+  "never",
+  "exception",
+  "deaf",
+] as const satisfies readonly DecidedFaultKind[];
 
 function Faults({ context, run }: { context: EditorContext; run: DryRun }) {
   const { fault } = run.decided;
@@ -172,7 +179,7 @@ function Said({ run }: { run: DryRun }) {
     <>
       {run.words.join(" · ") || "…"}
       {last && run.cut && <i> · It goes on; the dry-run is cut here.</i>}
-      {last && !run.cut && run.sighting.going.length > 0 && <i> · This never ends by itself.</i>}
+      {last && !run.cut && run.sighting.running.length > 0 && <i> · This never ends by itself.</i>}
     </>
   );
 }
@@ -227,7 +234,7 @@ export function DryRunBar({
           w={74}
           aria-label="Speed"
           className={style.speed ?? ""}
-          data={SPEEDS.map((speed) => ({ value: String(speed), label: `${speed}×` }))}
+          data={DRY_RUN_SPEEDS.map((speed) => ({ value: String(speed), label: `${speed}×` }))}
           value={String(run.speed)}
           onChange={(speed) => run.setSpeed(Number(speed ?? 1))}
         />

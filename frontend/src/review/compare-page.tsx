@@ -8,11 +8,11 @@ import { authorName } from "../api/graphs";
 import { sentence } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import {
+  type ComparedField,
+  type ComparedStep,
   type Comparison,
-  EVERYTHING,
-  type Field,
   listRuns,
-  type Step,
+  NO_FILTER,
   useComparison,
 } from "../api/review";
 import { getRun, type Run, type Visit } from "../api/runs";
@@ -22,7 +22,7 @@ import { StateWord } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, useNow } from "../ui/times";
 import style from "./compare-page.module.css";
-import type { BarParts } from "./run/run-page";
+import type { RunBarParts } from "./run/run-page";
 
 /** How it ended; that nobody knows how is something else than that nobody saw an end. */
 function outcome(visit: Visit): string {
@@ -50,7 +50,7 @@ function VisitCell({ visit, slower }: { visit: Visit | null; slower: boolean }) 
   );
 }
 
-const RELATIONS: Record<Step["relation"], string> = {
+const RELATIONS: Record<ComparedStep["relation"], string> = {
   same: "the same",
   result: "another result",
   only_a: "only in the first",
@@ -61,7 +61,8 @@ const RELATIONS: Record<Step["relation"], string> = {
 
 function Steps({ found }: { found: Comparison }) {
   const parting = found.parting?.step;
-  const is = (step: Step) => step.action === parting?.action && step.visit === parting.visit;
+  const is = (step: ComparedStep) =>
+    step.action === parting?.action && step.visit === parting.visit;
   return (
     <table className={style.steps}>
       <thead>
@@ -121,7 +122,7 @@ function fieldWords(field: string): string {
   return field.replaceAll("_", " ");
 }
 
-function Fields({ fields }: { fields: readonly Field[] }) {
+function Fields({ fields }: { fields: readonly ComparedField[] }) {
   return (
     <ul className={style.fields}>
       {fields.map((field) => (
@@ -242,7 +243,7 @@ function Choose({ runner, b }: { runner: string; b: string }) {
   const graph = second.data?.graph ?? second.data?.graph_name ?? "";
   const others = useQuery({
     queryKey: ["runs", "of", graph],
-    queryFn: ({ signal }) => listRuns(runner, { ...EVERYTHING, graph }, null, 200, signal),
+    queryFn: ({ signal }) => listRuns(runner, { ...NO_FILTER, graph }, null, 200, signal),
     enabled: graph !== "",
   });
   const choices = (others.data ?? [])
@@ -263,7 +264,7 @@ function Choose({ runner, b }: { runner: string; b: string }) {
   );
 }
 
-export function ComparePage({ bar }: { bar: (parts: BarParts) => ReactNode }) {
+export function ComparePage({ bar }: { bar: (parts: RunBarParts) => ReactNode }) {
   const query = new URLSearchParams(useSearch());
   const [a, b] = [query.get("a") ?? "", query.get("b") ?? ""];
   const { runner } = useLive();

@@ -92,7 +92,7 @@ function Fields({ filter, onChange }: Props) {
   );
 }
 
-export function MoreFilters(props: Props) {
+export function MoreRunFilters(props: Props) {
   const set = RARE.filter((name) => props.filter[name] !== "").length;
   return (
     <Popover position="bottom-end" width={260} withinPortal trapFocus>

@@ -3,8 +3,8 @@ import { ActionIcon, Button, Menu, SegmentedControl, Select, TextInput } from "@
 import { useDebouncedCallback, useLocalStorage } from "@mantine/hooks";
 import { IconFilter, IconPin, IconSearch, IconTrash } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
-import { EVERYTHING, filterOf, queryOf, type RunFilter, useLabels } from "../api/review";
-import { dateOf, MoreFilters } from "./more-filters";
+import { filterOf, NO_FILTER, queryOf, type RunFilter, useLabels } from "../api/review";
+import { dateOf, MoreRunFilters } from "./more-filters";
 import style from "./runs-page.module.css";
 
 type Ending = Pick<RunFilter, "state" | "failed">;
@@ -29,7 +29,7 @@ function endingOf(filter: Ending): string {
   return found?.value ?? "";
 }
 
-interface Saved {
+interface SavedFilter {
   name: string;
   query: string;
 }
@@ -60,7 +60,10 @@ export function filterWords(filter: RunFilter): string {
 }
 
 function SavedFilters({ filter, onChange }: Pick<Props, "filter" | "onChange">) {
-  const [saved, setSaved] = useLocalStorage<Saved[]>({ key: "aa.run-filters", defaultValue: [] });
+  const [saved, setSaved] = useLocalStorage<SavedFilter[]>({
+    key: "aa.run-filters",
+    defaultValue: [],
+  });
   const query = queryOf(filter).toString();
   const known = saved.some((each) => each.query === query);
   return (
@@ -91,7 +94,7 @@ function SavedFilters({ filter, onChange }: Pick<Props, "filter" | "onChange">) 
         >
           {query === "" ? "Filter first, then save" : `Save “${filterWords(filter)}”`}
         </Menu.Item>
-        <Menu.Item disabled={query === ""} onClick={() => onChange(EVERYTHING)}>
+        <Menu.Item disabled={query === ""} onClick={() => onChange(NO_FILTER)}>
           Show all runs
         </Menu.Item>
       </Menu.Dropdown>
@@ -99,7 +102,7 @@ function SavedFilters({ filter, onChange }: Pick<Props, "filter" | "onChange">) 
   );
 }
 
-export function Filters({ runner, filter, onChange, engines }: Props) {
+export function RunFilters({ runner, filter, onChange, engines }: Props) {
   const labels = useLabels(runner).data ?? [];
   const [text, setText] = useState(filter.text);
   useEffect(() => setText(filter.text), [filter.text]);
@@ -155,7 +158,7 @@ export function Filters({ runner, filter, onChange, engines }: Props) {
       >
         <IconPin size={16} aria-hidden />
       </ActionIcon>
-      <MoreFilters filter={filter} onChange={onChange} />
+      <MoreRunFilters filter={filter} onChange={onChange} />
       <SavedFilters filter={filter} onChange={onChange} />
     </div>
   );

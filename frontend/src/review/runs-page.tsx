@@ -17,11 +17,11 @@ import { sentence } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import {
   filterOf,
+  importExamples,
   type ListedRun,
   listRuns,
   queryOf,
   type RunFilter,
-  takeInExamples,
 } from "../api/review";
 import { hasEnded, placeOf, type Run } from "../api/runs";
 import { spanWords } from "../status/durations";
@@ -30,7 +30,7 @@ import { StateWord } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";
 import { useVersionLabel } from "./run/use-version-label";
-import { Filters } from "./run-filters";
+import { RunFilters } from "./run-filters";
 import style from "./runs-page.module.css";
 
 const PAGE = 100;
@@ -56,14 +56,14 @@ export function newcomers(
   return [...live.values()].filter((run) => run.number > newest && !known.has(run.id)).length;
 }
 
-interface RowProps {
+interface RunRowProps {
   run: ListedRun;
   now: number;
   chosen: boolean;
   onChoose: (chosen: boolean) => void;
 }
 
-function Row({ run, now, chosen, onChoose }: RowProps) {
+function Row({ run, now, chosen, onChoose }: RunRowProps) {
   const [, go] = useLocation();
   const label = useVersionLabel(run);
   const { tone, word } = runWord(run);
@@ -176,7 +176,7 @@ function Waiting() {
 /** Recorded runs that failed: how this page finds out why can be seen without a robot. */
 function BringExamples({ runner, onDone }: { runner: string | undefined; onDone: () => void }) {
   const bring = useMutation({
-    mutationFn: () => takeInExamples(runner ?? ""),
+    mutationFn: () => importExamples(runner ?? ""),
     onSuccess: onDone,
     onError: (error) =>
       notifications.show({ color: "red", title: "Not taken in", message: sentence(error) }),
@@ -223,7 +223,7 @@ export function RunsPage() {
       <div className={style.inner}>
         <div className={style.head}>
           <h2 className={style.title}>Runs</h2>
-          <Filters runner={runner} filter={filter} onChange={setFilter} engines={engines} />
+          <RunFilters runner={runner} filter={filter} onChange={setFilter} engines={engines} />
         </div>
         <div className={style.deeds} aria-live="polite">
           {waiting > 0 && (

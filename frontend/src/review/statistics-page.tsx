@@ -11,7 +11,7 @@ import { spanWords } from "../status/durations";
 import { runWord } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import type { BarParts } from "./run/run-page";
+import type { RunBarParts } from "./run/run-page";
 import style from "./statistics-page.module.css";
 
 const seconds = (took: Took | null) => spanWords(took) ?? "—";
@@ -205,7 +205,7 @@ function Found({ found }: { found: Statistics }) {
   );
 }
 
-export function StatisticsPage({ bar }: { bar: (parts: BarParts) => ReactNode }) {
+export function StatisticsPage({ bar }: { bar: (parts: RunBarParts) => ReactNode }) {
   const graph = new URLSearchParams(useSearch()).get("graph") ?? "";
   const { runner } = useLive();
   const found = useStatistics(runner, graph);

@@ -10,15 +10,15 @@ import {
 import { useEffect, useRef } from "react";
 import { duration } from "../../ui/times";
 import style from "./replay-controls.module.css";
-import { type Replay, SPEEDS } from "./use-replay";
+import { REPLAY_SPEEDS, type ReplayCursor } from "./use-replay";
 
 interface Props {
-  replay: Replay;
+  replay: ReplayCursor;
   goes: boolean;
 }
 
 /** Space plays, arrows step, Home and End go to the ends: wherever nobody is typing. */
-function usePlayerKeys(replay: Replay): void {
+function usePlayerKeys(replay: ReplayCursor): void {
   const now = useRef(replay);
   now.current = replay;
   useEffect(() => {
@@ -29,16 +29,16 @@ function usePlayerKeys(replay: Replay): void {
       const taken = event.target instanceof HTMLElement && event.target.closest(own) !== null;
       if (taken || event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
       const { seek, play, step, playing, start } = now.current;
-      const deed = new Map<string, () => void>([
+      const handler = new Map<string, () => void>([
         [" ", () => play(!playing)],
         ["ArrowRight", () => step(1)],
         ["ArrowLeft", () => step(-1)],
         ["Home", () => seek(start)],
         ["End", () => seek(null)],
       ]).get(event.key);
-      if (deed === undefined) return;
+      if (handler === undefined) return;
       event.preventDefault();
-      deed();
+      handler();
     };
     window.addEventListener("keydown", onKey);
     return () => window.removeEventListener("keydown", onKey);
@@ -103,7 +103,7 @@ export function PlayerControls({ replay, goes }: Props) {
         aria-label="Speed of the replay"
         value={String(speed)}
         onChange={(event) => replay.setSpeed(Number(event.currentTarget.value))}
-        data={SPEEDS.map((each) => ({ value: String(each), label: `${each}×` }))}
+        data={REPLAY_SPEEDS.map((each) => ({ value: String(each), label: `${each}×` }))}
       />
       <Button
         className={style.edge ?? ""}

@@ -1,5 +1,5 @@
 /** What of a film stands on the time axis, and what its marks say in words. */
-import type { Film, FilmMark } from "../../api/review";
+import type { Replay, ReplayMark } from "../../api/review";
 import type { Run } from "../../api/runs";
 import type { TimeGap, TimeSign } from "../../status/timeline";
 import { clock, instant } from "../../ui/times";
@@ -16,7 +16,7 @@ const SIGNS: Record<string, TimeSign["tone"]> = {
 };
 
 /** A mark in one sentence; empty for what needs none. */
-export function wordsOf(mark: Pick<FilmMark, "kind" | "by" | "text" | "since">): string {
+export function markText(mark: Pick<ReplayMark, "kind" | "by" | "text" | "since">): string {
   const by = mark.by || "somebody";
   const text = mark.text ? `: ${mark.text}` : "";
   switch (mark.kind) {
@@ -51,22 +51,22 @@ export function wordsOf(mark: Pick<FilmMark, "kind" | "by" | "text" | "since">):
   }
 }
 
-export function signsOf(film: Film | undefined): TimeSign[] {
-  return (film?.marks ?? []).flatMap((mark) => {
+export function timelineSignsOf(replay: Replay | undefined): TimeSign[] {
+  return (replay?.marks ?? []).flatMap((mark) => {
     const tone = SIGNS[mark.kind];
     const at = instant(mark.at);
-    return tone === undefined || at === null ? [] : [{ at, tone, text: wordsOf(mark) }];
+    return tone === undefined || at === null ? [] : [{ at, tone, text: markText(mark) }];
   });
 }
 
 /** Times in which the engine gave no answer. An end that nothing proves leaves the last one open. */
-export function gapsOf(film: Film | undefined, run: Run, until: number): TimeGap[] {
+export function silentTimesOf(replay: Replay | undefined, run: Run, until: number): TimeGap[] {
   const gaps: TimeGap[] = [];
   let since: { at: number; text: string } | null = null;
-  for (const mark of film?.marks ?? []) {
+  for (const mark of replay?.marks ?? []) {
     const at = instant(mark.at);
     if (mark.kind === "run.silent.v1") {
-      since ??= { at: instant(mark.since) ?? at ?? 0, text: wordsOf(mark) };
+      since ??= { at: instant(mark.since) ?? at ?? 0, text: markText(mark) };
     } else if (mark.kind === "run.answered.v1" && since !== null && at !== null) {
       gaps.push({ from: since.at, until: at, text: since.text });
       since = null;

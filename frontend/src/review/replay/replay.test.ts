@@ -1,8 +1,8 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import type { Film, Frame } from "../../api/review";
+import type { Frame, Replay } from "../../api/review";
 import type { Run, Visit } from "../../api/runs";
-import { blank, chapterAt, follow, framesBy, Player, shows } from "./replay";
+import { chapterAt, framesBy, ReplayPlayer, runAfter, runBefore, shows } from "./replay";
 
 const at = (ms: number) => new Date(1_000_000 + ms).toISOString();
 
@@ -69,7 +69,7 @@ const FRAMES: Frame[] = [
   },
 ];
 
-const film = (frames: Frame[]): Film => ({
+const replay = (frames: Frame[]): Replay => ({
   run: "r",
   after: 0,
   newest: frames.length,
@@ -82,7 +82,7 @@ const film = (frames: Frame[]): Film => ({
 const ms = (text: string) => Date.parse(text);
 
 test("what was learned later does not show earlier", () => {
-  const player = new Player(film(FRAMES), RUN);
+  const player = new ReplayPlayer(replay(FRAMES), RUN);
   const early = player.at(ms(at(3)));
   expect(early.state).toBe("running");
   expect(early.ended_at).toBeNull();
@@ -92,14 +92,14 @@ test("what was learned later does not show earlier", () => {
 });
 
 test("at its end the replay shows what is known now", () => {
-  const player = new Player(film(FRAMES), RUN);
+  const player = new ReplayPlayer(replay(FRAMES), RUN);
   const end = player.at(ms(at(99)));
   expect(end.state).toBe("finished");
   expect(end.actions?.Go_0).toEqual({ ...RUN.actions?.Go_0 });
 });
 
 test("a step goes from one visible change to the next and back", () => {
-  const player = new Player(film(FRAMES), RUN);
+  const player = new ReplayPlayer(replay(FRAMES), RUN);
   expect(player.next(ms(at(2)))).toBe(ms(at(9))); // not the stop message, which changes nothing
   expect(player.previous(ms(at(9)))).toBe(ms(at(2)));
   expect(player.next(ms(at(99)))).toBeNull();
@@ -123,9 +123,9 @@ test("asking for moments in any order tells the same as playing through", () => 
         kind: "run.observed.v1",
         actions: { Go_0: action },
       }));
-      const player = new Player(film(frames), RUN);
+      const player = new ReplayPlayer(replay(frames), RUN);
       for (const count of order) {
-        const wanted = frames.slice(0, count).reduce(follow, blank(RUN));
+        const wanted = frames.slice(0, count).reduce(runAfter, runBefore(RUN));
         expect(player.after(count)).toEqual(wanted);
       }
     }),
@@ -133,8 +133,8 @@ test("asking for moments in any order tells the same as playing through", () => 
 });
 
 test("visits that are not kept singly are counted", () => {
-  const base = blank(RUN);
-  const later = follow(base, {
+  const base = runBefore(RUN);
+  const later = runAfter(base, {
     seq: 9,
     at: at(9),
     kind: "run.observed.v1",

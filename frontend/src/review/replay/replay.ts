@@ -1,5 +1,5 @@
 /** A run at any moment of its film: what was known then, and nothing that was learned later. */
-import type { ActionFrame, Film, Frame } from "../../api/review";
+import type { ActionFrame, Frame, Replay } from "../../api/review";
 import type { ActionRun, Run } from "../../api/runs";
 import { instant } from "../../ui/times";
 
@@ -19,7 +19,7 @@ function changed(action: ActionRun, frame: ActionFrame): ActionRun {
 }
 
 /** The run after one more frame. */
-export function follow(run: Run, frame: Frame): Run {
+export function runAfter(run: Run, frame: Frame): Run {
   const next: Run = { ...run, ...frame.head };
   if (frame.alarms) next.alarms = [...run.alarms, ...frame.alarms];
   if (frame.actions) {
@@ -33,7 +33,7 @@ export function follow(run: Run, frame: Frame): Run {
 }
 
 /** Before its first event: everything that was sent, nothing that came of it. */
-export function blank(run: Run): Run {
+export function runBefore(run: Run): Run {
   const actions: Record<string, ActionRun> = {};
   for (const [name, action] of Object.entries(run.actions ?? {})) {
     if (action.aid !== null) actions[name] = { ...BLANK, aid: action.aid };
@@ -76,32 +76,32 @@ export function shows(frame: Frame): boolean {
 }
 
 /** A film that can be asked for any number of its frames, quickly in any order. */
-export class Player {
-  readonly film: Film;
+export class ReplayPlayer {
+  readonly replay: Replay;
   private readonly known: Run[];
 
-  constructor(film: Film, run: Run) {
-    this.film = film;
-    this.known = [film.base ? { ...run, ...film.base, umrf: run.umrf } : blank(run)];
+  constructor(replay: Replay, run: Run) {
+    this.replay = replay;
+    this.known = [replay.base ? { ...run, ...replay.base, umrf: run.umrf } : runBefore(run)];
   }
 
   /** The run after the first `count` frames of this page. */
   after(count: number): Run {
-    const wanted = Math.min(Math.max(0, count), this.film.frames.length);
+    const wanted = Math.min(Math.max(0, count), this.replay.frames.length);
     for (let i = this.known.length; i <= wanted; i += 1) {
       const before = this.known[i - 1] as Run;
-      this.known.push(follow(before, this.film.frames[i - 1] as Frame));
+      this.known.push(runAfter(before, this.replay.frames[i - 1] as Frame));
     }
     return this.known[wanted] as Run;
   }
 
   at(time: number): Run {
-    return this.after(framesBy(this.film.frames, time));
+    return this.after(framesBy(this.replay.frames, time));
   }
 
   /** When the next change that can be seen happens; null when none is in this page. */
   next(time: number): number | null {
-    const { frames } = this.film;
+    const { frames } = this.replay;
     for (let i = framesBy(frames, time); i < frames.length; i += 1) {
       const frame = frames[i] as Frame;
       if (shows(frame)) return instant(frame.at);
@@ -111,7 +111,7 @@ export class Player {
 
   /** When the last visible change before `time` happened; null when none is in this page. */
   previous(time: number): number | null {
-    const { frames } = this.film;
+    const { frames } = this.replay;
     for (let i = framesBy(frames, time - 1) - 1; i >= 0; i -= 1) {
       const frame = frames[i] as Frame;
       const at = instant(frame.at);
@@ -122,7 +122,7 @@ export class Player {
 }
 
 /** The page of a film in which `time` lies: how many events come before it. */
-export function chapterAt(chapters: Film["chapters"], time: number): number {
+export function chapterAt(chapters: Replay["chapters"], time: number): number {
   let after = 0;
   for (const chapter of chapters) {
     if ((instant(chapter.at) ?? 0) <= time) after = chapter.after;

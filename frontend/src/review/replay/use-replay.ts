@@ -1,14 +1,14 @@
 /** The cursor of a replay: where it stands, whether it plays, and the run as it was known there. */
 import { useQueryClient } from "@tanstack/react-query";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
-import { useFilm } from "../../api/review";
+import { useReplayData } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { instant } from "../../ui/times";
-import { chapterAt, Player } from "./replay";
+import { chapterAt, ReplayPlayer } from "./replay";
 
-export const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
+export const REPLAY_SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
 
-export interface Replay {
+export interface ReplayCursor {
   /** Milliseconds since 1970; null at the live edge, or at the end of what is over. */
   at: number | null;
   start: number;
@@ -20,7 +20,7 @@ export interface Replay {
   failed: unknown;
   /** The run as it was known at the cursor. */
   run: Run;
-  player: Player | null;
+  player: ReplayPlayer | null;
   seek: (at: number | null) => void;
   play: (playing: boolean) => void;
   setSpeed: (speed: number) => void;
@@ -35,14 +35,14 @@ export function useReplay(
   newest: Run,
   end: number,
   from: number | null,
-): Replay {
+): ReplayCursor {
   const start = instant(newest.requested_at) ?? instant(newest.started_at) ?? end;
   const [at, setAt] = useState(from);
   const [playing, setPlaying] = useState(false);
   const [speed, setSpeed] = useState(1);
   const [chapter, setChapter] = useState(0);
   const asked = at !== null || playing;
-  const film = useFilm(runner, newest.id, chapter, asked);
+  const replay = useReplayData(runner, newest.id, chapter, asked);
   const client = useQueryClient();
   const goes = newest.ended_at === null;
   useEffect(() => {
@@ -57,10 +57,10 @@ export function useReplay(
   const still = useRef(newest);
   if (still.current.id !== newest.id || newest.umrf !== still.current.umrf) still.current = newest;
   const player = useMemo(
-    () => (film.data ? new Player(film.data, still.current) : null),
-    [film.data],
+    () => (replay.data ? new ReplayPlayer(replay.data, still.current) : null),
+    [replay.data],
   );
-  const chapters = film.data?.chapters;
+  const chapters = replay.data?.chapters;
   useEffect(() => {
     if (at !== null && chapters) setChapter(chapterAt(chapters, at));
   }, [at, chapters]);
@@ -124,8 +124,8 @@ export function useReplay(
     end,
     playing,
     speed,
-    waiting: asked && film.isPending,
-    failed: asked ? film.error : null,
+    waiting: asked && replay.isPending,
+    failed: asked ? replay.error : null,
     run,
     player,
     seek,

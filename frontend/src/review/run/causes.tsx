@@ -1,6 +1,6 @@
 /** Why a run did not end well, at the top of its page: each cause with a way to where it shows. */
 import { IconAlertTriangle } from "@tabler/icons-react";
-import { type Cause, useCauses, wentWrong } from "../../api/review";
+import { type Cause, needsExplanation, useCauses } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { clock, instant } from "../../ui/times";
 import style from "./causes.module.css";
@@ -31,9 +31,9 @@ function Line({ cause, onShow }: { cause: Cause; onShow: Props["onShow"] }) {
 }
 
 /** Says so, too, when nothing is recorded that would explain it. */
-export function Causes({ runner, run, onShow }: Props) {
+export function FailureCauses({ runner, run, onShow }: Props) {
   const found = useCauses(runner, run).data;
-  if (!wentWrong(run) || found === undefined) return null;
+  if (!needsExplanation(run) || found === undefined) return null;
   const plain = run.ended_at === null || run.state === "stopped" || run.result === null;
   if (found.length === 0 && plain) return null;
   return (

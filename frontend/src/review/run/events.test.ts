@@ -1,7 +1,7 @@
 /** What a run tells is told in the order in which it can have happened. */
 import { expect, test } from "vitest";
 import type { Run } from "../../api/runs";
-import { happenings } from "./events";
+import { eventLines } from "./events";
 
 /** An action that the engine says to have begun and ended at these times. */
 function ran(from: string, until: string): Run {
@@ -51,7 +51,7 @@ function ran(from: string, until: string): Run {
 }
 
 test("nothing comes before the start, although the engine's clock stands behind", () => {
-  const told = happenings(ran("2026-11-20T09:00:00.990Z", "2026-11-20T09:00:02.000Z"), "v1");
+  const told = eventLines(ran("2026-11-20T09:00:00.990Z", "2026-11-20T09:00:02.000Z"), "v1");
   expect(told.map(({ name, text }) => [name, text])).toEqual([
     [null, "Ada started v1 in the simulator"],
     ["Look 0", "runs"],
@@ -66,9 +66,9 @@ test("an end that was seen between two moments is told between them", () => {
   const visit = look?.visits[0];
   if (visit === undefined) throw new Error("no visit");
   visit.not_after = "2026-11-20T09:00:02.900Z";
-  expect(happenings(run, "v1").map(({ text }) => text)).toContain("true (not before +1.0)");
+  expect(eventLines(run, "v1").map(({ text }) => text)).toContain("true (not before +1.0)");
   visit.not_after = null;
-  expect(happenings(run, "v1").map(({ text }) => text)).toContain(
+  expect(eventLines(run, "v1").map(({ text }) => text)).toContain(
     "true (not before +1.0); its code may go on",
   );
 });

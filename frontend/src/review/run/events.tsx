@@ -3,12 +3,12 @@
 import { TextInput } from "@mantine/core";
 import { useMemo, useState } from "react";
 import { authorName } from "../../api/graphs";
-import type { FilmMark } from "../../api/review";
+import type { ReplayMark } from "../../api/review";
 import { placeOf, type Run } from "../../api/runs";
 import { atMost, begun, ended, endWords, type Tone } from "../../status/progress";
 import { toneColor } from "../../status/state-label";
 import { clock, instant } from "../../ui/times";
-import { wordsOf } from "../replay/replay-marks";
+import { markText } from "../replay/replay-marks";
 import style from "./events.module.css";
 
 interface Happening {
@@ -41,10 +41,10 @@ const TOLD: ReadonlySet<string> = new Set([
 ]);
 
 /** Everything that the run tells, oldest first; nothing comes before its start. */
-export function happenings(
+export function eventLines(
   run: Run,
   version: string,
-  marks: readonly FilmMark[] = [],
+  marks: readonly ReplayMark[] = [],
 ): Happening[] {
   const all: Happening[] = [];
   const start = instant(run.started_at);
@@ -86,7 +86,7 @@ export function happenings(
   for (const mark of marks) {
     const at = instant(mark.at);
     if (at === null || !TOLD.has(mark.kind)) continue;
-    all.push({ at, tone: "stopped", name: null, aid: null, text: wordsOf(mark) });
+    all.push({ at, tone: "stopped", name: null, aid: null, text: markText(mark) });
   }
   for (const alarm of run.alarms) {
     const at = instant(alarm.at);
@@ -113,7 +113,7 @@ interface Props {
   version: string;
   selected: string | null;
   onPick: (aid: string | null) => void;
-  marks: readonly FilmMark[];
+  marks: readonly ReplayMark[];
   /** Where the replay stands, ms; null at the end. */
   at: number | null;
   onSeek: (at: number) => void;
@@ -158,11 +158,11 @@ function Line(
   );
 }
 
-export function Events(props: Props) {
+export function RunEvents(props: Props) {
   const { run, version, marks, selected } = props;
   const [search, setSearch] = useState("");
   const start = instant(run.started_at) ?? 0;
-  const all = useMemo(() => happenings(run, version, marks), [run, version, marks]);
+  const all = useMemo(() => eventLines(run, version, marks), [run, version, marks]);
   const wanted = search.trim().toLowerCase();
   const found = all.filter(
     (event) => wanted === "" || `${event.name ?? ""} ${event.text}`.toLowerCase().includes(wanted),

@@ -2,11 +2,11 @@
 import { Button, Modal, SegmentedControl, Select, Stack, Text } from "@mantine/core";
 import { useState } from "react";
 import { sentence } from "../../api/http";
-import type { Fault } from "../../api/review";
+import type { InjectedFault } from "../../api/review";
 import type { Run } from "../../api/runs";
-import { type Repeated, repeat, type Which } from "./repeat-run";
+import { type Repeated, type RepeatedVersion, repeatRun } from "./repeat-run";
 
-const FAULTS: { value: Fault; label: string }[] = [
+const FAULTS: { value: InjectedFault; label: string }[] = [
   { value: "error", label: "It ends in error" },
   { value: "false", label: "It ends false" },
   { value: "hang", label: "It never ends and ignores Stop" },
@@ -22,7 +22,7 @@ interface Props {
 
 export function FaultDialog({ runner, run, onDone, onClose }: Props) {
   const actions = Object.keys(run.actions ?? {});
-  const [which, setWhich] = useState<Which>("same");
+  const [which, setWhich] = useState<RepeatedVersion>("same");
   const [action, setAction] = useState<string | null>(actions[0] ?? null);
   const [fault, setFault] = useState<string | null>("error");
   const [refused, setRefused] = useState("");
@@ -30,7 +30,7 @@ export function FaultDialog({ runner, run, onDone, onClose }: Props) {
     const chosen = FAULTS.find((each) => each.value === fault);
     if (runner === undefined || action === null || chosen === undefined) return;
     try {
-      const done = await repeat(runner, run, which, { action, fault: chosen.value });
+      const done = await repeatRun(runner, run, which, { action, fault: chosen.value });
       onClose();
       onDone(done);
     } catch (error) {

@@ -1,7 +1,7 @@
 /** Values as executed stand beside those that were sent, and what nobody saw is not made up. */
 import { expect, test } from "vitest";
 import type { ActionRun, Visit } from "../../api/runs";
-import { executed } from "./parameter-changes";
+import { parametersOfVisits } from "./parameter-changes";
 
 function visit(inputs: Visit["inputs"]): Visit {
   const at = "2026-11-20T09:00:00Z";
@@ -21,7 +21,7 @@ function action(...visits: Visit[]): ActionRun {
 }
 
 test("neighbouring visits with the same values are one column", () => {
-  const found = executed(
+  const found = parametersOfVisits(
     { x: "1" },
     action(visit({ x: "1" }), visit({ x: "1" }), visit({ x: "2" })),
   );
@@ -30,13 +30,13 @@ test("neighbouring visits with the same values are one column", () => {
 });
 
 test("a value that nobody saw is not there, and is counted", () => {
-  const found = executed({ x: "1" }, action(visit(null), visit({ x: "1" })));
+  const found = parametersOfVisits({ x: "1" }, action(visit(null), visit({ x: "1" })));
   expect(found.visits).toEqual(["Visit 2"]);
   expect(found.unseen).toBe(1);
 });
 
 test("a parameter without a value in a visit is told apart from one that was not sent", () => {
-  const found = executed({ gone: "5" }, action(visit({ come: '"a"' })));
+  const found = parametersOfVisits({ gone: "5" }, action(visit({ come: '"a"' })));
   expect(found.rows).toEqual([
     { parameter: "come", sent: null, ran: ['"a"'] },
     { parameter: "gone", sent: "5", ran: [null] },

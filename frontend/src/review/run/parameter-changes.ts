@@ -1,7 +1,7 @@
 /** What the visits of an action ran with, against what was sent. Pure. */
 import type { ActionRun } from "../../api/runs";
 
-export interface Row {
+export interface ParameterRow {
   parameter: string;
   /** JSON text; null where it had no value. */
   sent: string | null;
@@ -9,29 +9,29 @@ export interface Row {
   ran: readonly (string | null)[];
 }
 
-export interface Executed {
-  rows: readonly Row[];
+export interface ParametersOfVisits {
+  rows: readonly ParameterRow[];
   /** The groups of visits in words: neighbours that ran with the same are one. */
   visits: readonly string[];
   /** Visits whose values nobody saw. */
   unseen: number;
 }
 
-type Values = Readonly<Record<string, string>>;
+type ReportedValues = Readonly<Record<string, string>>;
 
-interface Group {
+interface VisitGroup {
   first: number;
   last: number;
-  values: Values;
+  values: ReportedValues;
 }
 
-function alike(a: Values, b: Values): boolean {
+function alike(a: ReportedValues, b: ReportedValues): boolean {
   const names = Object.keys(a);
   return names.length === Object.keys(b).length && names.every((name) => a[name] === b[name]);
 }
 
-function groupsOf(action: ActionRun): Group[] {
-  const groups: Group[] = [];
+function groupsOf(action: ActionRun): VisitGroup[] {
+  const groups: VisitGroup[] = [];
   action.visits.forEach((visit, i) => {
     if (visit.inputs == null) return;
     const number = action.older + i + 1;
@@ -42,7 +42,7 @@ function groupsOf(action: ActionRun): Group[] {
   return groups;
 }
 
-function wordsOf(group: Group, only: boolean): string {
+function wordsOf(group: VisitGroup, only: boolean): string {
   if (only) return "Ran with";
   return group.first === group.last
     ? `Visit ${group.first}`
@@ -51,7 +51,7 @@ function wordsOf(group: Group, only: boolean): string {
 
 const MOST = 12; // groups of visits side by side; the newest
 
-export function executed(sent: Values, action: ActionRun): Executed {
+export function parametersOfVisits(sent: ReportedValues, action: ActionRun): ParametersOfVisits {
   const groups = groupsOf(action).slice(-MOST);
   const names = new Set([...Object.keys(sent), ...groups.flatMap((g) => Object.keys(g.values))]);
   const only = groups.length === 1 && action.older + action.visits.length === 1;

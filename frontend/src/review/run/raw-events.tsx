@@ -40,7 +40,7 @@ function Event({ line }: { line: string }) {
 
 const MOST = 300;
 
-export function Raw({ runner, run }: { runner: string | undefined; run: Run }) {
+export function RawEvents({ runner, run }: { runner: string | undefined; run: Run }) {
   const found = useRawEvents(runner, run, MOST);
   return (
     <div className={style.raw}>

@@ -1,15 +1,15 @@
 /** A run once more in the simulator: the graph that it ran or the newest one, doing what it did then. */
 import { graphMoment, publish, type Version } from "../../api/graphs";
 import { askText } from "../../api/http";
-import { type Fault, fittedScriptOf, scriptOf, umrfUrl } from "../../api/review";
+import { type InjectedFault, recordedScriptFor, recordedScriptOf, umrfUrl } from "../../api/review";
 import { type Run, startRun } from "../../api/runs";
 import { memberText } from "../../graph/json-members";
 
-export type Which = "same" | "newest";
+export type RepeatedVersion = "same" | "newest";
 
 export interface Injected {
   action: string;
-  fault: Fault;
+  fault: InjectedFault;
 }
 
 export interface Repeated {
@@ -18,14 +18,14 @@ export interface Repeated {
   doubts: readonly { action: string; text: string }[];
 }
 
-interface Sent {
+interface SentGraph {
   version: string;
   digest: string;
   umrf: string;
 }
 
 /** The graph as it is now, published as exactly that. */
-async function newestOf(graph: string): Promise<Sent> {
+async function newestOf(graph: string): Promise<SentGraph> {
   const { seq } = await graphMoment(graph);
   const text = await publish(graph, seq);
   const version = JSON.parse(text) as Version;
@@ -35,13 +35,13 @@ async function newestOf(graph: string): Promise<Sent> {
 }
 
 /** Starts it; whatever was not seen is chosen, and told. */
-export async function repeat(
+export async function repeatRun(
   runner: string,
   run: Run,
-  which: Which,
+  which: RepeatedVersion,
   fault?: Injected,
 ): Promise<Repeated> {
-  const sent: Sent =
+  const sent: SentGraph =
     which === "newest" && run.graph !== null
       ? await newestOf(run.graph)
       : {
@@ -51,8 +51,8 @@ export async function repeat(
         };
   const script =
     which === "newest"
-      ? await fittedScriptOf(runner, run.id, sent.umrf, fault)
-      : await scriptOf(runner, run.id, fault);
+      ? await recordedScriptFor(runner, run.id, sent.umrf, fault)
+      : await recordedScriptOf(runner, run.id, fault);
   const started = await startRun({
     runner,
     ...sent,

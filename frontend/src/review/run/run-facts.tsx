@@ -21,7 +21,7 @@ function restWords(rest: Rest, moment: (at: number | null) => string): string {
   return `${moment(instant(rest.at))} ${who}: “${rest.how}”`;
 }
 
-export function Facts({ runner, run, version, by }: Props) {
+export function RunFacts({ runner, run, version, by }: Props) {
   const raw = useRaw(runner, run).data;
   const now = useNow(60_000);
   const start = instant(run.started_at);

@@ -18,11 +18,11 @@ import { sentence } from "../../api/http";
 import { expectRun, exportUrl } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { FaultDialog } from "./fault-dialog";
-import { type Repeated, repeat, type Which } from "./repeat-run";
+import { type Repeated, type RepeatedVersion, repeatRun } from "./repeat-run";
 import style from "./run-page.module.css";
 
 /** A start like any other one, that begins with what a run had. */
-export interface StartAgain {
+export interface RepeatActions {
   graph: string;
   name: string;
   seq: number;
@@ -37,7 +37,7 @@ interface Props {
 interface MenuProps extends Props {
   /** Engines of the run, and of those that were started with it. */
   engines: readonly string[];
-  onStart: (again: StartAgain) => void;
+  onStart: (again: RepeatActions) => void;
 }
 
 function ExpectDialog({ runner, run, onClose }: Props & { onClose: () => void }) {
@@ -104,8 +104,8 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
       autoClose: 12_000,
     });
   };
-  const simulate = (which: Which) => {
-    if (runner !== undefined) repeat(runner, run, which).then(show, complain);
+  const simulate = (which: RepeatedVersion) => {
+    if (runner !== undefined) repeatRun(runner, run, which).then(show, complain);
   };
   const start = (seq: number) => onStart({ graph, name: run.graph_name, seq, engines });
   const startNewest = () => graphMoment(graph).then(({ seq }) => start(seq), complain);

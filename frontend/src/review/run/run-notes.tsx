@@ -29,7 +29,7 @@ function useEditedMarks(runner: string | undefined, run: string) {
   return { marks: marks.data, change };
 }
 
-export function Pin({ runner, run }: { runner: string | undefined; run: string }) {
+export function PinRun({ runner, run }: { runner: string | undefined; run: string }) {
   const { marks, change } = useEditedMarks(runner, run);
   const pinned = marks?.pinned ?? false;
   return (
@@ -44,7 +44,7 @@ export function Pin({ runner, run }: { runner: string | undefined; run: string }
   );
 }
 
-export function Notes({ runner, run }: { runner: string | undefined; run: string }) {
+export function RunNotes({ runner, run }: { runner: string | undefined; run: string }) {
   const { marks, change } = useEditedMarks(runner, run);
   const known = useLabels(runner).data ?? [];
   const [draft, setDraft] = useState<string | null>(null);

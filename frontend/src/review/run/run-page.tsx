@@ -7,7 +7,7 @@ import { Link, useSearch } from "wouter";
 import { authorName } from "../../api/graphs";
 import { sentence } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
-import { type FilmMark, useFilm, useMates } from "../../api/review";
+import { type ReplayMark, useReplayData, useRunsOfSameStart } from "../../api/review";
 import { type Run, useRun } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
 import { GraphView } from "../../canvas/graph-view";
@@ -19,31 +19,31 @@ import { Empty } from "../../ui/empty";
 import { clock, instant, useNow } from "../../ui/times";
 import type { Crumb } from "../../ui/top-bar";
 import { PlayerControls } from "../replay/replay-controls";
-import { gapsOf, signsOf } from "../replay/replay-marks";
-import { type Replay, useReplay } from "../replay/use-replay";
-import { Causes } from "./causes";
-import { Events } from "./events";
-import { Raw } from "./raw-events";
-import { Facts } from "./run-facts";
-import { RunMenu, type StartAgain } from "./run-menu";
-import { Notes, Pin } from "./run-notes";
+import { silentTimesOf, timelineSignsOf } from "../replay/replay-marks";
+import { type ReplayCursor, useReplay } from "../replay/use-replay";
+import { FailureCauses } from "./causes";
+import { RunEvents } from "./events";
+import { RawEvents } from "./raw-events";
+import { RunFacts } from "./run-facts";
+import { type RepeatActions, RunMenu } from "./run-menu";
+import { PinRun, RunNotes } from "./run-notes";
 import style from "./run-page.module.css";
-import { Parameters } from "./run-parameters";
+import { RunParameters } from "./run-parameters";
 import { useVersionLabel } from "./use-version-label";
 
-export interface BarParts {
+export interface RunBarParts {
   crumbs: readonly Crumb[];
   status?: ReactNode;
   actions?: ReactNode;
 }
 
-const NO_MARKS: readonly FilmMark[] = [];
+const NO_MARKS: readonly ReplayMark[] = [];
 
 interface Props {
   id: string;
-  bar: (parts: BarParts) => ReactNode;
+  bar: (parts: RunBarParts) => ReactNode;
   /** The dialog by which everything is started. */
-  start: (again: StartAgain, onClose: () => void) => ReactNode;
+  start: (again: RepeatActions, onClose: () => void) => ReactNode;
 }
 
 /** Progress as it was at a moment: what went on then had gone on for so long. */
@@ -68,7 +68,7 @@ function usePlace(run: Run) {
 }
 
 /** Keeps the address in step, so that it can be sent to somebody. */
-function useAddress(id: string, replay: Replay, selected: string | null): void {
+function useAddress(id: string, replay: ReplayCursor, selected: string | null): void {
   const { at, start, playing } = replay;
   useEffect(() => {
     const query = new URLSearchParams();
@@ -83,7 +83,7 @@ function useAddress(id: string, replay: Replay, selected: string | null): void {
 /** The runs that began together with this one, as they are known now. */
 function useTracks(runner: string | undefined, run: Run): readonly Track[] {
   const { now } = useLive();
-  const mates = useMates(runner, run).data;
+  const mates = useRunsOfSameStart(runner, run).data;
   return useMemo(
     () =>
       (mates ?? []).map((stored) => {
@@ -122,11 +122,11 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
         : [newest.engine, ...mates.map(({ run: mate }) => mate.engine)].sort(),
     [newest, mates],
   );
-  const [again, setAgain] = useState<StartAgain | null>(null);
+  const [again, setAgain] = useState<RepeatActions | null>(null);
   const picked = useMemo(() => new Set(selected === null ? [] : [selected]), [selected]);
-  const film = useFilm(runner, newest.id, 0, true).data;
-  const signs = useMemo(() => signsOf(film), [film]);
-  const gaps = useMemo(() => gapsOf(film, newest, until), [film, newest, until]);
+  const replayData = useReplayData(runner, newest.id, 0, true).data;
+  const signs = useMemo(() => timelineSignsOf(replayData), [replayData]);
+  const gaps = useMemo(() => silentTimesOf(replayData, newest, until), [replayData, newest, until]);
   const label = useVersionLabel(newest);
   const show = (at: number, aid: string | null) => {
     replay.seek(at);
@@ -159,7 +159,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
         ),
         actions: (
           <>
-            <Pin runner={runner} run={newest.id} />
+            <PinRun runner={runner} run={newest.id} />
             <RunMenu runner={runner} run={newest} engines={engines} onStart={setAgain} />
             {newest.graph !== null && (
               <Button component={Link} to={`/graphs/${newest.graph}`} className={style.back ?? ""}>
@@ -170,7 +170,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
         ),
       })}
       <main className={style.page}>
-        <Causes runner={runner} run={newest} onShow={show} />
+        <FailureCauses runner={runner} run={newest} onShow={show} />
         <section className={style.canvas} aria-label="Graph of the run">
           <ReactFlowProvider>
             <GraphView
@@ -212,25 +212,30 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
               <Tabs.Tab value="raw">Raw</Tabs.Tab>
             </Tabs.List>
             <Tabs.Panel value="events" className={style.panel ?? ""}>
-              <Events
+              <RunEvents
                 run={newest}
                 version={label}
                 selected={selected}
                 onPick={setSelected}
-                marks={film?.marks ?? NO_MARKS}
+                marks={replayData?.marks ?? NO_MARKS}
                 at={replay.at}
                 onSeek={replay.seek}
               />
             </Tabs.Panel>
             <Tabs.Panel value="parameters" className={style.panel ?? ""}>
-              <Parameters run={run} selected={selected} onPick={setSelected} />
+              <RunParameters run={run} selected={selected} onPick={setSelected} />
             </Tabs.Panel>
             <Tabs.Panel value="facts" className={style.panel ?? ""}>
-              <Notes runner={runner} run={newest.id} />
-              <Facts runner={runner} run={newest} version={label} by={authorName(newest.author)} />
+              <RunNotes runner={runner} run={newest.id} />
+              <RunFacts
+                runner={runner}
+                run={newest}
+                version={label}
+                by={authorName(newest.author)}
+              />
             </Tabs.Panel>
             <Tabs.Panel value="raw" className={style.panel ?? ""}>
-              <Raw runner={runner} run={newest} />
+              <RawEvents runner={runner} run={newest} />
             </Tabs.Panel>
           </Tabs>
         </aside>

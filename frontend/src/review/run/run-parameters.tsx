@@ -1,6 +1,6 @@
 /** Values as they were sent beside those that the engine reported, visit by visit. */
 import type { ActionRun, Run } from "../../api/runs";
-import { executed, type Row } from "./parameter-changes";
+import { type ParameterRow, parametersOfVisits } from "./parameter-changes";
 import style from "./run-parameters.module.css";
 
 interface Props {
@@ -23,7 +23,7 @@ function Value({ text, differs }: { text: string | null; differs: boolean }) {
   );
 }
 
-function Rows({ rows }: { rows: readonly Row[] }) {
+function Rows({ rows }: { rows: readonly ParameterRow[] }) {
   return (
     <tbody>
       {rows.map((row) => (
@@ -42,7 +42,7 @@ function Rows({ rows }: { rows: readonly Row[] }) {
 
 function Action(props: { name: string; action: ActionRun; run: Run; onPick: () => void }) {
   const { name, action, run, onPick } = props;
-  const found = executed(run.sent?.[name] ?? {}, action);
+  const found = parametersOfVisits(run.sent?.[name] ?? {}, action);
   return (
     <section className={style.action} aria-label={`Parameters of ${spaced(name)}`}>
       <h3>
@@ -77,7 +77,7 @@ function Action(props: { name: string; action: ActionRun; run: Run; onPick: () =
   );
 }
 
-export function Parameters({ run, selected, onPick }: Props) {
+export function RunParameters({ run, selected, onPick }: Props) {
   const all = Object.entries(run.actions ?? {});
   const chosen = all.filter(([, action]) => selected === null || action.aid === selected);
   const told = chosen.filter(

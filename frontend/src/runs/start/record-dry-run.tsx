@@ -17,7 +17,7 @@ interface Props {
   onStarted: () => void;
 }
 
-export function RecordRehearsed({ graph, seq, obstacle, script, onStarted }: Props) {
+export function RecordDryRun({ graph, seq, obstacle, script, onStarted }: Props) {
   const versions = useVersions(graph).data ?? [];
   const { now } = useLive();
   const start = useStart(graph);
