@@ -13,7 +13,7 @@ import {
 } from "@mantine/core";
 import { IconDeviceDesktop, IconLogout, IconMoon, IconShare, IconSun } from "@tabler/icons-react";
 import { useState } from "react";
-import { sentence } from "../api/http";
+import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
 import { usePerson } from "../api/use-person";
@@ -38,7 +38,7 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
       await rename(name.trim());
       setOpen(false);
     } catch (error) {
-      setProblem(sentence(error));
+      setProblem(errorText(error));
     }
   };
   const leave = async () => {
@@ -46,7 +46,7 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
       await signOut(runner);
       location.reload();
     } catch (error) {
-      setProblem(sentence(error));
+      setProblem(errorText(error));
     }
   };
   return (

@@ -1,8 +1,8 @@
 /** The page for somebody who comes by a link: says what it leads to, and asks for a name, once. */
 import { Button, Paper, Text, TextInput, Title } from "@mantine/core";
 import {
-  type Invited,
-  type Key,
+  type Credential,
+  type InvitationPreview,
   openSession,
   type Person,
   ROLE_WORDS,
@@ -10,16 +10,16 @@ import {
 } from "../api/session";
 import { Logo } from "../ui/top-bar";
 import style from "./sign-in.module.css";
-import { useEntry } from "./use-sign-in-field";
+import { useSignInField } from "./use-sign-in-field";
 
 interface Props {
-  link: Key;
-  invited: Invited;
+  link: Credential;
+  invited: InvitationPreview;
   onOpen: (person: Person) => void;
 }
 
 export function Invitation({ link, invited, onOpen }: Props) {
-  const entry = useEntry(async (name) => {
+  const entry = useSignInField(async (name) => {
     const person = await openSession(link, name);
     rememberName(person.name);
     return person;

@@ -1,14 +1,14 @@
 /** Asks for a name, once, where it covers nothing. */
 import { Button, CloseButton, TextInput } from "@mantine/core";
 import { useState } from "react";
-import { sentence } from "../api/http";
+import { errorText } from "../api/http";
 import { rememberedName } from "../api/session";
 import { usePerson } from "../api/use-person";
 import style from "./name-prompt.module.css";
 
 const SUGGESTION = "Operator";
 
-export function AskName() {
+export function NamePrompt() {
   const { person, rename } = usePerson();
   const [open, setOpen] = useState(() => rememberedName() === "" && person.name === "");
   const [name, setName] = useState(person.name || SUGGESTION);
@@ -19,7 +19,7 @@ export function AskName() {
       await rename(name.trim());
       setOpen(false);
     } catch (error) {
-      setProblem(sentence(error));
+      setProblem(errorText(error));
     }
   };
   return (

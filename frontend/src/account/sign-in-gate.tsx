@@ -8,18 +8,18 @@ import {
   useState,
   useSyncExternalStore,
 } from "react";
-import { Refusal, sentence } from "../api/http";
+import { errorText, Refusal } from "../api/http";
 import {
+  type Credential,
+  credentialIn,
   currentPerson,
-  type Invited,
-  type Key,
-  keyIn,
-  lookAt,
+  type InvitationPreview,
   openSession,
   type Person,
+  readInvitation,
   rememberedName,
-  rename,
-  takeKey,
+  renamePerson,
+  takeCredential,
 } from "../api/session";
 import { sessionEnd } from "../api/session-end";
 import { PersonContext } from "../api/use-person";
@@ -30,11 +30,11 @@ import { SignInBar } from "./sign-in-bar";
 type Gate =
   | { at: "knocking" }
   | { at: "outside"; why: string }
-  | { at: "invited"; key: Key; invited: Invited }
+  | { at: "invited"; key: Credential; invited: InvitationPreview }
   | { at: "inside"; person: Person; visit: number };
 
 async function knock(): Promise<Gate> {
-  const key = takeKey();
+  const key = takeCredential();
   try {
     if (key?.kind === "invitation") return await knockInvited(key);
     const person = key === null ? await currentPerson() : await openSession(key);
@@ -46,14 +46,14 @@ async function knock(): Promise<Gate> {
     const strange = refused && key?.kind === "token";
     return {
       at: "outside",
-      why: strange ? "The link is of another server, or of an older start." : sentence(error),
+      why: strange ? "The link is of another server, or of an older start." : errorText(error),
     };
   }
 }
 
 /** Who has given a name in this browser before goes straight in; else that is asked first. */
-async function knockInvited(key: Key): Promise<Gate> {
-  const invited = await lookAt(key.text);
+async function knockInvited(key: Credential): Promise<Gate> {
+  const invited = await readInvitation(key.text);
   const known = rememberedName() !== "" || (await currentPerson().catch(() => null))?.name;
   if (!known) return { at: "invited", key, invited };
   return { at: "inside", person: await openSession(key), visit: 0 };
@@ -79,7 +79,7 @@ function inside(gate: Gate, person: Person): Gate & { at: "inside" } {
 const stay = (gate: Gate, next: Gate): Gate =>
   gate.at === "inside" && next.at === "outside" ? gate : next;
 
-export function Gate({ children }: { children: ReactNode }) {
+export function SignInGate({ children }: { children: ReactNode }) {
   const [gate, setGate] = useState<Gate>({ at: "knocking" });
   useEffect(() => {
     let gone = false;
@@ -91,7 +91,7 @@ export function Gate({ children }: { children: ReactNode }) {
       });
     // A fresh link pasted into the same tab changes only the fragment.
     const onHash = () => {
-      if (keyIn(location.hash) !== null) enter();
+      if (credentialIn(location.hash) !== null) enter();
     };
     enter();
     window.addEventListener("hashchange", onHash);
@@ -101,7 +101,7 @@ export function Gate({ children }: { children: ReactNode }) {
     };
   }, []);
   const takeName = useCallback(async (name: string) => {
-    const person = await rename(name);
+    const person = await renamePerson(name);
     setGate((now) => ({ ...inside(now, { ...person, name }), visit: visitOf(now) }));
   }, []);
   const client = useQueryClient();

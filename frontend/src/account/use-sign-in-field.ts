@@ -1,11 +1,11 @@
 /** One field by which somebody comes in: what is typed, why it was refused, whether it is on its way. */
 import type { ChangeEvent, FormEvent } from "react";
 import { useState } from "react";
-import { sentence } from "../api/http";
+import { errorText } from "../api/http";
 import type { Person } from "../api/session";
 
 /** `enter` asks the server with what was typed; what it throws is shown at the field. */
-export function useEntry(
+export function useSignInField(
   enter: (typed: string) => Promise<Person>,
   onOpen: (person: Person) => void,
   why = "",
@@ -18,7 +18,7 @@ export function useEntry(
     try {
       onOpen(await enter(typed.trim()));
     } catch (error) {
-      setProblem(sentence(error));
+      setProblem(errorText(error));
       setBusy(false);
     }
   };

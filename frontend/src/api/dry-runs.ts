@@ -1,6 +1,6 @@
 /** Rehearsals: what a graph would do by the engine's rules. Nothing is recorded. */
 import { keepPreviousData, useQuery } from "@tanstack/react-query";
-import { ask } from "./http";
+import { fetchJson } from "./http";
 
 interface At {
   readonly t_ms: number;
@@ -67,7 +67,7 @@ export function useDryRunResult(graph: string, wanted: DryRunRequest | null) {
   return useQuery({
     queryKey: ["rehearsal", graph, wanted],
     queryFn: ({ signal }) =>
-      ask<DryRunResult>(`/api/graphs/${encodeURIComponent(graph)}/rehearsal`, {
+      fetchJson<DryRunResult>(`/api/graphs/${encodeURIComponent(graph)}/rehearsal`, {
         method: "POST",
         body: wanted,
         signal,

@@ -7,14 +7,14 @@ function written(): string {
 }
 
 /** "" or as "/temoto". */
-export const base: string = written();
+export const basePath: string = written();
 
 /** The address on the page's own server of what lies at a path below its root, as "/api/graphs". */
-export function here(path: string): string {
-  return base + path;
+export function serverPath(path: string): string {
+  return basePath + path;
 }
 
 /** Of the page, without a slash at its end: what links to it begin with. */
 export function pageUrl(): string {
-  return globalThis.location.origin + base;
+  return globalThis.location.origin + basePath;
 }

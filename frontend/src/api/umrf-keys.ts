@@ -1,7 +1,7 @@
 /** UMRF text of any dialect as the keys that a document would hold. Nothing is stored. */
-import { ask } from "./http";
+import { fetchJson } from "./http";
 
-export interface Pieces {
+export interface UmrfKeys {
   readonly dialect: string;
   readonly notes: readonly string[];
   readonly name: string;
@@ -10,6 +10,6 @@ export interface Pieces {
   readonly positions: Readonly<Record<string, unknown>>;
 }
 
-export function readPieces(text: string): Promise<Pieces> {
-  return ask("/api/pieces", { method: "POST", body: text });
+export function readUmrfKeys(text: string): Promise<UmrfKeys> {
+  return fetchJson("/api/pieces", { method: "POST", body: text });
 }

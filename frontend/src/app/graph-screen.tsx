@@ -10,8 +10,8 @@ import { useMay, usePerson } from "../api/use-person";
 import { Editor, type Shown } from "../editor/editor";
 import { useKnownActions } from "../library/known-actions";
 import { Sidebar } from "../library/sidebar";
-import { LiveWord } from "../runs/connection-status";
-import { DraftWord } from "../runs/draft-status";
+import { ConnectionStatus } from "../runs/connection-status";
+import { DraftStatus } from "../runs/draft-status";
 import { RunStrip } from "../runs/run-strip";
 import { RecordDryRun } from "../runs/start/record-dry-run";
 import { StartControl } from "../runs/start/start-control";
@@ -20,7 +20,7 @@ import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom } from "../sync/use-room";
 import { Empty } from "../ui/empty";
 import { useNewGraphs } from "./new-graphs";
-import { Bar, Frame } from "./page-frame";
+import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
 
 /** How long a start waits for the name of the moment on screen, ms. */
@@ -95,7 +95,7 @@ function Inside({ id }: { id: string }) {
       bar={(parts) => <TitledBar id={id} {...parts} />}
       list={(place) => <Sidebar current={id} onNew={create} onImport={choose} onPlace={place} />}
       status={(shown: Shown) => (
-        <DraftWord
+        <DraftStatus
           run={live}
           label={label}
           graph={shown.graph}
@@ -140,22 +140,22 @@ function Inside({ id }: { id: string }) {
           onFold={shown.fold}
         />
       )}
-      corner={<LiveWord run={live} whose={going.length > 1} />}
+      corner={<ConnectionStatus run={live} whose={going.length > 1} />}
     />
   );
 }
 
-function TitledBar(props: { id: string } & Parameters<typeof Bar>[0]) {
+function TitledBar(props: { id: string } & Parameters<typeof PageBar>[0]) {
   const { id, ...parts } = props;
   const here = parts.crumbs.find(({ to, part }) => to === undefined && !part)?.label;
   useTitle(typeof here === "string" ? here : "Graph");
-  return <Bar graph={id} {...parts} />;
+  return <PageBar graph={id} {...parts} />;
 }
 
 function Gone() {
   return (
     <>
-      <Bar crumbs={[{ label: "Graphs", to: "/" }, { label: "Gone" }]} />
+      <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "Gone" }]} />
       <main>
         <Empty
           icon={<IconMapOff size={22} />}
@@ -176,14 +176,14 @@ function Gone() {
 export function GraphScreen({ id }: { id: string }): ReactNode {
   const { person } = usePerson();
   return (
-    <Frame>
+    <PageFrame>
       <RoomProvider
         url={roomUrl(id)}
         keep={{ graph: id, person }}
-        fallback={<Bar crumbs={[{ label: "Graphs", to: "/" }]} />}
+        fallback={<PageBar crumbs={[{ label: "Graphs", to: "/" }]} />}
       >
         <Inside id={id} />
       </RoomProvider>
-    </Frame>
+    </PageFrame>
   );
 }

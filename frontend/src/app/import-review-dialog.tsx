@@ -1,19 +1,19 @@
 /** What was translated in a file of an old dialect, before it is kept. */
 import { Button, Group, Modal, Text } from "@mantine/core";
 import { useSyncExternalStore } from "react";
-import type { Where } from "../api/graphs";
+import type { ProblemPlace } from "../api/graphs";
 import { bySeverity, countWords } from "../canvas/problem-marks";
-import { dialectWords, reviews, type Waiting } from "./import-review";
+import { dialectWords, type ImportUnderReview, importReviews } from "./import-review";
 import style from "./import-review-dialog.module.css";
 
 const MOST_PROBLEMS = 8;
 
 /** Where in the file something stands; for one of many the first. */
-function Line({ where }: { where: Where }) {
+function Line({ where }: { where: ProblemPlace }) {
   return where.line === undefined ? null : <Text span c="dimmed">{` line ${where.line}`}</Text>;
 }
 
-function Problems({ waiting }: { waiting: Waiting }) {
+function Problems({ waiting }: { waiting: ImportUnderReview }) {
   // That it is an old form is solved by keeping it.
   const left = waiting.preview.problems.filter(({ code }) => code !== "dialect-old");
   const problems = bySeverity(left);
@@ -37,7 +37,7 @@ function Problems({ waiting }: { waiting: Waiting }) {
   );
 }
 
-function Body({ waiting }: { waiting: Waiting }) {
+function Body({ waiting }: { waiting: ImportUnderReview }) {
   const { preview, file } = waiting;
   const count = preview.actions === 1 ? "1 action" : `${preview.actions} actions`;
   return (
@@ -73,8 +73,8 @@ function Body({ waiting }: { waiting: Waiting }) {
   );
 }
 
-export function ReviewDialog() {
-  const waiting = useSyncExternalStore(reviews.subscribe, reviews.now);
+export function ImportReviewDialog() {
+  const waiting = useSyncExternalStore(importReviews.subscribe, importReviews.now);
   return (
     <Modal
       opened={waiting !== null}

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Preview } from "../api/graphs";
-import { dialectWords, isPlain, Reviews } from "./import-review";
+import { dialectWords, ImportReviews, isPlain } from "./import-review";
 
 const preview = (part: Partial<Preview> = {}): Preview => ({
   dialect: "D1",
@@ -19,7 +19,7 @@ test("a file of the present form without notes needs no look", () => {
 });
 
 test("files are asked about one after the other, and each gets its own answer", async () => {
-  const reviews = new Reviews();
+  const reviews = new ImportReviews();
   const first = reviews.ask("a.json", preview());
   const second = reviews.ask("b.json", preview());
   expect(reviews.now()?.file).toBe("a.json");

@@ -2,7 +2,7 @@
 import type { Preview } from "../api/graphs";
 
 /** One file that waits. `answer` lets the import go on (true) or drops it. */
-export interface Waiting {
+export interface ImportUnderReview {
   readonly file: string;
   readonly preview: Preview;
   answer(keep: boolean): void;
@@ -28,8 +28,8 @@ export function dialectWords(dialect: string): string {
 }
 
 /** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
-export class Reviews {
-  #waiting: readonly Waiting[] = [];
+export class ImportReviews {
+  #waiting: readonly ImportUnderReview[] = [];
   readonly #listeners = new Set<() => void>();
 
   subscribe = (listener: () => void): (() => void) => {
@@ -38,12 +38,12 @@ export class Reviews {
   };
 
   /** The first that waits; null when none does. */
-  now = (): Waiting | null => this.#waiting[0] ?? null;
+  now = (): ImportUnderReview | null => this.#waiting[0] ?? null;
 
   /** Asks whether a file shall be kept, after those that wait already. */
   ask(file: string, preview: Preview): Promise<boolean> {
     return new Promise((resolve) => {
-      const waiting: Waiting = {
+      const waiting: ImportUnderReview = {
         file,
         preview,
         answer: (keep) => {
@@ -55,10 +55,10 @@ export class Reviews {
     });
   }
 
-  #set(waiting: readonly Waiting[]): void {
+  #set(waiting: readonly ImportUnderReview[]): void {
     this.#waiting = waiting;
     for (const listener of [...this.#listeners]) listener();
   }
 }
 
-export const reviews = new Reviews();
+export const importReviews = new ImportReviews();

@@ -10,17 +10,17 @@ import {
   previewGraph,
   refreshGraphs,
 } from "../api/graphs";
-import { place, sentence } from "../api/http";
-import { isPlain, reviews } from "./import-review";
+import { errorPlace, errorText } from "../api/http";
+import { importReviews, isPlain } from "./import-review";
 
 const MOST_BYTES = 10 * 1024 * 1024;
 
 function complain(title: string, error: unknown): void {
-  const where = place(error);
+  const where = errorPlace(error);
   notifications.show({
     color: "red",
     title,
-    message: where === "" ? sentence(error) : `${sentence(error)} (${where})`,
+    message: where === "" ? errorText(error) : `${errorText(error)} (${where})`,
     autoClose: 15_000,
   });
 }
@@ -64,7 +64,7 @@ export function useNewGraphs(): NewGraphs {
           if (file.size > MOST_BYTES) throw new Error("The file is larger than 10 MB.");
           const text = await file.text();
           const preview = await previewGraph(text);
-          if (!isPlain(preview) && !(await reviews.ask(file.name, preview))) continue;
+          if (!isPlain(preview) && !(await importReviews.ask(file.name, preview))) continue;
           last = await importGraph(text);
         } catch (error) {
           complain(`${file.name} was not imported`, error);

@@ -3,12 +3,12 @@ import { Button } from "@mantine/core";
 import { IconMapOff } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { Empty } from "../ui/empty";
-import { Bar, Frame } from "./page-frame";
+import { PageBar, PageFrame } from "./page-frame";
 
-export function Lost() {
+export function NotFound() {
   return (
-    <Frame>
-      <Bar crumbs={[{ label: "Graphs", to: "/" }, { label: "Nowhere" }]} />
+    <PageFrame>
+      <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "Nowhere" }]} />
       <main>
         <Empty
           icon={<IconMapOff size={22} />}
@@ -20,6 +20,6 @@ export function Lost() {
           }
         />
       </main>
-    </Frame>
+    </PageFrame>
   );
 }

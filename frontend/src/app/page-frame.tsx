@@ -52,7 +52,7 @@ const Way = memo(function Way({ to, icon: Icon, name, tight }: WayProps) {
   );
 });
 
-export function Bar({ crumbs, status, actions, start, graph, at }: Props) {
+export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
   const mayShare = useMay("share");
   const [sharing, setSharing] = useState(false);
   const share = useStableCallback(() => setSharing(true));
@@ -92,6 +92,6 @@ export function Bar({ crumbs, status, actions, start, graph, at }: Props) {
 }
 
 /** Bar above, screen below, each scrolling by itself. */
-export function Frame({ children }: { children: ReactNode }) {
+export function PageFrame({ children }: { children: ReactNode }) {
   return <div className={style.frame}>{children}</div>;
 }

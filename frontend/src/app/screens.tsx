@@ -11,40 +11,40 @@ import { RobotsPage } from "../robots/robots-page";
 import { StartDialog } from "../runs/start/start-dialog";
 import { nextLabel } from "../runs/start/use-start";
 import { useNewGraphs } from "./new-graphs";
-import { Bar, Frame } from "./page-frame";
+import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
 
 export function HomeScreen() {
   const { create, choose } = useNewGraphs();
   useTitle("Graphs");
   return (
-    <Frame>
-      <Bar crumbs={[{ label: "Graphs" }]} />
+    <PageFrame>
+      <PageBar crumbs={[{ label: "Graphs" }]} />
       <Home onNew={create} onImport={choose} />
-    </Frame>
+    </PageFrame>
   );
 }
 
 export function RunsScreen() {
   useTitle("Runs");
   return (
-    <Frame>
-      <Bar at="runs" crumbs={[{ label: "Graphs", to: "/" }, { label: "Runs" }]} />
+    <PageFrame>
+      <PageBar at="runs" crumbs={[{ label: "Graphs", to: "/" }, { label: "Runs" }]} />
       <RunsPage />
-    </Frame>
+    </PageFrame>
   );
 }
 
 export function RunScreen({ id }: { id: string }) {
   useTitle("Run");
   return (
-    <Frame>
+    <PageFrame>
       <RunPage
         id={id}
-        bar={(parts) => <Bar at="runs" {...parts} />}
+        bar={(parts) => <PageBar at="runs" {...parts} />}
         start={(again, onClose) => <Again {...again} onClose={onClose} />}
       />
-    </Frame>
+    </PageFrame>
   );
 }
 
@@ -71,27 +71,27 @@ export function RobotsScreen() {
     void take([new File([text], `${name}.umrf.graph.json`, { type: "application/json" })]);
   };
   return (
-    <Frame>
-      <Bar at="robots" crumbs={[{ label: "Graphs", to: "/" }, { label: "Robots" }]} />
+    <PageFrame>
+      <PageBar at="robots" crumbs={[{ label: "Graphs", to: "/" }, { label: "Robots" }]} />
       <RobotsPage onImport={onImport} />
-    </Frame>
+    </PageFrame>
   );
 }
 
 export function CompareScreen() {
   useTitle("Compare runs");
   return (
-    <Frame>
-      <ComparePage bar={(parts) => <Bar at="runs" {...parts} />} />
-    </Frame>
+    <PageFrame>
+      <ComparePage bar={(parts) => <PageBar at="runs" {...parts} />} />
+    </PageFrame>
   );
 }
 
 export function StatisticsScreen() {
   useTitle("Statistics");
   return (
-    <Frame>
-      <StatisticsPage bar={(parts) => <Bar at="runs" {...parts} />} />
-    </Frame>
+    <PageFrame>
+      <StatisticsPage bar={(parts) => <PageBar at="runs" {...parts} />} />
+    </PageFrame>
   );
 }

@@ -3,9 +3,9 @@ import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo } from "react";
 import { cardLines, lineText } from "../graph/value-text";
-import { tookWords } from "../status/durations";
+import { durationText } from "../status/durations";
 import type { Progress } from "../status/progress";
-import { StateWord } from "../status/state-label";
+import { StateLabel } from "../status/state-label";
 import { colorOfName } from "../ui/name-colors";
 import { stopwatch, useNow } from "../ui/times";
 import style from "./action-card.module.css";
@@ -17,14 +17,16 @@ import { ProblemBadge } from "./problem-badge";
 function ProgressLine({ progress }: { progress: Progress | null }) {
   const going = progress?.since != null;
   const now = useNow(1000, going);
-  if (progress === null) return <StateWord tone="idle" word="idle" />;
+  if (progress === null) return <StateLabel tone="idle" word="idle" />;
   const parts: string[] = [];
-  const took = tookWords(progress);
+  const took = durationText(progress);
   if (progress.since !== null) parts.push(stopwatch(now - progress.since));
   else if (took !== null) parts.push(took);
   if (progress.visits > 1) parts.push(`${progress.visits}×`);
   const more = parts.join(" · ");
-  return <StateWord tone={progress.tone} word={progress.word} {...(more === "" ? {} : { more })} />;
+  return (
+    <StateLabel tone={progress.tone} word={progress.word} {...(more === "" ? {} : { more })} />
+  );
 }
 
 export const ActionCard = memo(function ActionCard({

@@ -5,8 +5,8 @@
  * secure context; elsewhere what was copied last in this browser serves.
  */
 import { notifications } from "@mantine/notifications";
-import { place, sentence } from "../api/http";
-import { readPieces } from "../api/umrf-keys";
+import { errorPlace, errorText } from "../api/http";
+import { readUmrfKeys } from "../api/umrf-keys";
 import { arrange } from "../canvas/geometry/arrange";
 import { mapsFrom } from "../graph/document-keys";
 import { type Clip, clipOf, isEmpty, paste } from "../graph/edit/clip";
@@ -128,11 +128,11 @@ export async function pasteText(context: EditorContext, text: string): Promise<v
     return;
   }
   try {
-    const pieces = await readPieces(text);
+    const pieces = await readUmrfKeys(text);
     if (isEmpty(pieces)) failed("This UMRF text has no actions.");
     else land(context, pieces, false);
   } catch (error) {
-    const where = place(error);
-    failed(where === "" ? sentence(error) : `${sentence(error)} (${where})`);
+    const where = errorPlace(error);
+    failed(where === "" ? errorText(error) : `${errorText(error)} (${where})`);
   }
 }

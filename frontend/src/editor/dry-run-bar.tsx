@@ -10,7 +10,7 @@ import {
   IconX,
 } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { sentence } from "../api/http";
+import { errorText } from "../api/http";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import type { RunningAction } from "../dry-run/playback";
 import { type DecidedFaultKind, faultWords } from "../dry-run/script";
@@ -171,7 +171,7 @@ function Faults({ context, run }: { context: EditorContext; run: DryRun }) {
 }
 
 function Said({ run }: { run: DryRun }) {
-  if (run.failed) return <span className={style.failed}>{sentence(run.failed)}</span>;
+  if (run.failed) return <span className={style.failed}>{errorText(run.failed)}</span>;
   if (run.moments.length === 0)
     return <span>{run.busy ? "Working it out …" : "Nothing happens."}</span>;
   const last = run.index === run.moments.length - 1;

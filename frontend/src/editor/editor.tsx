@@ -20,7 +20,7 @@ import { useShortcuts } from "../edit-actions/shortcuts";
 import { FindBar } from "../find/find-bar";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
-import { Details } from "../inspector/inspector";
+import { Inspector } from "../inspector/inspector";
 import { Outline } from "../outline/outline";
 import { People } from "../people/people";
 import type { Progress } from "../status/progress";
@@ -32,7 +32,7 @@ import { QuickAdd } from "./canvas/quick-add";
 import { CanvasPane } from "./canvas-pane";
 import style from "./editor.module.css";
 import { Overlays } from "./menus/overlays";
-import { ProblemWord } from "./problem-count";
+import { ProblemCount } from "./problem-count";
 import { RoomNotices } from "./room-notices";
 import { SaveStatus } from "./save-status";
 import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
@@ -52,7 +52,7 @@ export interface Shown {
   fold: (folded: boolean) => void;
 }
 
-export interface BarParts {
+export interface EditorBarParts {
   crumbs: readonly Crumb[];
   status?: ReactNode;
   actions?: ReactNode;
@@ -66,7 +66,7 @@ interface Props {
   progress: ReadonlyMap<Key, Progress>;
   /** The run that goes, if one does. */
   run: string | null;
-  bar: (parts: BarParts) => ReactNode;
+  bar: (parts: EditorBarParts) => ReactNode;
   list: (place: (template: NewAction) => void) => ReactNode;
   strip: (shown: Shown) => ReactNode;
   start: (shown: Shown) => ReactNode;
@@ -78,7 +78,7 @@ interface Props {
 
 type Pane = "canvas" | "outline" | "details" | "run";
 
-type Side = "library" | "outline";
+type EditorSidePanel = "library" | "outline";
 
 const SIDES = [
   { value: "library", label: "Library" },
@@ -133,7 +133,7 @@ export function Editor(props: Props) {
     getInitialValueInEffect: false,
   });
   const carrying = useSyncExternalStore(actionDrag.subscribe, actionDrag.now) !== null;
-  const [side, setSide] = useState<Side>("library");
+  const [side, setSide] = useState<EditorSidePanel>("library");
   const onPanel = useCallback((next: Panel) => {
     const outline = next === "outline";
     if (outline) setSide("outline");
@@ -205,7 +205,7 @@ export function Editor(props: Props) {
   // A dry-run is told apart from runs that are over; one that goes on is never out of sight.
   const strip = context.dryRun && props.run === null ? null : props.strip(shown);
   const details = (
-    <Details id={id} seq={link.seq} panel={panel} problems={problems} threads={threads} />
+    <Inspector id={id} seq={link.seq} panel={panel} problems={problems} threads={threads} />
   );
   const find = finding && <FindBar problems={problems?.problems ?? []} onClose={closeFind} />;
   return (
@@ -215,7 +215,7 @@ export function Editor(props: Props) {
         status: (
           <>
             <SaveStatus />
-            <ProblemWord problems={problems} />
+            <ProblemCount problems={problems} />
             {wide && props.status(shown)}
           </>
         ),
@@ -258,7 +258,7 @@ export function Editor(props: Props) {
               size="xs"
               data={SIDES}
               value={side}
-              onChange={(next) => setSide(next as Side)}
+              onChange={(next) => setSide(next as EditorSidePanel)}
             />
             <div className={style.side}>
               {side === "outline" ? <Outline progress={progress} /> : props.list(place)}

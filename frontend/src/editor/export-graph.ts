@@ -1,6 +1,6 @@
 /** Taking a graph away as a file: UMRF as the server writes it, or a picture of the canvas. */
 import { notifications } from "@mantine/notifications";
-import { here } from "../api/page-url";
+import { serverPath } from "../api/page-url";
 import { svgPictureOf } from "../canvas/svg-picture";
 import type { EditorContext, ExportFormat } from "../edit-actions/editor-context";
 
@@ -51,10 +51,13 @@ async function rasterised(svg: string, width: number, height: number): Promise<B
   }
 }
 
-export async function takeAway(context: EditorContext, format: ExportFormat): Promise<void> {
+export async function exportGraph(context: EditorContext, format: ExportFormat): Promise<void> {
   const name = fileName(context.graph.name);
   if (format === "umrf") {
-    save(here(`/api/graphs/${encodeURIComponent(context.id)}/umrf`), `${name}.umrf.graph.json`);
+    save(
+      serverPath(`/api/graphs/${encodeURIComponent(context.id)}/umrf`),
+      `${name}.umrf.graph.json`,
+    );
     return;
   }
   try {

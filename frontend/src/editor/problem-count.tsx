@@ -4,7 +4,7 @@ import type { Problems } from "../api/graphs";
 import { useEditorContext } from "../edit-actions/editor-context";
 import style from "./problem-count.module.css";
 
-export function ProblemWord({ problems }: { problems: Problems | undefined }) {
+export function ProblemCount({ problems }: { problems: Problems | undefined }) {
   const { setPanel } = useEditorContext();
   const count = problems?.problems.length ?? 0;
   if (count === 0) return null;

@@ -22,7 +22,7 @@ import {
   useThrottledLink,
   useUndo,
 } from "../sync/use-room";
-import { takeAway } from "./export-graph";
+import { exportGraph } from "./export-graph";
 
 const NONE: ReadonlySet<string> = new Set();
 
@@ -116,7 +116,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   const closeAdd = useCallback(() => setAdding(null), []);
   const close = useCallback(() => setSurface(null), []);
   const download = useCallback((format: ExportFormat = "umrf") => {
-    if (latest.current) void takeAway(latest.current, format);
+    if (latest.current) void exportGraph(latest.current, format);
   }, []);
   const closeFind = useCallback(() => setFinding(false), []);
 

@@ -22,7 +22,7 @@ interface Fact {
   readonly text: string;
 }
 
-interface Entry extends Omit<Hit, "why"> {
+interface SearchEntry extends Omit<Hit, "why"> {
   readonly facts: readonly Fact[];
 }
 
@@ -38,14 +38,14 @@ const titleOf = (graph: Graph, key: Key): string => {
   return action ? `${action.name} ${action.instanceId}` : "";
 };
 
-function entriesOf(graph: Graph, problems: readonly Problem[]): Entry[] {
+function entriesOf(graph: Graph, problems: readonly Problem[]): SearchEntry[] {
   const wrong = (id: string): Fact[] =>
     problems
       .filter((problem) => markedKeyOf(problem) === id)
       .map(({ code, message }) => ({ field: "problem", text: `${code} ${message}` }));
   const names = new Map(graph.actions.map(({ key }) => [key, titleOf(graph, key)]));
   const name = (key: Key) => names.get(key) ?? titleOf(graph, key);
-  const actions = graph.actions.map((action): Entry => {
+  const actions = graph.actions.map((action): SearchEntry => {
     const values = (list: typeof action.inputs, field: string): Fact[] =>
       list.map((each) => {
         const value = valueText(each);
@@ -68,7 +68,7 @@ function entriesOf(graph: Graph, problems: readonly Problem[]): Entry[] {
       ],
     };
   });
-  const arrows = graph.relations.map((relation): Entry => {
+  const arrows = graph.relations.map((relation): SearchEntry => {
     const said = PRECONDITIONS.filter((outcome) => relation.conditions[outcome] !== "ignore");
     return {
       id: relationId(relation),

@@ -6,11 +6,11 @@ import { adoptGhost, rename, setField } from "../graph/edit";
 import type { Action, Graph } from "../graph/model";
 import { DraftInput } from "../ui/draft-input";
 import { colorOfName } from "../ui/name-colors";
-import { Arrows } from "./arrow-list";
-import { FieldOf } from "./fields/shared-field";
+import { ArrowList } from "./arrow-list";
+import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
-import { Parameters } from "./parameters/parameter-list";
-import { RunsWhen } from "./run-conditions";
+import { ParameterList } from "./parameters/parameter-list";
+import { RunConditions } from "./run-conditions";
 
 function robots(graph: Graph): string[] {
   return [...new Set(graph.actions.map((action) => action.actor))].filter(Boolean).sort();
@@ -46,15 +46,15 @@ export function ActionForm({ action }: { action: Action }) {
   return (
     <div className={style.form}>
       <div className={style.nameRow}>
-        <FieldOf of={action.key} field="name">
+        <SharedField of={action.key} field="name">
           <DraftInput
             label="Name"
             value={action.name}
             check={(draft) => (draft.trim() === "" ? "An action has a name." : null)}
             onCommit={(name) => rename(doc, action.key, name.trim())}
           />
-        </FieldOf>
-        <FieldOf of={action.key} field="number">
+        </SharedField>
+        <SharedField of={action.key} field="number">
           <DraftInput
             label="Number"
             value={String(action.instanceId)}
@@ -62,9 +62,9 @@ export function ActionForm({ action }: { action: Action }) {
             check={wholeNumber}
             onCommit={(text) => setField(doc, action.key, "instanceId", Number(text))}
           />
-        </FieldOf>
+        </SharedField>
       </div>
-      <FieldOf of={action.key} field="robot">
+      <SharedField of={action.key} field="robot">
         <Autocomplete
           key={`actor-${action.actor}`}
           label="Robot"
@@ -86,8 +86,8 @@ export function ActionForm({ action }: { action: Action }) {
           }}
           onOptionSubmit={(value) => setField(doc, action.key, "actor", value)}
         />
-      </FieldOf>
-      <FieldOf of={action.key} field="description">
+      </SharedField>
+      <SharedField of={action.key} field="description">
         <DraftInput
           label="Description"
           lines
@@ -95,13 +95,13 @@ export function ActionForm({ action }: { action: Action }) {
           placeholder="What it does, for people"
           onCommit={(text) => setField(doc, action.key, "description", text)}
         />
-      </FieldOf>
-      <Parameters action={action} side="in" />
-      <RunsWhen of={action.key} title="When" />
-      <Arrows action={action} />
-      <Parameters action={action} side="out" />
+      </SharedField>
+      <ParameterList action={action} side="in" />
+      <RunConditions of={action.key} title="When" />
+      <ArrowList action={action} />
+      <ParameterList action={action} side="out" />
       <section className={style.section}>
-        <FieldOf of={action.key} field="type">
+        <SharedField of={action.key} field="type">
           <DraftInput
             label="Type"
             value={action.type}
@@ -109,7 +109,7 @@ export function ActionForm({ action }: { action: Action }) {
             check={(draft) => (draft.trim() === "" ? "The engine wants one, usually sync." : null)}
             onCommit={(text) => setField(doc, action.key, "type", text.trim())}
           />
-        </FieldOf>
+        </SharedField>
       </section>
     </div>
   );

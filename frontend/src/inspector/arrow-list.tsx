@@ -87,7 +87,7 @@ function Connect({ action, onDone }: { action: Action; onDone: () => void }) {
   );
 }
 
-export function Arrows({ action }: { action: Action }) {
+export function ArrowList({ action }: { action: Action }) {
   const context = useEditorContext();
   const [connecting, setConnecting] = useState(false);
   const out = context.graph.relations

@@ -4,24 +4,24 @@ import { printedKeys } from "../edit-actions/edit-action";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { setGraphDescription, setGraphName } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";
-import { FieldOf } from "./fields/shared-field";
+import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
-import { labelsOf, setLabels } from "./labels";
+import { graphLabels, setLabels } from "./labels";
 
 export function GraphForm() {
   const { doc, graph } = useEditorContext();
   const arrows = graph.relations.length;
   return (
     <div className={style.form}>
-      <FieldOf of="graph" field="name">
+      <SharedField of="graph" field="name">
         <DraftInput
           label="Graph"
           value={graph.name}
           check={(draft) => (draft.trim() === "" ? "A graph has a name." : null)}
           onCommit={(name) => setGraphName(doc, name.trim())}
         />
-      </FieldOf>
-      <FieldOf of="graph" field="description">
+      </SharedField>
+      <SharedField of="graph" field="description">
         <DraftInput
           label="Description"
           lines
@@ -29,13 +29,13 @@ export function GraphForm() {
           placeholder="What it is for"
           onCommit={(text) => setGraphDescription(doc, text)}
         />
-      </FieldOf>
+      </SharedField>
       <TagsInput
         label="Labels"
         size="sm"
         placeholder="night shift, demo …"
         maxTags={20}
-        value={labelsOf(graph)}
+        value={graphLabels(graph)}
         onChange={(labels) => setLabels(doc, labels)}
       />
       <p className={style.hint}>

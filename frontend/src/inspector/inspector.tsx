@@ -16,15 +16,15 @@ import { notesOf } from "../graph/edit/notes";
 import { EXIT } from "../graph/model";
 import { ActionForm } from "./action-form";
 import { ProblemsContext } from "./fields/field-problems";
-import { FieldOf } from "./fields/shared-field";
-import { LookOnly } from "./fields/view-only";
+import { SharedField } from "./fields/shared-field";
+import { ViewOnly } from "./fields/view-only";
 import { GraphForm } from "./graph-form";
 import style from "./inspector.module.css";
 import { JsonView } from "./json/json-view";
 import { NoteForm } from "./note-form";
 import { ProblemList, ProblemsHere } from "./problem-list";
 import { RelationForm } from "./relation-form";
-import { RunsWhen } from "./run-conditions";
+import { RunConditions } from "./run-conditions";
 
 const NONE: readonly Problem[] = [];
 
@@ -80,11 +80,11 @@ function Properties() {
   if (note) return <NoteForm key={note.key} note={note} />;
   if (action) return <ActionForm key={action.key} action={action} />;
   if (relation) return <RelationForm key={relationId(relation)} relation={relation} />;
-  if (context.selection.has(EXIT)) return <RunsWhen of={EXIT} title="The graph ends" />;
+  if (context.selection.has(EXIT)) return <RunConditions of={EXIT} title="The graph ends" />;
   return <GraphForm />;
 }
 
-export function Details({ id, seq, panel, problems, threads }: Props) {
+export function Inspector({ id, seq, panel, problems, threads }: Props) {
   const context = useEditorContext();
   const open = threads.filter((thread) => !thread.resolved).length;
   const count = problems?.problems.length ?? 0;
@@ -117,17 +117,17 @@ export function Details({ id, seq, panel, problems, threads }: Props) {
         </Tabs.Tab>
       </Tabs.List>
       <Tabs.Panel value="details" className={style.panel ?? ""}>
-        <LookOnly>
+        <ViewOnly>
           <ProblemsHere problems={problems} />
           <ProblemsContext value={problems?.problems ?? NONE}>
             <Properties />
           </ProblemsContext>
-        </LookOnly>
+        </ViewOnly>
       </Tabs.Panel>
       <Tabs.Panel value="json" className={style.panel ?? ""} data-fill>
-        <FieldOf of="graph" field="json">
+        <SharedField of="graph" field="json">
           <JsonView graph={id} seq={seq} />
-        </FieldOf>
+        </SharedField>
       </Tabs.Panel>
       <Tabs.Panel value="comments" className={style.panel ?? ""}>
         <Comments threads={threads} />

@@ -12,7 +12,7 @@ function attributes(text: string | undefined): string {
   return text?.trimStart().startsWith("{") ? text : "{}";
 }
 
-export function labelsOf(graph: Graph): string[] {
+export function graphLabels(graph: Graph): string[] {
   const kept = graph.extra.find(([field]) => `x/${field}` === KEY)?.[1];
   const text = memberText(attributes(kept), "labels");
   const value: unknown = text === null ? [] : JSON.parse(text);

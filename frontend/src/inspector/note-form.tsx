@@ -6,7 +6,7 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import { removeNotes } from "../graph/edit";
 import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../graph/edit/notes";
 import { DraftInput } from "../ui/draft-input";
-import { FieldOf } from "./fields/shared-field";
+import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
 
 const LEAST = { width: 60, height: 32 }; // px, as it is read
@@ -47,7 +47,7 @@ export function NoteForm({ note }: { note: Note }) {
   const [width, height] = note.size;
   return (
     <div className={style.form}>
-      <FieldOf of={note.key} field="text">
+      <SharedField of={note.key} field="text">
         <DraftInput
           label={frame ? "Title" : "Text"}
           lines={!frame}
@@ -56,7 +56,7 @@ export function NoteForm({ note }: { note: Note }) {
           check={(draft) => (draft.length > 5_000 ? "At most 5000 characters." : null)}
           onCommit={(text) => change({ text })}
         />
-      </FieldOf>
+      </SharedField>
       <Colors note={note} onPick={(color) => change({ color })} />
       <div className={style.pair}>
         <DraftInput

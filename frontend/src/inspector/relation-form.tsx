@@ -7,9 +7,9 @@ import { relationId } from "../graph/document-keys";
 import { removeRelation, setRequired, setResponse } from "../graph/edit";
 import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../graph/model";
 import { endName, ignoredWords, relationWords } from "../graph/relation-words";
-import { FieldOf } from "./fields/shared-field";
+import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
-import { Remaps } from "./parameters/remap-list";
+import { RemapList } from "./parameters/remap-list";
 
 const meaning: Record<Response, string> = {
   run: "run it",
@@ -54,7 +54,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
       ) : (
         <>
           <section className={style.section}>
-            <FieldOf of={id} field="conditions">
+            <SharedField of={id} field="conditions">
               {OUTCOMES.map((outcome) => (
                 <div className={style.answer} key={outcome}>
                   <span className={style.when} style={{ color: outcomeColor[outcome] }}>
@@ -71,7 +71,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
                   />
                 </div>
               ))}
-            </FieldOf>
+            </SharedField>
           </section>
           <div className={style.say}>
             <div>
@@ -81,7 +81,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
               {nothing !== null && <p>{nothing}</p>}
             </div>
           </div>
-          <FieldOf of={id} field="required">
+          <SharedField of={id} field="required">
             <Switch
               label={`${child} waits for this`}
               description={
@@ -92,11 +92,11 @@ export function RelationForm({ relation }: { relation: Relation }) {
               checked={relation.required}
               onChange={(event) => setRequired(doc, id, event.currentTarget.checked)}
             />
-          </FieldOf>
+          </SharedField>
           {relation.child !== EXIT && (
-            <FieldOf of={id} field="remap">
-              <Remaps relation={relation} />
-            </FieldOf>
+            <SharedField of={id} field="remap">
+              <RemapList relation={relation} />
+            </SharedField>
           )}
         </>
       )}

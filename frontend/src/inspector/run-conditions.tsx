@@ -5,7 +5,7 @@ import type { Key } from "../graph/model";
 import { startWords } from "../graph/relation-words";
 import style from "./inspector.module.css";
 
-export function RunsWhen({ of, title }: { of: Key; title: string }) {
+export function RunConditions({ of, title }: { of: Key; title: string }) {
   const { graph } = useEditorContext();
   return (
     <section className={style.section}>

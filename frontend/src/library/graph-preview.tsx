@@ -112,7 +112,7 @@ export function Miniature({ graph }: { graph: Graph }) {
   );
 }
 
-export function Preview({ graph, seq }: { graph: string; seq: number }) {
+export function GraphPreview({ graph, seq }: { graph: string; seq: number }) {
   const umrf = useQuery({
     queryKey: ["graphs", graph, "umrf", seq],
     queryFn: () => graphText(graph).then((text) => JSON.parse(text) as unknown),

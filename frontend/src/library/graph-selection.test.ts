@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { GraphSummary } from "../api/graphs";
 import type { Run } from "../api/runs";
-import { choose, labelsOf, lastRuns, type Order } from "./graph-selection";
+import { allLabels, type GraphOrder, lastRuns, selectGraphs } from "./graph-selection";
 
 const graph = (id: string, more: Partial<GraphSummary> = {}): GraphSummary => ({
   id,
@@ -21,8 +21,8 @@ const graphs = [
   graph("ccc", { labels: ["night", "demo"], problems: { error: 0, warning: 9 }, actions: 5 }),
 ];
 const runs = lastRuns([run("a", 1), run("bb", 2), run("a", 3, "stopped")]);
-const ids = (order: Order, search = "", label: string | null = null) =>
-  choose(graphs, { search, label, order }, runs).map(({ id }) => id);
+const ids = (order: GraphOrder, search = "", label: string | null = null) =>
+  selectGraphs(graphs, { search, label, order }, runs).map(({ id }) => id);
 
 test("the newest run of each graph is its last", () => {
   expect(runs.get("a")?.number).toBe(3);
@@ -43,5 +43,5 @@ test("a search finds robots, labels and people, and a label is had by all that a
   expect(ids("name", "mari bb")).toEqual(["bb"]);
   expect(ids("name", "", "night")).toEqual(["a", "ccc"]);
   expect(ids("name", "nothing")).toEqual([]);
-  expect(labelsOf(graphs)).toEqual(["demo", "night"]);
+  expect(allLabels(graphs)).toEqual(["demo", "night"]);
 });

@@ -9,13 +9,13 @@ export const ORDERS = {
   problems: "Most problems",
   size: "Most actions",
 } as const;
-export type Order = keyof typeof ORDERS;
+export type GraphOrder = keyof typeof ORDERS;
 
-export interface Wish {
+export interface GraphFilter {
   readonly search: string;
   /** Every graph shown has it; null: whatever. */
   readonly label: string | null;
-  readonly order: Order;
+  readonly order: GraphOrder;
 }
 
 /** The newest run of each graph, by the graph's id. */
@@ -30,7 +30,7 @@ export function lastRuns(runs: readonly Run[]): Map<string, Run> {
 }
 
 /** Every word of a search stands somewhere in the texts. */
-export function fits(search: string, ...texts: readonly (string | undefined)[]): boolean {
+export function matchesSearch(search: string, ...texts: readonly (string | undefined)[]): boolean {
   const words = search.toLowerCase().split(/\s+/).filter(Boolean);
   const all = texts.join(" ").toLowerCase();
   return words.every((word) => all.includes(word));
@@ -41,15 +41,15 @@ function says({ name, description, robots, labels, people }: GraphSummary): stri
   return [name, description, ...(robots ?? []), ...(labels ?? []), ...names].join(" ");
 }
 
-export function labelsOf(graphs: readonly GraphSummary[]): string[] {
+export function allLabels(graphs: readonly GraphSummary[]): string[] {
   return [...new Set(graphs.flatMap(({ labels }) => labels ?? []))].sort((a, b) =>
     a.localeCompare(b),
   );
 }
 
-export function choose(
+export function selectGraphs(
   graphs: readonly GraphSummary[],
-  { search, label, order }: Wish,
+  { search, label, order }: GraphFilter,
   runs: ReadonlyMap<string, Run>,
 ): GraphSummary[] {
   const ran = ({ id }: GraphSummary): string => {
@@ -59,7 +59,7 @@ export function choose(
   };
   const worst = ({ problems }: GraphSummary) =>
     (problems?.error ?? 0) * 10_000 + (problems?.warning ?? 0);
-  const by: Record<Order, (a: GraphSummary, b: GraphSummary) => number> = {
+  const by: Record<GraphOrder, (a: GraphSummary, b: GraphSummary) => number> = {
     changed: () => 0,
     run: (a, b) => ran(b).localeCompare(ran(a)),
     name: (a, b) => a.name.localeCompare(b.name, undefined, { numeric: true }),
@@ -68,6 +68,6 @@ export function choose(
   };
   return graphs
     .filter((graph) => label === null || graph.labels?.includes(label))
-    .filter((graph) => fits(search, says(graph)))
+    .filter((graph) => matchesSearch(search, says(graph)))
     .sort((a, b) => by[order](a, b) || b.updated_at.localeCompare(a.updated_at));
 }

@@ -14,34 +14,34 @@ import { noteColor } from "../canvas/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import type { Note } from "../graph/edit/notes";
 import { cardLines, lineText } from "../graph/value-text";
-import { moreOf } from "../status/durations";
+import { durationLabel } from "../status/durations";
 import type { Progress } from "../status/progress";
-import { StateWord } from "../status/state-label";
+import { StateLabel } from "../status/state-label";
 import { colorOfName } from "../ui/name-colors";
 import style from "./outline.module.css";
 import { type RowAction, rowActionsOf } from "./row-actions";
-import { type Change, RowEdit } from "./row-edit";
-import type { Row } from "./rows";
+import { RowEdit, type RowEditKind } from "./row-edit";
+import type { OutlineItem } from "./rows";
 
 interface Props {
-  row: Row;
+  row: OutlineItem;
   active: boolean;
   selected: boolean;
   progress: Progress | null;
-  change: Change | null;
+  change: RowEditKind | null;
   /** What the action is called, or that to which the arrow leads. */
   name: string;
   mayEdit: boolean;
   /** Always the same object, so that a row draws again only when something of it changes. */
-  handlers: Hands;
+  handlers: RowHandlers;
 }
 
 /** What a row can ask for. */
-export interface Hands {
+export interface RowHandlers {
   flip(id: string): void;
   focus(id: string): void;
-  choose(row: Row): void;
-  run(rowAction: RowAction, row: Row): void;
+  choose(row: OutlineItem): void;
+  run(rowAction: RowAction, row: OutlineItem): void;
   done(said: string | null): void;
 }
 
@@ -75,7 +75,7 @@ function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">
             </b>
             <Talk of={action.key} />
             {progress && (
-              <StateWord tone={progress.tone} word={progress.word} {...moreOf(progress)} />
+              <StateLabel tone={progress.tone} word={progress.word} {...durationLabel(progress)} />
             )}
           </span>
           <span className={style.sub}>
@@ -113,11 +113,11 @@ function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">
 }
 
 interface RowActionsProps {
-  row: Row;
+  row: OutlineItem;
   active: boolean;
   label: string;
   mayEdit: boolean;
-  handlers: Hands;
+  handlers: RowHandlers;
 }
 
 /** The menu itself is made when it is first opened: there may be thousands of rows. */
@@ -159,12 +159,12 @@ const keyWords = (key: string): string =>
 
 const noteWord = ({ kind }: Note) => (kind === "frame" ? "Frame" : "Note");
 
-function colorOf(row: Row): string {
+function colorOf(row: OutlineItem): string {
   if (row.kind === "note") return noteColor[row.note.color];
   return row.kind === "action" ? colorOfName(row.action.actor) : "transparent";
 }
 
-function labelOf(row: Row, name: string): string {
+function labelOf(row: OutlineItem, name: string): string {
   switch (row.kind) {
     case "entry":
       return "Entry";

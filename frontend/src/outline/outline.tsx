@@ -15,17 +15,17 @@ import { announcer } from "../ui/announcer";
 import { Empty } from "../ui/empty";
 import { useIsPhone } from "../ui/use-screen-size";
 import style from "./outline.module.css";
-import { type Hands, OutlineRow } from "./outline-row";
+import { OutlineRow, type RowHandlers } from "./outline-row";
 import { RobotFilter } from "./robot-filter";
 import { moveRow, type RowAction, removeRow, rowActionFor } from "./row-actions";
-import type { Change } from "./row-edit";
-import { namesOf, type Row, rowsOf, subjectOf } from "./rows";
+import type { RowEditKind } from "./row-edit";
+import { namesOf, type OutlineItem, rowsOf, subjectOf } from "./rows";
 
 const MANY = 40; // actions; above that the rows begin closed
 
 interface Edited {
   readonly id: string;
-  readonly change: Change;
+  readonly change: RowEditKind;
 }
 
 /** Which rows are open: those that a person opened or closed, else by how many there are. */
@@ -46,7 +46,7 @@ function useOpen(actions: number) {
 }
 
 /** The row to which an arrow key leads from the one at `at`; null where it opens or closes. */
-function stepFrom(rows: readonly Row[], at: number, key: string): number | null {
+function stepFrom(rows: readonly OutlineItem[], at: number, key: string): number | null {
   const row = rows[at];
   switch (key) {
     case "ArrowDown":
@@ -95,7 +95,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
       ?.querySelector<HTMLElement>(`[data-row="${CSS.escape(row.id)}"]`)
       ?.focus({ preventScroll: false });
   };
-  const choose = (row: Row) => {
+  const choose = (row: OutlineItem) => {
     setActive(row.id);
     const subject = subjectOf(row);
     select([subject]);
@@ -112,7 +112,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     found?.scrollIntoView({ block: "nearest" });
   }, [only, rows, active]);
 
-  const run = (rowAction: RowAction, row: Row) => {
+  const run = (rowAction: RowAction, row: OutlineItem) => {
     if (rowAction.changes && !mayEdit) return;
     switch (rowAction.name) {
       case "details":
@@ -158,7 +158,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     if (said !== null) announcer.say(said);
     focus(at);
   };
-  const latest = useRef<Hands | null>(null);
+  const latest = useRef<RowHandlers | null>(null);
   latest.current = {
     flip,
     focus: setActive,
@@ -166,8 +166,8 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     run,
     done,
   };
-  const handlers = useMemo((): Hands => {
-    const now = () => latest.current as Hands;
+  const handlers = useMemo((): RowHandlers => {
+    const now = () => latest.current as RowHandlers;
     return {
       flip: (id) => now().flip(id),
       focus: (id) => now().focus(id),
@@ -238,9 +238,10 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
 const DETAILS: RowAction = { name: "details", label: "Details", key: "Enter", changes: false };
 
 /** By whose name a row is called. */
-const nameKey = (row: Row): Key => (row.kind === "target" ? row.relation.child : ownerOf(row));
+const nameKey = (row: OutlineItem): Key =>
+  row.kind === "target" ? row.relation.child : ownerOf(row);
 
-function ownerOf(row: Row): Key {
+function ownerOf(row: OutlineItem): Key {
   switch (row.kind) {
     case "entry":
       return ENTRY;

@@ -5,11 +5,11 @@ import { relationId } from "../graph/document-keys";
 import { removeActions, removeNotes, removeRelation, setResponse, swapOrder } from "../graph/edit";
 import { ENTRY, type Key, spokenOutcomes } from "../graph/model";
 import { endName } from "../graph/relation-words";
-import type { Change } from "./row-edit";
-import type { Row } from "./rows";
+import type { RowEditKind } from "./row-edit";
+import type { OutlineItem } from "./rows";
 
 export interface RowAction {
-  readonly name: Change | "delete" | "up" | "down" | "details" | "comments";
+  readonly name: RowEditKind | "delete" | "up" | "down" | "details" | "comments";
   readonly label: string;
   /** As in `KeyboardEvent.key`, with `Alt+` before it where needed. */
   readonly key: string;
@@ -32,7 +32,7 @@ const RESPONSE: RowAction = {
 };
 const TARGET: RowAction = { name: "target", label: "Lead it elsewhere …", key: "t", changes: true };
 
-export function rowActionsOf(row: Row): readonly RowAction[] {
+export function rowActionsOf(row: OutlineItem): readonly RowAction[] {
   switch (row.kind) {
     case "entry":
       return [{ ...CONNECT, label: "Start with …" }];
@@ -49,14 +49,17 @@ export function rowActionsOf(row: Row): readonly RowAction[] {
   }
 }
 
-export function rowActionFor(row: Row, event: { key: string; altKey: boolean }): RowAction | null {
+export function rowActionFor(
+  row: OutlineItem,
+  event: { key: string; altKey: boolean },
+): RowAction | null {
   const pressed = event.altKey ? `Alt+${event.key}` : event.key;
   const key = pressed === "Backspace" ? "Delete" : pressed;
   return rowActionsOf(row).find((rowAction) => rowAction.key === key) ?? null;
 }
 
 /** Takes a row away: an action with its arrows, or what one outcome says to one target. */
-export function removeRow(context: EditorContext, row: Row): string {
+export function removeRow(context: EditorContext, row: OutlineItem): string {
   if (row.kind === "action") {
     const name = endName(context.graph, row.action.key);
     removeActions(context.doc, [row.action.key]);
@@ -78,7 +81,7 @@ export function removeRow(context: EditorContext, row: Row): string {
 }
 
 /** The relation through which a row stands where it stands. */
-function way(context: EditorContext, row: Row): { parent: Key; child: Key } | null {
+function way(context: EditorContext, row: OutlineItem): { parent: Key; child: Key } | null {
   if (row.kind === "target") return row.relation;
   if (row.kind !== "action") return null;
   const into = context.graph.relations.filter(({ child }) => child === row.action.key);
@@ -86,7 +89,7 @@ function way(context: EditorContext, row: Row): { parent: Key; child: Key } | nu
 }
 
 /** Changes places with the sibling before or after it, in the order in which they are started. */
-export function moveRow(context: EditorContext, row: Row, step: -1 | 1): string {
+export function moveRow(context: EditorContext, row: OutlineItem, step: -1 | 1): string {
   const here = way(context, row);
   const siblings = context.graph.relations
     .filter(({ parent }) => parent === here?.parent)

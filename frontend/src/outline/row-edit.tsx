@@ -9,13 +9,13 @@ import { changeNote } from "../graph/edit/notes";
 import { ENTRY, EXIT, type Precondition, RESPONSES, type Response } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import style from "./outline.module.css";
-import type { Row } from "./rows";
+import type { OutlineItem } from "./rows";
 
-export type Change = "rename" | "connect" | "response" | "target";
+export type RowEditKind = "rename" | "connect" | "response" | "target";
 
 interface Props {
-  row: Row;
-  change: Change;
+  row: OutlineItem;
+  change: RowEditKind;
   /** With the id of what is selected next, if that is something new. */
   onDone: (said: string | null) => void;
 }

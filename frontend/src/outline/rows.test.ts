@@ -6,12 +6,12 @@ import { addAction, connect, setEntry, setExit, setResponse } from "../graph/edi
 import { writeNote } from "../graph/edit/notes";
 import { type Graph, PRECONDITIONS } from "../graph/model";
 import { readGraph } from "../graph/read";
-import { inOrder, type Row, rowsOf } from "./rows";
+import { inOrder, type OutlineItem, rowsOf } from "./rows";
 
 const read = (doc: Y.Doc) => readGraph(mapsOf(doc));
 const all = () => true;
 
-function words(graph: Graph, row: Row): string {
+function words(graph: Graph, row: OutlineItem): string {
   const name = (key: string) => graph.actions.find((a) => a.key === key)?.name ?? key;
   switch (row.kind) {
     case "entry":

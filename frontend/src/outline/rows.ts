@@ -13,7 +13,7 @@ import {
   type Response,
 } from "../graph/model";
 
-interface Place {
+interface OutlinePosition {
   readonly id: string;
   readonly level: 1 | 2 | 3;
   /** The row above it in the tree; null at the top. */
@@ -25,7 +25,7 @@ interface Place {
   readonly of: number;
 }
 
-export type Row = Place &
+export type OutlineItem = OutlinePosition &
   (
     | { readonly kind: "entry" }
     | { readonly kind: "action"; readonly action: Action; readonly follows: number }
@@ -73,10 +73,10 @@ export function inOrder(graph: Graph, children = childrenOf(graph)): Action[] {
 }
 
 /** `isOpen` says of an action or outcome, by the id of its row, whether its children are shown. */
-export function rowsOf(graph: Graph, isOpen: (id: string) => boolean): Row[] {
+export function rowsOf(graph: Graph, isOpen: (id: string) => boolean): OutlineItem[] {
   const children = childrenOf(graph);
   const actions = inOrder(graph, children);
-  const rows: Row[] = [];
+  const rows: OutlineItem[] = [];
   const notes = notesOf(graph);
   const of = 1 + actions.length + notes.length;
   const starts = children.get(ENTRY) ?? [];
@@ -102,7 +102,7 @@ function outcomes(
   action: Action,
   after: readonly Relation[],
   isOpen: (id: string) => boolean,
-): Row[] {
+): OutlineItem[] {
   const said = PRECONDITIONS.map((outcome) => ({
     outcome,
     answers: after.filter((relation) => relation.conditions[outcome] !== "ignore"),
@@ -118,7 +118,7 @@ function outcomes(
     const id = `${action.key}|${outcome}`;
     const shown = outcome === "on_true" ? [...answers, ...mute] : answers;
     const open = isOpen(id);
-    const row: Row = {
+    const row: OutlineItem = {
       kind: "outcome",
       id,
       level: 2,
@@ -138,7 +138,7 @@ function targets(
   outcome: Precondition,
   parent: string,
   level: 2 | 3,
-): Row[] {
+): OutlineItem[] {
   return relations.map((relation, i) => ({
     kind: "target",
     id: `${relationId(relation)}|${outcome}`,
@@ -165,7 +165,7 @@ export function namesOf(graph: Graph): ReadonlyMap<Key, string> {
 }
 
 /** What is selected in the graph when a row is. */
-export function subjectOf(row: Row): string {
+export function subjectOf(row: OutlineItem): string {
   switch (row.kind) {
     case "entry":
       return ENTRY;

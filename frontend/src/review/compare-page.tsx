@@ -5,7 +5,7 @@ import { useQuery } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
-import { sentence } from "../api/http";
+import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import {
   type ComparedField,
@@ -16,9 +16,9 @@ import {
   useComparison,
 } from "../api/review";
 import { getRun, type Run, type Visit } from "../api/runs";
-import { spanWords, tookWords } from "../status/durations";
-import { endWords, runWord, tookOf } from "../status/progress";
-import { StateWord } from "../status/state-label";
+import { boundsText, durationText } from "../status/durations";
+import { runEndText, runLabel, visitDuration } from "../status/progress";
+import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, useNow } from "../ui/times";
 import style from "./compare-page.module.css";
@@ -31,7 +31,7 @@ function outcome(visit: Visit): string {
 
 function took(visit: Visit): string {
   if (visit.until === null) return "no end seen";
-  return tookWords(tookOf(visit)) ?? "its code may go on";
+  return durationText(visitDuration(visit)) ?? "its code may go on";
 }
 
 function VisitCell({ visit, slower }: { visit: Visit | null; slower: boolean }) {
@@ -40,7 +40,7 @@ function VisitCell({ visit, slower }: { visit: Visit | null; slower: boolean }) 
   const tone = result ?? (visit.until === null ? "run" : "unknown");
   return (
     <span className={style.visit}>
-      <StateWord tone={tone} word={outcome(visit)} />
+      <StateLabel tone={tone} word={outcome(visit)} />
       <span className={style.took} data-slower={slower || undefined}>
         {took(visit)}
         {slower && " · slower"}
@@ -166,17 +166,17 @@ function Head({ run, title }: { run: Run; title: string }) {
   const now = useNow(60_000);
   const start = instant(run.started_at);
   const end = instant(run.ended_at);
-  const { tone, word } = runWord(run);
+  const { tone, word } = runLabel(run);
   return (
     <section className={style.run} aria-label={title}>
       <Link to={`/runs/${run.id}`} className={style.link}>
         Run {run.number} · {run.graph_name}
       </Link>
-      <StateWord pill tone={tone} word={end === null ? word : endWords(run)} />
+      <StateLabel pill tone={tone} word={end === null ? word : runEndText(run)} />
       <span className={style.meta}>
         {run.simulated ? "simulator" : run.engine} · {authorName(run.author)}
         {start !== null && ` · ${day(start, now)} ${clock(start)}`}
-        {end !== null && spanWords(run.took) && ` · ${spanWords(run.took)}`}
+        {end !== null && boundsText(run.took) && ` · ${boundsText(run.took)}`}
       </span>
     </section>
   );
@@ -248,7 +248,7 @@ function Choose({ runner, b }: { runner: string; b: string }) {
   });
   const choices = (others.data ?? [])
     .filter((run) => run.id !== b)
-    .map((run) => ({ value: run.id, label: `Run ${run.number} · ${endWords(run)}` }));
+    .map((run) => ({ value: run.id, label: `Run ${run.number} · ${runEndText(run)}` }));
   return (
     <Empty icon={<IconArrowsDiff size={22} />} title="Compare with which run?">
       <Select
@@ -293,7 +293,7 @@ export function ComparePage({ bar }: { bar: (parts: RunBarParts) => ReactNode })
         )}
         {found.isError && (
           <Empty icon={<IconAlertTriangle size={22} />} title="These runs cannot be compared">
-            {sentence(found.error)}
+            {errorText(found.error)}
           </Empty>
         )}
         {found.data && <Found found={found.data} />}

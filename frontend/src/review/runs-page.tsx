@@ -13,7 +13,7 @@ import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
-import { sentence } from "../api/http";
+import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import {
   filterOf,
@@ -23,10 +23,10 @@ import {
   queryOf,
   type RunFilter,
 } from "../api/review";
-import { hasEnded, placeOf, type Run } from "../api/runs";
-import { spanWords } from "../status/durations";
-import { endWords, runWord } from "../status/progress";
-import { StateWord } from "../status/state-label";
+import { hasEnded, type Run, runPlace } from "../api/runs";
+import { boundsText } from "../status/durations";
+import { runEndText, runLabel } from "../status/progress";
+import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";
 import { useVersionLabel } from "./run/use-version-label";
@@ -66,10 +66,10 @@ interface RunRowProps {
 function Row({ run, now, chosen, onChoose }: RunRowProps) {
   const [, go] = useLocation();
   const label = useVersionLabel(run);
-  const { tone, word } = runWord(run);
+  const { tone, word } = runLabel(run);
   const start = instant(run.started_at);
   const end = instant(run.ended_at);
-  const over = end === null ? null : (spanWords(run.took) ?? "—");
+  const over = end === null ? null : (boundsText(run.took) ?? "—");
   const took = over ?? (start === null ? "" : stopwatch(now - start));
   const to = `/runs/${run.id}`;
   return (
@@ -84,7 +84,7 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
         />
       </td>
       <td className={style.state}>
-        <StateWord tone={tone} word={run.ended_at === null ? word : endWords(run)} />
+        <StateLabel tone={tone} word={run.ended_at === null ? word : runEndText(run)} />
       </td>
       <td>
         <Link to={to} className={style.link} onClick={(event) => event.stopPropagation()}>
@@ -101,7 +101,7 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
       <td>
         <span className={style.version}>{label}</span>
       </td>
-      <td className={style.quiet}>{placeOf(run)}</td>
+      <td className={style.quiet}>{runPlace(run)}</td>
       <td>{authorName(run.author)}</td>
       <td className={style.quiet}>{start !== null && `${day(start, now)} ${clock(start)}`}</td>
       <td className={style.took}>{took}</td>
@@ -179,7 +179,7 @@ function BringExamples({ runner, onDone }: { runner: string | undefined; onDone:
     mutationFn: () => importExamples(runner ?? ""),
     onSuccess: onDone,
     onError: (error) =>
-      notifications.show({ color: "red", title: "Not taken in", message: sentence(error) }),
+      notifications.show({ color: "red", title: "Not taken in", message: errorText(error) }),
   });
   return (
     <Button
@@ -258,7 +258,7 @@ export function RunsPage() {
         {listed.isPending && <Waiting />}
         {listed.isError && runs.length === 0 && (
           <Empty icon={<IconAlertTriangle size={22} />} title="The runs cannot be read">
-            {sentence(listed.error)} What was recorded is safe; it shows again when the runner
+            {errorText(listed.error)} What was recorded is safe; it shows again when the runner
             answers.
           </Empty>
         )}

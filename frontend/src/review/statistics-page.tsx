@@ -3,19 +3,19 @@ import { Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconChartBar } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link, useSearch } from "wouter";
-import { sentence } from "../api/http";
+import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
-import type { Run, Took } from "../api/runs";
-import { spanWords } from "../status/durations";
-import { runWord } from "../status/progress";
+import type { DurationBounds, Run } from "../api/runs";
+import { boundsText } from "../status/durations";
+import { runLabel } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import type { RunBarParts } from "./run/run-page";
 import style from "./statistics-page.module.css";
 
-const seconds = (took: Took | null) => spanWords(took) ?? "—";
-const high = (took: Took | null) => took?.most ?? took?.least ?? 0;
+const seconds = (took: DurationBounds | null) => boundsText(took) ?? "—";
+const high = (took: DurationBounds | null) => took?.most ?? took?.least ?? 0;
 
 /** One bar per run, the oldest on the left; its height is how long it took. */
 function RunBars({ runs }: { runs: Statistics["runs"] }) {
@@ -24,7 +24,7 @@ function RunBars({ runs }: { runs: Statistics["runs"] }) {
   return (
     <ol className={style.bars} aria-label="Runs, the oldest first">
       {ordered.map((run) => {
-        const { tone, word } = runWord(run as unknown as Run);
+        const { tone, word } = runLabel(run as unknown as Run);
         const text = `Run ${run.number}: ${word}, ${seconds(run.span)}`;
         return (
           <li key={run.id}>
@@ -221,7 +221,7 @@ export function StatisticsPage({ bar }: { bar: (parts: RunBarParts) => ReactNode
         )}
         {found.isError && (
           <Empty icon={<IconAlertTriangle size={22} />} title="There are no figures">
-            {sentence(found.error)}
+            {errorText(found.error)}
           </Empty>
         )}
         {found.data?.runs.length === 0 && (

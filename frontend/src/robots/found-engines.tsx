@@ -2,25 +2,25 @@
 import { Button } from "@mantine/core";
 import { IconRadar2 } from "@tabler/icons-react";
 import { useLive } from "../api/live/use-live";
-import { type Candidate, useCandidates } from "../api/robots";
+import { type FoundEngine, useFoundEngines } from "../api/robots";
 import style from "./found-engines.module.css";
 
 interface Props {
   may: boolean;
   on: boolean;
-  onTake: (candidate: Candidate) => void;
+  onTake: (candidate: FoundEngine) => void;
 }
 
-function words(candidate: Candidate): string {
+function words(candidate: FoundEngine): string {
   if (candidate.problem !== "") return candidate.problem;
   if (candidate.generation === "older") return "speaks an older generation of messages";
   if (candidate.actor === "") return "an idle engine does not say its name: you have to know it";
   return "heard by its feedback";
 }
 
-export function Candidates({ may, on, onTake }: Props) {
+export function FoundEngines({ may, on, onTake }: Props) {
   const { runner } = useLive();
-  const found = useCandidates(runner, on).data ?? [];
+  const found = useFoundEngines(runner, on).data ?? [];
   if (found.length === 0) return null;
   return (
     <section className={style.section} aria-label="In sight, not registered">

@@ -1,7 +1,7 @@
 /** The actions and graphs that a robot has indexed. */
 import { Text } from "@mantine/core";
 import { useLive } from "../api/live/use-live";
-import { useKnown } from "../api/robots";
+import { useIndexedByRobot } from "../api/robots";
 import style from "./indexed-actions.module.css";
 
 function parameters(inputs: Record<string, string>): string {
@@ -10,9 +10,9 @@ function parameters(inputs: Record<string, string>): string {
     .join(", ");
 }
 
-export function KnownHere({ robot }: { robot: string }) {
+export function IndexedActions({ robot }: { robot: string }) {
   const { runner } = useLive();
-  const known = useKnown(runner, robot, true);
+  const known = useIndexedByRobot(runner, robot, true);
   if (known.isPending) return <Text c="dimmed">Reading …</Text>;
   if (known.isError) return <Text c="var(--error)">What it knows cannot be read now.</Text>;
   const { actions, graphs, unread } = known.data;

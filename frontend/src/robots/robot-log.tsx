@@ -3,10 +3,10 @@ import { Button, Text } from "@mantine/core";
 import { IconFileImport } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { useLive } from "../api/live/use-live";
-import { commandedGraph, type Told, useFlight } from "../api/robots";
+import { commandedGraph, type RobotLogLine, useRobotLog } from "../api/robots";
 import { clock, day, instant } from "../ui/times";
 import style from "./robot-log.module.css";
-import { complain } from "./robot-runs";
+import { notifyRobotFailure } from "./robot-runs";
 
 interface Props {
   robot: string;
@@ -29,7 +29,7 @@ const BECAME: Readonly<Record<string, string>> = {
 };
 
 /** A sentence of one line; what it did to a run of ours comes after it. */
-export function wordsOf(told: Told): string {
+export function robotLogText(told: RobotLogLine): string {
   switch (told.kind) {
     case "commanded":
       return `Somebody else ${DONE[told.command] ?? told.command} ${told.graph || "a graph"}`;
@@ -45,7 +45,7 @@ export function wordsOf(told: Told): string {
 }
 
 /** What a command of somebody else did to a run from here. */
-function Effect({ told }: { told: Told }) {
+function Effect({ told }: { told: RobotLogLine }) {
   if (told.run === null) return null;
   const stopped = told.command === "start" || told.command === "stop";
   return (
@@ -55,20 +55,20 @@ function Effect({ told }: { told: Told }) {
   );
 }
 
-function Line({ robot, told, onImport }: Props & { told: Told }) {
+function Line({ robot, told, onImport }: Props & { told: RobotLogLine }) {
   const { runner } = useLive();
   const at = instant(told.at) ?? 0;
   const take = () =>
     commandedGraph(runner ?? "", robot, told.seq)
       .then((text) => onImport(text, told.graph))
-      .catch((error: unknown) => complain("Not imported", error));
+      .catch((error: unknown) => notifyRobotFailure("Not imported", error));
   return (
     <li className={style.line} data-kind={told.kind}>
       <time dateTime={told.at}>
         {day(at, Date.now())} {clock(at)}
       </time>
       <span className={style.words}>
-        {wordsOf(told)} <Effect told={told} />
+        {robotLogText(told)} <Effect told={told} />
       </span>
       {told.has_graph && (
         <Button
@@ -84,9 +84,9 @@ function Line({ robot, told, onImport }: Props & { told: Told }) {
   );
 }
 
-export function FlightRecord({ robot, onImport }: Props) {
+export function RobotLog({ robot, onImport }: Props) {
   const { runner } = useLive();
-  const flight = useFlight(runner, robot, true);
+  const flight = useRobotLog(runner, robot, true);
   if (flight.isPending) return <Text c="dimmed">Reading …</Text>;
   if (flight.isError) return <Text c="var(--error)">The record cannot be read now.</Text>;
   if (flight.data.length === 0) {

@@ -3,11 +3,11 @@ import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconFileImport, IconSquareFilled } from "@tabler/icons-react";
 import { Link } from "wouter";
-import { sentence } from "../api/http";
+import { errorText } from "../api/http";
 import { foreignGraphs, openRuns, useLive } from "../api/live/use-live";
 import { heldGraph, type Robot, stopRobot } from "../api/robots";
-import { runWord } from "../status/progress";
-import { StateWord } from "../status/state-label";
+import { runLabel } from "../status/progress";
+import { StateLabel } from "../status/state-label";
 import style from "./robot-runs.module.css";
 
 interface Props {
@@ -15,8 +15,8 @@ interface Props {
   onImport: (text: string, name: string) => void;
 }
 
-export function complain(title: string, error: unknown): void {
-  notifications.show({ color: "red", title, message: sentence(error) });
+export function notifyRobotFailure(title: string, error: unknown): void {
+  notifications.show({ color: "red", title, message: errorText(error) });
 }
 
 function Foreign(props: Props & { graph: string; stopping: string | null; state: string }) {
@@ -25,14 +25,14 @@ function Foreign(props: Props & { graph: string; stopping: string | null; state:
   const take = () =>
     heldGraph(runner ?? "", robot.name, graph)
       .then((text) => onImport(text, graph))
-      .catch((error: unknown) => complain(`${graph} was not imported`, error));
+      .catch((error: unknown) => notifyRobotFailure(`${graph} was not imported`, error));
   const stop = () =>
     stopRobot(runner ?? "", robot.name).catch((error: unknown) =>
-      complain(`NOT SENT: use the hardware stop of ${robot.name}`, error),
+      notifyRobotFailure(`NOT SENT: use the hardware stop of ${robot.name}`, error),
     );
   return (
     <li className={style.line}>
-      <StateWord tone="unknown" word={stopping === null ? state.toLowerCase() : "stopping"} />
+      <StateLabel tone="unknown" word={stopping === null ? state.toLowerCase() : "stopping"} />
       <span className={style.name}>{graph}</span>
       <span className={style.quiet}>
         {stopping ? `STOP UNCONFIRMED: ${stopping}` : "not started from here"}
@@ -58,7 +58,7 @@ function Foreign(props: Props & { graph: string; stopping: string | null; state:
   );
 }
 
-export function RunsHere({ robot, onImport }: Props) {
+export function RobotRuns({ robot, onImport }: Props) {
   const { now } = useLive();
   const own = openRuns(now).filter((run) => run.engine === robot.name);
   const foreign = foreignGraphs(now).filter((each) => each.robot.name === robot.name);
@@ -74,7 +74,7 @@ export function RunsHere({ robot, onImport }: Props) {
     <ul className={style.list} aria-label={`What runs on ${robot.name}`}>
       {own.map((run) => (
         <li key={run.id} className={style.line}>
-          <StateWord {...runWord(run)} />
+          <StateLabel {...runLabel(run)} />
           <Link to={`/runs/${run.id}`} className={style.name}>
             Run {run.number} of {run.graph_name}
           </Link>

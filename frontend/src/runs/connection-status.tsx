@@ -1,6 +1,6 @@
 /** Whether the page hears the runner, and how old what it shows of a run is, in words. */
 import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
-import { useLive, useSeen } from "../api/live/use-live";
+import { useLive, useRunSeenAt } from "../api/live/use-live";
 import type { Run } from "../api/runs";
 import { clock, duration, useNow } from "../ui/times";
 import style from "./connection-status.module.css";
@@ -8,8 +8,8 @@ import style from "./connection-status.module.css";
 const OLD = 2_500; // ms; a run is looked at each second
 
 /** "proof 0.4 s ago": when the engine itself last showed this run. `whose`: its name stands before. */
-export function Proof({ run, whose = false }: { run: Run; whose?: boolean }) {
-  const seen = useSeen(run.id);
+export function LastSeen({ run, whose = false }: { run: Run; whose?: boolean }) {
+  const seen = useRunSeenAt(run.id);
   const goes = run.ended_at === null;
   const present = useNow(500, goes);
   if (!goes) return null;
@@ -26,12 +26,12 @@ export function Proof({ run, whose = false }: { run: Run; whose?: boolean }) {
   );
 }
 
-export function LiveWord({ run, whose = false }: { run?: Run | null; whose?: boolean }) {
+export function ConnectionStatus({ run, whose = false }: { run?: Run | null; whose?: boolean }) {
   const { now } = useLive();
   if (now.link === "live") {
     return (
       <span className={style.both}>
-        {run && run.ended_at === null && !run.simulated && <Proof run={run} whose={whose} />}
+        {run && run.ended_at === null && !run.simulated && <LastSeen run={run} whose={whose} />}
         <span className={style.word} data-link="live">
           <i aria-hidden /> Live
         </span>

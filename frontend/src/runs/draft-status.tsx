@@ -4,8 +4,8 @@ import type { Run } from "../api/runs";
 import { differences } from "../graph/meaning";
 import type { Graph } from "../graph/model";
 import style from "./draft-status.module.css";
-import { SendChange } from "./modify-run";
-import { useRunning } from "./use-running-graph";
+import { ModifyRun } from "./modify-run";
+import { useRunningGraph } from "./use-running-graph";
 
 interface Props {
   run: Run | null;
@@ -18,8 +18,8 @@ interface Props {
   obstacle: string | null;
 }
 
-export function DraftWord({ run, label, graph, seq, settle, obstacle }: Props) {
-  const running = useRunning(run);
+export function DraftStatus({ run, label, graph, seq, settle, obstacle }: Props) {
+  const running = useRunningGraph(run);
   const found = useMemo(
     () => (running === null || running.seq === seq ? [] : differences(running.graph, graph)),
     [running, seq, graph],
@@ -29,7 +29,7 @@ export function DraftWord({ run, label, graph, seq, settle, obstacle }: Props) {
     <span className={style.word} data-differs={found.length > 0 || undefined}>
       {found.length > 0 ? "Draft differs from running" : "Running"} <i>{label}</i>
       {found.length > 0 && (
-        <SendChange
+        <ModifyRun
           run={run}
           label={label}
           found={found}

@@ -3,16 +3,16 @@ import { Button, Modal, Text } from "@mantine/core";
 import { IconArrowRight, IconMinus, IconPencil, IconPlus, IconSend } from "@tabler/icons-react";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { keys, useVersions } from "../api/graphs";
-import { sentence } from "../api/http";
+import { queryKeys, useVersions } from "../api/graphs";
+import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import type { Robot } from "../api/robots";
-import { modifyRun, playedBy, type Run } from "../api/runs";
+import { abilitiesOf, modifyRun, type Run } from "../api/runs";
 import { useMay } from "../api/use-person";
 import type { MeaningDifference } from "../graph/meaning";
 import { HoldButton } from "../ui/hold-button";
 import style from "./modify-run.module.css";
-import { complain, nextLabel, published } from "./start/use-start";
+import { nextLabel, notifyFailure, publishedVersion } from "./start/use-start";
 
 interface Props {
   run: Run;
@@ -28,7 +28,7 @@ const SIGNS = { added: IconPlus, removed: IconMinus, changed: IconPencil } as co
 const MOST = 40; // differences that are listed
 
 /** Why a running graph cannot be changed; null when it can. */
-export function whyNot(run: Run, engine: Robot | undefined, obstacle: string | null) {
+export function modifyObstacle(run: Run, engine: Robot | undefined, obstacle: string | null) {
   const where = run.simulated ? "the simulator" : run.engine;
   if (run.state !== "running" && run.state !== "paused") return `Run ${run.number} is ${run.state}`;
   if (run.desired === "stopped") return `Run ${run.number} is being stopped`;
@@ -65,30 +65,31 @@ function List({ found }: { found: readonly MeaningDifference[] }) {
   );
 }
 
-export function SendChange({ run, label, found, seq, settle, obstacle }: Props) {
+export function ModifyRun({ run, label, found, seq, settle, obstacle }: Props) {
   const { runner, now } = useLive();
   const client = useQueryClient();
   const [asking, setAsking] = useState<number | null>(null);
   const may = useMay(run.simulated ? "simulate" : "operate");
   const versions = useVersions(run.graph ?? "").data ?? [];
-  const why = whyNot(
+  const why = modifyObstacle(
     run,
-    now.engines.find((each) => each.name === playedBy(run)),
+    now.engines.find((each) => each.name === abilitiesOf(run)),
     now.link === "down" ? "The runner does not answer" : obstacle,
   );
   const where = run.simulated ? "the simulator" : run.engine;
   const send = useMutation({
     mutationFn: async (at: number) => {
       const graph = run.graph ?? "";
-      const { version, umrf } = await published(graph, at);
-      void client.invalidateQueries({ queryKey: keys.versions(graph) });
+      const { version, umrf } = await publishedVersion(graph, at);
+      void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
       return modifyRun(runner ?? "", run.id, { id: version.id, digest: version.digest, umrf });
     },
     onSuccess: () => setAsking(null),
-    onError: (error) => complain("Not sent", sentence(error)),
+    onError: (error) => notifyFailure("Not sent", errorText(error)),
   });
   if (!may) return null;
-  const ask = () => void settle().then(setAsking, (error) => complain("Not sent", sentence(error)));
+  const ask = () =>
+    void settle().then(setAsking, (error) => notifyFailure("Not sent", errorText(error)));
   const next = nextLabel(versions, asking ?? seq);
   return (
     <>

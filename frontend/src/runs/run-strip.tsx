@@ -5,18 +5,18 @@ import { useMemo } from "react";
 import { Link } from "wouter";
 import { authorName } from "../api/graphs";
 import { useLive } from "../api/live/use-live";
-import { alarmNow, type Run } from "../api/runs";
+import { currentAlarm, type Run } from "../api/runs";
 import type { Graph } from "../graph/model";
-import { spanWords } from "../status/durations";
-import { endWords, runWord } from "../status/progress";
-import { StateWord } from "../status/state-label";
+import { boundsText } from "../status/durations";
+import { runEndText, runLabel } from "../status/progress";
+import { StateLabel } from "../status/state-label";
 import { Timeline } from "../status/timeline";
 import { lanesOf } from "../status/timeline-lanes";
 import { colorOfName } from "../ui/name-colors";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";
 import { PauseButton } from "./pause-button";
 import style from "./run-strip.module.css";
-import { RestButton } from "./stop/confirm-rest-button";
+import { ConfirmRestButton } from "./stop/confirm-rest-button";
 
 /** What the notice shouts on every page already. */
 const SHOUTED: ReadonlySet<string> = new Set(["stop_unconfirmed", "moves_again"]);
@@ -63,7 +63,7 @@ function Whose({ run, going, onChoose }: Pick<Props, "going" | "onChoose"> & { r
           key={each.id}
           type="button"
           aria-pressed={each.id === run.id}
-          aria-label={`Run ${each.number} on ${each.engine}, ${runWord(each).word}`}
+          aria-label={`Run ${each.number} on ${each.engine}, ${runLabel(each).word}`}
           onClick={() => onChoose(each.id)}
         >
           <Robot name={each.engine} />
@@ -85,7 +85,7 @@ const SHORT = 60; // characters that fit beside the rest
 
 /** What a person must know of it now, or why it ended so. */
 function toldOf(run: Run): string {
-  const alarm = alarmNow(run)?.text ?? "";
+  const alarm = currentAlarm(run)?.text ?? "";
   return run.ended_at === null ? alarm : run.detail || alarm;
 }
 
@@ -114,9 +114,9 @@ export function RunStrip(props: Props) {
   const until = down ? now.since : present;
   const when = day(start, present);
   const started = when === "today" ? `at ${clock(start)}` : `${when} ${clock(start)}`;
-  const { tone, word } = runWord(run);
+  const { tone, word } = runLabel(run);
   const told = toldOf(run);
-  const announces = goes && !SHOUTED.has(alarmNow(run)?.code ?? "");
+  const announces = goes && !SHOUTED.has(currentAlarm(run)?.code ?? "");
   const inLine = folded === true || told.length < SHORT;
   const unsure = down && goes;
   const silent = goes ? instant(run.unknown_since) : null;
@@ -131,15 +131,15 @@ export function RunStrip(props: Props) {
         <b>Run {run.number}</b>
         <Whose run={run} going={going} onChoose={onChoose} />
         <span className={style.version}>{versionLabel}</span>
-        <StateWord
+        <StateLabel
           pill
           tone={unsure ? "unknown" : tone}
-          word={unsure ? `unknown since ${clock(now.since)}` : goes ? word : endWords(run)}
+          word={unsure ? `unknown since ${clock(now.since)}` : goes ? word : runEndText(run)}
         />
         <Text span c="dimmed" size="xs" truncate>
           {run.simulated && "simulated · "}
           started by {authorName(run.author)} {started} ·{" "}
-          {(!goes && spanWords(run.took)) || stopwatch((instant(run.ended_at) ?? until) - start)}
+          {(!goes && boundsText(run.took)) || stopwatch((instant(run.ended_at) ?? until) - start)}
         </Text>
         <span className={style.gap} />
         {inLine && told !== "" && (
@@ -147,7 +147,7 @@ export function RunStrip(props: Props) {
             {told}
           </span>
         )}
-        {goes && <RestButton run={run} />}
+        {goes && <ConfirmRestButton run={run} />}
         {!run.recorded && <span className={style.alarm}>not recorded</span>}
         {goes && <PauseButton run={run} />}
         <Button

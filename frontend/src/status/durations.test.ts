@@ -1,7 +1,7 @@
 /** How long something took is told no more exactly than it was seen. */
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { spanWords, tookWords } from "./durations";
+import { boundsText, durationText } from "./durations";
 
 test.each([
   [null, null, null],
@@ -16,7 +16,7 @@ test.each([
   [5_000, Number.POSITIVE_INFINITY, "≥ 5.0 s"],
   [0, Number.POSITIVE_INFINITY, null],
 ])("%s ms, %s at most: %s", (took, atMost, words) => {
-  expect(tookWords({ took, atMost })).toBe(words);
+  expect(durationText({ took, atMost })).toBe(words);
 });
 
 const seconds = (words: string) => Number(words.replace(" s", ""));
@@ -25,7 +25,7 @@ test("no range is told narrower than it is", () => {
   const ms = fc.integer({ min: 0, max: 59_000 });
   fc.assert(
     fc.property(ms, fc.integer({ min: 2, max: 900 }), (least, more) => {
-      const words = spanWords({ least: least / 1000, most: (least + more) / 1000 }) ?? "";
+      const words = boundsText({ least: least / 1000, most: (least + more) / 1000 }) ?? "";
       const [from, to] = words.startsWith("≤ ") ? ["0", words.slice(2)] : words.split("–");
       expect(seconds(from ?? "") * 1000).toBeLessThanOrEqual(least + 1e-6);
       expect(seconds(to ?? "") * 1000).toBeGreaterThanOrEqual(least + more - 1e-6);

@@ -1,6 +1,6 @@
 /** How long something took, in words: exactly, or between two bounds, which are never told closer. */
 
-import type { Took } from "../api/runs";
+import type { DurationBounds } from "../api/runs";
 import { duration } from "../ui/times";
 import type { Progress } from "./progress";
 
@@ -23,7 +23,7 @@ function between(least: number, most: number): string {
 const EXACT = 1; // ms
 
 /** Null where nothing is known. */
-export function spanWords(took: Took | null | undefined): string | null {
+export function boundsText(took: DurationBounds | null | undefined): string | null {
   if (!took) return null;
   const least = took.least * 1000;
   const most = took.most === null ? Number.POSITIVE_INFINITY : took.most * 1000;
@@ -32,18 +32,18 @@ export function spanWords(took: Took | null | undefined): string | null {
   return between(least, most);
 }
 
-export function tookWords(progress: Pick<Progress, "took" | "atMost">): string | null {
+export function durationText(progress: Pick<Progress, "took" | "atMost">): string | null {
   const { took, atMost } = progress;
   if (took === null || (took === 0 && atMost === null)) return null; // seen in one message only
   const most = atMost === null ? took : atMost;
-  return spanWords({
+  return boundsText({
     least: took / 1000,
     most: most === Number.POSITIVE_INFINITY ? null : most / 1000,
   });
 }
 
 /** The same beside a word of state. */
-export function moreOf(progress: Pick<Progress, "took" | "atMost">): { more?: string } {
-  const words = tookWords(progress);
+export function durationLabel(progress: Pick<Progress, "took" | "atMost">): { more?: string } {
+  const words = durationText(progress);
   return words === null ? {} : { more: words };
 }

@@ -17,7 +17,7 @@ const WORDS: Record<EngineState, { word: string; sign: typeof IconCircleCheck }>
   no_link: { word: "no link", sign: IconHelpCircle },
 };
 
-export function EngineWord({ robot }: { robot: Robot }) {
+export function EngineLabel({ robot }: { robot: Robot }) {
   const { word, sign: Sign } = WORDS[robot.state];
   return (
     <span className={style.word} data-state={robot.state} title={robot.why || undefined}>

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { ActionRun, Run } from "../api/runs";
-import { endWords, progressByAid, progressOf, runWord } from "./progress";
+import { progressByAid, progressOf, runEndText, runLabel } from "./progress";
 
 const run: Run = {
   id: "r",
@@ -65,17 +65,17 @@ test("actions of sub-graphs carry no place on this canvas", () => {
 });
 
 test("a run is called stopped or finished only by its own state", () => {
-  expect(runWord({ ...run, desired: "stopped" }).word).toBe("running");
-  expect(runWord({ ...run, state: "stopping" }).word).toBe("stopping");
+  expect(runLabel({ ...run, desired: "stopped" }).word).toBe("running");
+  expect(runLabel({ ...run, state: "stopping" }).word).toBe("stopping");
   const stopped = { ...run, state: "stopped", stopped_by: { id: "q", name: "Mari" } } as const;
-  expect(endWords(stopped)).toBe("stopped by Mari");
-  expect(runWord({ ...run, state: "finished", result: "on_error" }).tone).toBe("error");
+  expect(runEndText(stopped)).toBe("stopped by Mari");
+  expect(runLabel({ ...run, state: "finished", result: "on_error" }).tone).toBe("error");
 });
 
 test("a run that moves again is never called by the end that it had", () => {
   const again = { ...run, desired: "stopped", state: "stopping", moves_again_at: "t" } as const;
-  expect(runWord(again)).toEqual({ tone: "error", word: "MOVES AGAIN" });
-  expect(runWord({ ...again, state: "unknown", unknown_since: "t" }).word).toBe("MOVES AGAIN");
+  expect(runLabel(again)).toEqual({ tone: "error", word: "MOVES AGAIN" });
+  expect(runLabel({ ...again, state: "unknown", unknown_since: "t" }).word).toBe("MOVES AGAIN");
 });
 
 test("what is known between bounds is no value, and what may go on has no upper one", () => {
@@ -90,6 +90,6 @@ test("what is known between bounds is no value, and what may go on has no upper 
 
 test("a run that finished with a result that nobody told is not called true", () => {
   const over = { ...run, state: "finished", ended_at: "t" } as const;
-  expect(runWord(over)).toEqual({ tone: "done", word: "finished" });
-  expect(runWord({ ...over, result: "on_true" }).tone).toBe("true");
+  expect(runLabel(over)).toEqual({ tone: "done", word: "finished" });
+  expect(runLabel({ ...over, result: "on_true" }).tone).toBe("true");
 });

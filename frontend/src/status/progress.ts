@@ -22,11 +22,11 @@ export interface Progress {
 
 const time = (text: string | null | undefined): number | null => (text ? Date.parse(text) : null);
 
-export function begun(visit: Visit): number | null {
+export function visitBegin(visit: Visit): number | null {
   return time(visit.from) ?? time(visit.not_before) ?? time(visit.not_after);
 }
 
-export function ended(visit: Visit): number | null {
+export function visitEnd(visit: Visit): number | null {
   return time(visit.until);
 }
 
@@ -68,13 +68,13 @@ function stateOf(action: ActionRun, over: boolean, unsure: boolean): { tone: Ton
     case "FINISHED":
       return finished(last);
     default:
-      if (last !== undefined && ended(last) !== null) return finished(last);
+      if (last !== undefined && visitEnd(last) !== null) return finished(last);
       return { tone: "idle", word: over ? "did not run" : "waits" };
   }
 }
 
 /** How long a visit took at most; null where its ends are known exactly, and while it goes on. */
-export function atMost(visit: Visit): number | null {
+export function visitDurationBound(visit: Visit): number | null {
   const [from, until] = [time(visit.from), time(visit.until)];
   const [before, after] = [time(visit.not_before), time(visit.not_after)];
   if (from === null || until === null || before === null) return null;
@@ -83,10 +83,10 @@ export function atMost(visit: Visit): number | null {
 }
 
 /** How long a visit took, at least and at most, ms. */
-export function tookOf(visit: Visit): Pick<Progress, "took" | "atMost"> {
-  const [from, until] = [begun(visit), ended(visit)];
+export function visitDuration(visit: Visit): Pick<Progress, "took" | "atMost"> {
+  const [from, until] = [visitBegin(visit), visitEnd(visit)];
   const took = from !== null && until !== null ? Math.max(0, until - from) : null;
-  return { took, atMost: atMost(visit) };
+  return { took, atMost: visitDurationBound(visit) };
 }
 
 /** `unsure`: nobody has heard of the run for too long. */
@@ -94,13 +94,13 @@ export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progre
   const over = run.ended_at !== null;
   const { tone, word } = stateOf(action, over, unsure || run.state === "unknown");
   const last = action.visits.at(-1);
-  const from = last ? begun(last) : null;
-  const until = last ? ended(last) : null;
+  const from = last ? visitBegin(last) : null;
+  const until = last ? visitEnd(last) : null;
   return {
     tone,
     word,
     since: until === null && !over ? from : null,
-    ...(last ? tookOf(last) : { took: null, atMost: null }),
+    ...(last ? visitDuration(last) : { took: null, atMost: null }),
     visits: action.visits.length,
     inferred: last?.how === "inferred",
     message: action.messages.at(-1)?.text ?? null,
@@ -137,7 +137,7 @@ const runWords: Record<Run["state"], { tone: Tone; word: string }> = {
 };
 
 /** The run's state, with the result where it has one that says more. */
-export function runWord(run: Run): { tone: Tone; word: string } {
+export function runLabel(run: Run): { tone: Tone; word: string } {
   if (run.moves_again_at) return { tone: "error", word: "MOVES AGAIN" };
   if (run.unconfirmed && run.ended_at === null && run.state !== "running") {
     return { tone: "error", word: run.state === "lost" ? "lost" : "stop unconfirmed" };
@@ -154,8 +154,8 @@ export function runWord(run: Run): { tone: Tone; word: string } {
 }
 
 /** The end in words, for history. */
-export function endWords(run: Run): string {
-  const { word } = runWord(run);
+export function runEndText(run: Run): string {
+  const { word } = runLabel(run);
   const by = run.stopped_by?.name;
   if (run.state === "stopped" && by) return `stopped by ${by}`;
   if (run.at_rest?.by) return `${word}: seen at rest by ${run.at_rest.by.name}`;

@@ -41,7 +41,7 @@ interface Props {
   pill?: boolean;
 }
 
-export function StateWord({ tone, word, more, pill = false }: Props) {
+export function StateLabel({ tone, word, more, pill = false }: Props) {
   const Sign = signs[tone];
   return (
     <span

@@ -3,9 +3,9 @@ import { Fragment, type PointerEvent, useEffect, useRef } from "react";
 import type { Run, Visit } from "../api/runs";
 import { colorOfName } from "../ui/name-colors";
 import { duration, instant } from "../ui/times";
-import { moreOf } from "./durations";
-import { begun, ended, progressOf, type Tone } from "./progress";
-import { StateWord, toneColor } from "./state-label";
+import { durationLabel } from "./durations";
+import { progressOf, type Tone, visitBegin, visitEnd } from "./progress";
+import { StateLabel, toneColor } from "./state-label";
 import style from "./timeline.module.css";
 import type { Lane } from "./timeline-lanes";
 
@@ -62,10 +62,10 @@ function barOf(
   until: number,
   over: boolean,
 ): Bar | null {
-  const from = begun(visit);
+  const from = visitBegin(visit);
   if (from === null) return null;
-  const to = ended(visit) ?? until;
-  const open = ended(visit) === null;
+  const to = visitEnd(visit) ?? until;
+  const open = visitEnd(visit) === null;
   const result = visit.result?.replace(/^on_/, "");
   const known =
     result === "true" || result === "false" || result === "error" || result === "stopped";
@@ -128,7 +128,7 @@ function Across(props: {
   );
 }
 
-interface RowProps {
+interface LaneRowProps {
   run: Run;
   lane: Lane;
   axis: { start: number; span: number; end: number };
@@ -137,7 +137,7 @@ interface RowProps {
   onPick: ((aid: string) => void) | undefined;
 }
 
-function LaneRow({ run, lane, axis, unsure, selected, onPick }: RowProps) {
+function LaneRow({ run, lane, axis, unsure, selected, onPick }: LaneRowProps) {
   const over = run.ended_at !== null;
   const ended = instant(run.ended_at) ?? axis.end;
   const action = run.actions?.[lane.name];
@@ -194,7 +194,9 @@ function LaneRow({ run, lane, axis, unsure, selected, onPick }: RowProps) {
         })}
       </div>
       <span className={style.state}>
-        {progress && <StateWord tone={progress.tone} word={progress.word} {...moreOf(progress)} />}
+        {progress && (
+          <StateLabel tone={progress.tone} word={progress.word} {...durationLabel(progress)} />
+        )}
       </span>
     </li>
   );

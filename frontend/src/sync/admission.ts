@@ -6,7 +6,7 @@
  * person never go under another's name.
  */
 
-import { ask, Refusal } from "../api/http";
+import { fetchJson, Refusal } from "../api/http";
 import { currentPerson } from "../api/session";
 import type { RefusalReason } from "./room-connection";
 
@@ -19,7 +19,7 @@ export function admissionCheck(
     try {
       const here = await currentPerson();
       if (here.id !== person) return "other-person";
-      if (again) await ask(`/api/graphs/${encodeURIComponent(graph)}`);
+      if (again) await fetchJson(`/api/graphs/${encodeURIComponent(graph)}`);
       return null;
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;

@@ -2,7 +2,7 @@
 
 import type { Awareness } from "y-protocols/awareness";
 import type * as Y from "yjs";
-import { here } from "../api/page-url";
+import { serverPath } from "../api/page-url";
 import type { CopyOwner, EditStore } from "./indexed-db";
 import type { StrandedEdits } from "./replaced-history";
 
@@ -96,7 +96,7 @@ export interface PersistenceOptions extends CopyOwner {
 
 /** The address of a graph's room on the server that the page came from. */
 export function roomUrl(graph: string, from: string | URL = window.location.href): string {
-  const url = new URL(here(`/api/graphs/${encodeURIComponent(graph)}/room`), from);
+  const url = new URL(serverPath(`/api/graphs/${encodeURIComponent(graph)}/room`), from);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   return url.href;
 }

@@ -2,7 +2,7 @@
 
 import { Fragment, type ReactNode } from "react";
 import { Link } from "wouter";
-import { here } from "../api/page-url";
+import { serverPath } from "../api/page-url";
 import style from "./top-bar.module.css";
 
 export interface Crumb {
@@ -24,7 +24,7 @@ interface Props {
 }
 
 export function Logo() {
-  return <img src={here("/mark.svg")} alt="" width={24} height={24} className={style.mark} />;
+  return <img src={serverPath("/mark.svg")} alt="" width={24} height={24} className={style.mark} />;
 }
 
 /** The focus goes past the bar. */

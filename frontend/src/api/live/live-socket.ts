@@ -1,15 +1,19 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
 import { newAid } from "../../graph/ids";
-import { isFinal, sentence } from "../http";
+import { errorText, isFinal } from "../http";
 import type { Robot } from "../robots";
 import { getRun, postStop, type Run } from "../runs";
 import { sessionEnd } from "../session-end";
-import { forbidden, type Unreached, unreached } from "./unreachable-runner";
+import {
+  blockedByBrowser,
+  findUnreachableReason,
+  type UnreachableReason,
+} from "./unreachable-runner";
 
 export type LiveLink = "connecting" | "live" | "down";
 
 /** A Stop that a person asked for. It is done when the run's own state says so, not before. */
-export interface StopAsked {
+export interface StopRequest {
   id: string;
   run: string | "all";
   at: number;
@@ -21,18 +25,18 @@ export interface StopAsked {
   detail: string;
 }
 
-export interface LiveNow {
+export interface LiveState {
   link: LiveLink;
   /** When the link became what it is, ms. */
   since: number;
   /** Why the link is not there, as far as that was found out. */
-  unreached?: Unreached | null;
+  unreached?: UnreachableReason | null;
   engines: readonly Robot[];
   runs: ReadonlyMap<string, Run>;
-  stops: readonly StopAsked[];
+  stops: readonly StopRequest[];
 }
 
-type Message =
+type RunnerMessage =
   | { type: "hello"; engines: Robot[]; runs: Run[] }
   | { type: "engines"; engines: Robot[] }
   | { type: "run"; run: Run }
@@ -54,8 +58,8 @@ const SELDOM = 60_000; // ms; the same where trying soon has proven to be of no 
 const ALL_HOLDS = 5_000; // ms; later, "all" would mean runs that nobody had seen when it was asked
 
 /** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
-export class Live {
-  now: LiveNow = {
+export class LiveSocket {
+  state: LiveState = {
     link: "connecting",
     since: Date.now(),
     engines: [],
@@ -63,9 +67,9 @@ export class Live {
     stops: [],
   };
   /** When each open run was last shown by its engine, ms. Apart from `now`: it changes each second. */
-  seen: ReadonlyMap<string, number> = new Map();
+  runSeenAt: ReadonlyMap<string, number> = new Map();
   /** When each robot last answered, ms. */
-  heard: ReadonlyMap<string, number> = new Map();
+  robotAnsweredAt: ReadonlyMap<string, number> = new Map();
   readonly #seers = new Set<() => void>();
   readonly #runner: string;
   readonly #listeners = new Set<() => void>();
@@ -75,7 +79,7 @@ export class Live {
   #tries = 0;
   #closed = false;
   /** What was found out about the last socket that did not open. */
-  #unreached: Unreached | null = null;
+  #unreached: UnreachableReason | null = null;
 
   constructor(runner: string) {
     this.#runner = runner;
@@ -122,7 +126,7 @@ export class Live {
   stop(run: string | "all"): void {
     const id = newAid();
     const at = Date.now();
-    const open = [...this.now.runs.values()].filter((each) => each.ended_at === null);
+    const open = [...this.state.runs.values()].filter((each) => each.ended_at === null);
     const meant = open.map((each) => each.id);
     this.#putStop({ id, run, at, state: "asked", detail: "" });
     void this.#keepStopping(id, run, at, meant);
@@ -135,9 +139,9 @@ export class Live {
         for (const each of late ? meant : [run]) await this.#sendStop(each, id);
         this.#answerStop(id, "heard", "");
       } catch (error) {
-        this.#answerStop(id, isFinal(error) ? "refused" : "unheard", sentence(error));
+        this.#answerStop(id, isFinal(error) ? "refused" : "unheard", errorText(error));
       }
-      const now = this.now.stops.find((stop) => stop.id === id);
+      const now = this.state.stops.find((stop) => stop.id === id);
       if (this.#closed || now?.state !== "unheard") return;
       await new Promise((done) => setTimeout(done, AGAIN));
     }
@@ -152,13 +156,13 @@ export class Live {
 
   /** Takes in a run that this page has just started, before the socket tells of it. */
   learn(run: Run): void {
-    if (!this.now.runs.has(run.id)) this.#putRun(run);
+    if (!this.state.runs.has(run.id)) this.#putRun(run);
   }
 
   #connect(): void {
     clearTimeout(this.#again);
     if (this.#closed) return;
-    const barred = forbidden(this.#runner);
+    const barred = blockedByBrowser(this.#runner);
     if (barred !== null) {
       this.#unreached = barred;
       this.#down();
@@ -174,7 +178,7 @@ export class Live {
     socket.onmessage = (event) => {
       opened = true;
       this.#expect(socket);
-      this.#hear(JSON.parse(String(event.data)) as Message);
+      this.#hear(JSON.parse(String(event.data)) as RunnerMessage);
     };
     socket.onclose = ({ code }) => {
       if (code === SESSION_ENDED) sessionEnd.notice();
@@ -201,7 +205,7 @@ export class Live {
 
   /** There is no link; another try comes after a while, unless nobody is signed in. */
   #down(): void {
-    if (this.now.link !== "down") this.#set({ link: "down", since: Date.now() });
+    if (this.state.link !== "down") this.#set({ link: "down", since: Date.now() });
     this.#set({ unreached: this.#unreached });
     clearTimeout(this.#again);
     if (this.#closed || this.#unreached?.kind === "ended") return;
@@ -214,19 +218,19 @@ export class Live {
   /** A browser does not tell why a socket did not open. */
   async #findOut(): Promise<void> {
     const turn = this.#again;
-    const found = await unreached(this.#runner);
-    if (this.#closed || this.now.link === "live" || turn !== this.#again) return;
+    const found = await findUnreachableReason(this.#runner);
+    if (this.#closed || this.state.link === "live" || turn !== this.#again) return;
     this.#unreached = found;
     this.#set({ unreached: found });
     if (found.kind === "ended") clearTimeout(this.#again);
   }
 
-  #hear(message: Message): void {
+  #hear(message: RunnerMessage): void {
     switch (message.type) {
       case "hello": {
         this.#tries = 0;
         this.#unreached = null;
-        const runs = new Map(this.now.runs);
+        const runs = new Map(this.state.runs);
         const open = new Set(message.runs.map((run) => run.id));
         // What this page believed to be open and the runner no longer names has ended unseen.
         for (const [id, run] of runs) {
@@ -262,9 +266,9 @@ export class Live {
       case "beat": {
         const seen = times(message.seen);
         const heard = times(message.heard);
-        if (seen.size + heard.size + this.seen.size + this.heard.size === 0) break;
-        this.seen = seen;
-        this.heard = heard;
+        if (seen.size + heard.size + this.runSeenAt.size + this.robotAnsweredAt.size === 0) break;
+        this.runSeenAt = seen;
+        this.robotAnsweredAt = heard;
         for (const seer of this.#seers) seer();
         break;
       }
@@ -272,22 +276,22 @@ export class Live {
   }
 
   #putRun(run: Run): void {
-    this.#set({ runs: new Map(this.now.runs).set(run.id, run) });
+    this.#set({ runs: new Map(this.state.runs).set(run.id, run) });
   }
 
-  #putStop(stop: StopAsked): void {
-    this.#set({ stops: [...this.now.stops.slice(1 - STOPS_KEPT), stop] });
+  #putStop(stop: StopRequest): void {
+    this.#set({ stops: [...this.state.stops.slice(1 - STOPS_KEPT), stop] });
   }
 
-  #answerStop(id: string, state: StopAsked["state"], detail: string): void {
-    const stops = this.now.stops.map((stop) =>
+  #answerStop(id: string, state: StopRequest["state"], detail: string): void {
+    const stops = this.state.stops.map((stop) =>
       stop.id === id && stop.state !== "heard" ? { ...stop, state, detail } : stop,
     );
     this.#set({ stops });
   }
 
-  #set(part: Partial<LiveNow>): void {
-    this.now = { ...this.now, ...part };
+  #set(part: Partial<LiveState>): void {
+    this.state = { ...this.state, ...part };
     for (const listener of this.#listeners) listener();
   }
 }

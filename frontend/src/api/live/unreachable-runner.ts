@@ -1,13 +1,13 @@
 /** Why no socket to the runner opens, found out by asking it, and the editor, over HTTP. */
 
-import { knowsUs } from "../http";
+import { isSignedIn } from "../http";
 import { pageUrl } from "../page-url";
 
 /**
  * `ended`: nobody is signed in any more. `strange`: asking again soon is of no use. `mute`: it answers,
  * so a Stop arrives, but what becomes of it is not seen.
  */
-export interface Unreached {
+export interface UnreachableReason {
   readonly kind: "ended" | "strange" | "mute" | "silent";
   readonly why: string;
 }
@@ -15,7 +15,7 @@ export interface Unreached {
 const PATIENCE = 3_000; // ms
 
 /** What can be said without asking: browsers keep an encrypted page from what is not. */
-export function forbidden(runner: string): Unreached | null {
+export function blockedByBrowser(runner: string): UnreachableReason | null {
   const encrypted = globalThis.location?.protocol === "https:";
   if (!encrypted || !runner.startsWith("http:")) return null;
   return {
@@ -25,7 +25,7 @@ export function forbidden(runner: string): Unreached | null {
 }
 
 /** Asked after a socket did not open. */
-export async function unreached(runner: string): Promise<Unreached> {
+export async function findUnreachableReason(runner: string): Promise<UnreachableReason> {
   const answer = await asked(`${runner}/api/reach`);
   if (answer === null)
     return { kind: "silent", why: `The runner does not answer.${stray(runner)}` };
@@ -44,8 +44,8 @@ async function asked(url: string): Promise<Response | null> {
   return fetch(url, init).catch(() => null);
 }
 
-async function unknownTo(runner: string): Promise<Unreached> {
-  const known = await knowsUs();
+async function unknownTo(runner: string): Promise<UnreachableReason> {
+  const known = await isSignedIn();
   if (known === "no") return { kind: "ended", why: "Your session has ended." };
   const here = known === "yes" ? ", though the editor does" : "";
   return {

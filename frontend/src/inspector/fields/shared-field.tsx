@@ -16,7 +16,7 @@ interface Props {
 
 const WRITABLE = "input, textarea, [contenteditable=true]";
 
-export function FieldOf({ of, field, children }: Props) {
+export function SharedField({ of, field, children }: Props) {
   const { presence } = useRoom();
   const id = `${of}|${field}`;
   const here = useRef(false);

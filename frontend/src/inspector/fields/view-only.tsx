@@ -23,7 +23,7 @@ const LOOKING = {
   },
 };
 
-export function LookOnly({ children }: { children: ReactNode }) {
+export function ViewOnly({ children }: { children: ReactNode }) {
   const { mayEdit } = useEditorContext();
   return (
     <MantineThemeProvider theme={mayEdit ? {} : LOOKING}>

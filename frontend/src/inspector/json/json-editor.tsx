@@ -27,7 +27,7 @@ import { useEffect, useRef } from "react";
 import type { Lines } from "./json-positions";
 import style from "./json-view.module.css";
 
-export interface Fault {
+export interface JsonError {
   /** From 0. */
   readonly line: number;
   /** From 0; null: the whole line. */
@@ -39,7 +39,7 @@ export interface Fault {
 interface Props {
   text: string;
   readOnly: boolean;
-  faults: readonly Fault[];
+  faults: readonly JsonError[];
   /** What is selected in the graph. */
   marked: Lines | null;
   onChange: (text: string) => void;
@@ -82,7 +82,7 @@ function replacement(old: string, next: string) {
   return { from, to: old.length - end, insert: next.slice(from, next.length - end) };
 }
 
-function diagnosticsOf(state: EditorState, faults: readonly Fault[]): Diagnostic[] {
+function diagnosticsOf(state: EditorState, faults: readonly JsonError[]): Diagnostic[] {
   return faults.map(({ line, column, message, severity }) => {
     const { from, to } = state.doc.line(Math.min(line + 1, state.doc.lines));
     const at = column === null ? from : Math.min(from + column, to);

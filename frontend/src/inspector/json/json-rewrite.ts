@@ -18,7 +18,7 @@ export function collisions(doc: Y.Doc, changes: readonly KeyChange[]): KeyChange
 }
 
 /** Makes the changes as one edit, which one undo takes back. */
-export function rewrite(doc: Y.Doc, changes: readonly KeyChange[]): void {
+export function applyTextChanges(doc: Y.Doc, changes: readonly KeyChange[]): void {
   asOneEdit(doc, () => {
     for (const { root, key, after } of changes) {
       if (!isRoot(root)) continue;

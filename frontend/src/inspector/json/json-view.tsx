@@ -3,23 +3,23 @@ import { ActionIcon, Button, CopyButton, Kbd, Skeleton, Tooltip } from "@mantine
 import { IconAlertTriangle, IconCheck, IconCopy } from "@tabler/icons-react";
 import { lazy, type ReactNode, Suspense, useMemo, useState } from "react";
 import type { KeyChange } from "../../api/graphs";
-import { sentence } from "../../api/http";
+import { errorText } from "../../api/http";
 import { printedKeys } from "../../edit-actions/edit-action";
 import {
   selectedActions,
   selectedRelations,
   useEditorContext,
 } from "../../edit-actions/editor-context";
-import type { Fault } from "./json-editor";
+import type { JsonError } from "./json-editor";
 import { actionAt, rangeOf, rangeOfArrow } from "./json-positions";
-import { collisions, places, rewrite } from "./json-rewrite";
+import { applyTextChanges, collisions, places } from "./json-rewrite";
 import style from "./json-view.module.css";
 import { useJson, type Verdict } from "./use-json";
 
 const JsonEditor = lazy(() => import("./json-editor"));
-const NO_FAULTS: readonly Fault[] = [];
+const NO_FAULTS: readonly JsonError[] = [];
 
-function faultsOf(verdict: Verdict): readonly Fault[] {
+function faultsOf(verdict: Verdict): readonly JsonError[] {
   return verdict.kind === "wrong" ? [verdict.fault] : NO_FAULTS;
 }
 
@@ -111,7 +111,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
   const faults = useMemo(() => (draft ? faultsOf(verdict) : NO_FAULTS), [draft, verdict]);
   const changes = verdict.kind === "fits" && draft ? verdict.rewriting.changes : [];
   const write = (some: readonly KeyChange[]) => {
-    rewrite(context.doc, some);
+    applyTextChanges(context.doc, some);
     setAsking(null);
     json.done();
   };
@@ -125,7 +125,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
     const action = actionAt(context.graph, lines, line);
     if (action && !context.selection.has(action.key)) context.select([action.key]);
   };
-  if (json.error && text === undefined) return <p>{sentence(json.error)}</p>;
+  if (json.error && text === undefined) return <p>{errorText(json.error)}</p>;
   if (text === undefined) return <Skeleton height={200} />;
   let foot: ReactNode = null;
   if (asking !== null) {

@@ -1,14 +1,14 @@
 /** The JSON of a graph while it is read and while it is edited: newest text, draft, verdict. */
 import { useQuery } from "@tanstack/react-query";
 import { useEffect, useRef, useState, useSyncExternalStore } from "react";
-import { graphMoment, type Rewriting, rewritingOf } from "../../api/graphs";
-import { Refusal, sentence } from "../../api/http";
-import type { Fault } from "./json-editor";
+import { graphMoment, type TextChanges, textChangesOf } from "../../api/graphs";
+import { errorText, Refusal } from "../../api/http";
+import type { JsonError } from "./json-editor";
 import { lineOf } from "./json-positions";
 
 const PAUSE = 400; // ms
 
-interface Moment {
+interface JsonSnapshot {
   readonly text: string;
   readonly seq: number;
 }
@@ -16,13 +16,13 @@ interface Moment {
 /** A text being edited, and the moment whose text it was. */
 interface Draft {
   readonly text: string;
-  readonly base: Moment;
+  readonly base: JsonSnapshot;
 }
 
 export type Verdict =
   | { readonly kind: "checking" }
-  | { readonly kind: "fits"; readonly rewriting: Rewriting }
-  | { readonly kind: "wrong"; readonly fault: Fault }
+  | { readonly kind: "fits"; readonly rewriting: TextChanges }
+  | { readonly kind: "wrong"; readonly fault: JsonError }
   | { readonly kind: "unknown"; readonly why: string };
 
 const CHECKING: Verdict = { kind: "checking" };
@@ -48,7 +48,7 @@ function useDraft(graph: string): Draft | null {
 }
 
 function verdictOf(error: unknown, text: string): Verdict {
-  if (!(error instanceof Refusal)) return { kind: "unknown", why: sentence(error) };
+  if (!(error instanceof Refusal)) return { kind: "unknown", why: errorText(error) };
   const { where, detail, title } = error.details;
   const line = where?.line !== undefined ? where.line - 1 : lineOf(text, where?.path ?? "");
   const column = where?.column === undefined ? null : where.column - 1;
@@ -67,7 +67,7 @@ export function useJson(graph: string, seq: number) {
   const draft = useDraft(graph);
   const [verdict, setVerdict] = useState<Verdict>(CHECKING);
   // What was applied is shown until the server's text says it too.
-  const [applied, setApplied] = useState<Moment | null>(null);
+  const [applied, setApplied] = useState<JsonSnapshot | null>(null);
   const arrived = newest !== undefined && applied !== null && newest.seq > applied.seq;
   useEffect(() => {
     if (arrived) setApplied(null);
@@ -81,7 +81,7 @@ export function useJson(graph: string, seq: number) {
     asked.current += 1;
     const mine = asked.current;
     const timer = setTimeout(async () => {
-      const answer = await rewritingOf(graph, base, text).then(
+      const answer = await textChangesOf(graph, base, text).then(
         (rewriting): Verdict => ({ kind: "fits", rewriting }),
         (error: unknown) => verdictOf(error, text),
       );

@@ -10,7 +10,14 @@ import { pathWords } from "../../graph/value-text";
 import { DraftInput } from "../../ui/draft-input";
 import style from "../inspector.module.css";
 import { ParameterSettings } from "./parameter-settings";
-import { complaint, type Field, fieldOf, shown, typed, withValue } from "./parameter-values";
+import {
+  complaint,
+  type ParameterValue,
+  parameterValueOf,
+  shown,
+  typed,
+  withValue,
+} from "./parameter-values";
 
 interface Props {
   owner: Key;
@@ -32,7 +39,7 @@ interface LabelProps {
   name: string;
   /** With its groups. */
   fullName: string;
-  field: Field;
+  field: ParameterValue;
   open: boolean;
   onOpen: () => void;
 }
@@ -74,7 +81,7 @@ function Label({ name, fullName, field, open, onOpen }: LabelProps) {
 export function ParameterField({ owner, side, parameter, name, others }: Props) {
   const { doc } = useEditorContext();
   const [open, setOpen] = useState(false);
-  const field = fieldOf(parameter.text);
+  const field = parameterValueOf(parameter.text);
   const label: ReactNode = (
     <Label
       name={name}
@@ -109,7 +116,7 @@ export function ParameterField({ owner, side, parameter, name, others }: Props) 
 interface ValueProps {
   label: ReactNode;
   name: string;
-  field: Field;
+  field: ParameterValue;
   parameter: Parameter;
   write: (change: (now: string) => string) => void;
 }

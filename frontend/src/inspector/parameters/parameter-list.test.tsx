@@ -8,7 +8,7 @@ import { addAction } from "../../graph/edit";
 import { graphNow } from "../../graph/edit/document-writes";
 import { RoomProvider, useGraph, useRoom } from "../../sync/use-room";
 import { FakeServer } from "../../testing/fake-server";
-import { Parameters } from "./parameter-list";
+import { ParameterList } from "./parameter-list";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
 vi.stubGlobal("matchMedia", () => ({
@@ -36,7 +36,7 @@ function Page() {
   const [action] = graph.actions;
   return (
     <EditorReactContext value={{ doc, graph } as unknown as EditorContext}>
-      {action && <Parameters action={action} side="in" />}
+      {action && <ParameterList action={action} side="in" />}
     </EditorReactContext>
   );
 }

@@ -7,7 +7,7 @@ import type { ParameterSide } from "../../graph/document-keys";
 import { addParameter, asOneEdit } from "../../graph/edit";
 import type { Action } from "../../graph/model";
 import { pathWords } from "../../graph/value-text";
-import { FieldOf } from "../fields/shared-field";
+import { SharedField } from "../fields/shared-field";
 import style from "../inspector.module.css";
 import { ParameterField } from "./parameter-field";
 import { type Family, families, pathFrom, taken } from "./parameter-path";
@@ -77,12 +77,12 @@ function AddParameter({ action, side, onDone }: AddProps) {
   );
 }
 
-export function Parameters({ action, side }: { action: Action; side: ParameterSide }) {
+export function ParameterList({ action, side }: { action: Action; side: ParameterSide }) {
   const [adding, setAdding] = useState(false);
   const list = side === "in" ? action.inputs : action.outputs;
   const fields = ({ prefix, members }: Family) =>
     members.map((parameter) => (
-      <FieldOf key={parameter.path} of={action.key} field={`${side}/${parameter.path}`}>
+      <SharedField key={parameter.path} of={action.key} field={`${side}/${parameter.path}`}>
         <ParameterField
           owner={action.key}
           side={side}
@@ -90,7 +90,7 @@ export function Parameters({ action, side }: { action: Action; side: ParameterSi
           name={pathWords(parameter.path.slice(prefix.length))}
           others={list.filter((other) => other !== parameter)}
         />
-      </FieldOf>
+      </SharedField>
     ));
   return (
     <section className={style.section}>

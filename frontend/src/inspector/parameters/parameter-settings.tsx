@@ -11,7 +11,7 @@ import style from "../inspector.module.css";
 import { pathFrom, taken } from "./parameter-path";
 import {
   allowedLines,
-  fieldOf,
+  parameterValueOf,
   TYPES,
   withAllowed,
   withLock,
@@ -29,7 +29,7 @@ interface Props {
 
 export function ParameterSettings({ owner, side, parameter, others, onClose }: Props) {
   const { doc } = useEditorContext();
-  const field = fieldOf(parameter.text);
+  const field = parameterValueOf(parameter.text);
   const name = pathWords(parameter.path);
   const write = (change: (now: string) => string) =>
     setParameter(doc, owner, side, parameter.path, change);

@@ -3,7 +3,7 @@ import { expect, test } from "vitest";
 import {
   allowedLines,
   complaint,
-  fieldOf,
+  parameterValueOf,
   shown,
   typed,
   withAllowed,
@@ -16,25 +16,25 @@ import {
 test("a number keeps the spelling in which it was typed", () => {
   const text = withValue('{"pvf_type": "number"}', "5.0");
   expect(text).toBe('{"pvf_type": "number", "pvf_value": 5.0}');
-  expect(shown(fieldOf(text))).toBe("5.0");
+  expect(shown(parameterValueOf(text))).toBe("5.0");
 });
 
 test("what is no number is explained and not written", () => {
-  const field = fieldOf('{"pvf_type": "number", "pvf_value": 30}');
+  const field = parameterValueOf('{"pvf_type": "number", "pvf_value": 30}');
   expect(complaint(field, "abc")).toBe("“abc” is no number.");
   expect(complaint(field, "-.5")).toBeNull();
   expect(typed("number", "-.5")).toEqual({ ok: "-0.5" });
 });
 
 test("only allowed values are taken", () => {
-  const field = fieldOf('{"pvf_type": "string", "pvf_allowed_values": ["red", "blue"]}');
+  const field = parameterValueOf('{"pvf_type": "string", "pvf_allowed_values": ["red", "blue"]}');
   expect(complaint(field, "green")).toContain("Allowed");
   expect(complaint(field, "red")).toBeNull();
 });
 
 test("lists have a line for each item", () => {
   expect(typed("numbers", "1\n 2.5\n")).toEqual({ ok: "[1, 2.5]" });
-  expect(shown(fieldOf('{"pvf_type":"strings","pvf_value":["a b","c"]}'))).toBe("a b\nc");
+  expect(shown(parameterValueOf('{"pvf_type":"strings","pvf_value":["a b","c"]}'))).toBe("a b\nc");
   expect(typed("bools", "true\nmaybe")).toEqual({ wrong: "“maybe” is neither true nor false." });
 });
 
@@ -44,7 +44,7 @@ test("an empty number has no value, an empty string has one", () => {
 });
 
 test("a parameter of a foreign type is left alone", () => {
-  const field = fieldOf('{"pvf_type": "map::Pose"}');
+  const field = parameterValueOf('{"pvf_type": "map::Pose"}');
   expect([field.type, field.native, field.value]).toEqual(["map::Pose", null, null]);
 });
 
@@ -53,7 +53,7 @@ test("any text that is typed comes back as it was", () => {
     fc.property(fc.string(), (draft) => {
       const result = typed("string", draft);
       if (!("ok" in result) || result.ok === null) throw new Error("a string is always fine");
-      expect(shown(fieldOf(withValue('{"pvf_type": "string"}', result.ok)))).toBe(draft);
+      expect(shown(parameterValueOf(withValue('{"pvf_type": "string"}', result.ok)))).toBe(draft);
     }),
   );
 });
@@ -72,14 +72,14 @@ test("allowed values are of the type, one a line, and none allows all", () => {
   expect(some).toEqual({ ok: '{"pvf_type": "number", "pvf_allowed_values": [1, 2.50]}' });
   expect(withAllowed(text, "red")).toEqual({ wrong: "“red” is no number." });
   if (!("ok" in some)) throw new Error("they fit");
-  expect(allowedLines(fieldOf(some.ok ?? ""))).toBe("1\n2.50");
+  expect(allowedLines(parameterValueOf(some.ok ?? ""))).toBe("1\n2.50");
   expect(withAllowed(some.ok ?? "", "")).toEqual({ ok: text });
 });
 
 test("what the engine assumes anyway is not written down", () => {
   const text = '{"pvf_type": "bool"}';
-  expect(fieldOf(withRequired(text, false)).required).toBe(false);
+  expect(parameterValueOf(withRequired(text, false)).required).toBe(false);
   expect(withRequired(withRequired(text, false), true)).toBe(text);
-  expect(fieldOf(withLock(text, true)).locked).toBe(true);
+  expect(parameterValueOf(withLock(text, true)).locked).toBe(true);
   expect(withLock(withLock(text, true), false)).toBe(text);
 });

@@ -4,7 +4,7 @@ import { memberText, withMember } from "../../graph/json-members";
 export const TYPES = ["string", "number", "bool", "strings", "numbers", "bools"] as const;
 export type PvfType = (typeof TYPES)[number];
 
-export interface Field {
+export interface ParameterValue {
   /** As the file says it; null when the text is no parameter of a type. */
   readonly type: string | null;
   readonly native: PvfType | null;
@@ -33,7 +33,7 @@ function itemsOf(text: string | null): string[] {
   return plain ? spelled.map((item) => item.trim()) : list.map((item) => JSON.stringify(item));
 }
 
-export function fieldOf(text: string): Field {
+export function parameterValueOf(text: string): ParameterValue {
   const none = { native: null, allowed: [], required: true, locked: false } as const;
   if (!text.trimStart().startsWith("{")) return { ...none, type: null, value: text };
   const type = json(memberText(text, "pvf_type"));
@@ -57,7 +57,7 @@ export function withValue(text: string, value: string | null): string {
 /** The parameter under another type; a value that does not fit it is taken away. */
 export function withType(text: string, type: string): string {
   const next = withMember(text, "pvf_type", JSON.stringify(type));
-  const field = fieldOf(next);
+  const field = parameterValueOf(next);
   if (field.native === null || field.value === null) return next;
   const draft = shown(field);
   return complaint(field, draft) === null && fitsType(field.native, json(field.value))
@@ -81,7 +81,7 @@ function fitsType(type: PvfType, value: unknown): boolean {
 
 /** The parameter with other allowed values, one on each line; with none, everything is allowed. */
 export function withAllowed(text: string, draft: string): Typed {
-  const field = fieldOf(text);
+  const field = parameterValueOf(text);
   const item = field.native?.replace(/s$/, "");
   const items: string[] = [];
   for (const line of lines(draft)) {
@@ -96,7 +96,7 @@ export function withAllowed(text: string, draft: string): Typed {
 }
 
 /** Allowed values as lines. */
-export function allowedLines(field: Field): string {
+export function allowedLines(field: ParameterValue): string {
   return field.allowed
     .map((item) => (typeof json(item) === "string" ? String(json(item)) : item))
     .join("\n");
@@ -111,7 +111,7 @@ export const withLock = (text: string, locked: boolean): string =>
   withMember(text, "pvf_updatable", locked ? "false" : null);
 
 /** What is shown in a field for a value: lists have a line for each item. */
-export function shown(field: Field): string {
+export function shown(field: ParameterValue): string {
   const value = json(field.value);
   if (field.native === "string") return typeof value === "string" ? value : (field.value ?? "");
   if (field.native === "strings" && Array.isArray(value)) {
@@ -186,7 +186,7 @@ export function typed(type: PvfType, draft: string): Typed {
 }
 
 /** What is wrong with a draft of a field; null when it may be written. */
-export function complaint(field: Field, draft: string): string | null {
+export function complaint(field: ParameterValue, draft: string): string | null {
   if (field.native === null) return null;
   const result = typed(field.native, draft);
   if ("wrong" in result) return result.wrong;

@@ -1,22 +1,22 @@
 /** Which output of an action can reach which input of the next, and why not. Pure. */
 import { flatName } from "../../graph/document-keys";
 import type { Action, Parameter, Remap } from "../../graph/model";
-import { fieldOf } from "./parameter-values";
+import { parameterValueOf } from "./parameter-values";
 
 /** One end of a renaming as a choice; `reason` says why it cannot be chosen. */
-export interface Choice {
+export interface RemapChoice {
   readonly name: string;
   readonly type: string | null;
   readonly reason: string | null;
 }
 
-const typeOf = (parameter: Parameter): string | null => fieldOf(parameter.text).type;
+const typeOf = (parameter: Parameter): string | null => parameterValueOf(parameter.text).type;
 
 const named = (list: readonly Parameter[] | undefined, name: string): Parameter | undefined =>
   list?.find((parameter) => flatName(parameter.path) === name);
 
 /** The outputs that are not renamed yet. */
-export function sources(parent: Action | undefined, remap: readonly Remap[]): Choice[] {
+export function sources(parent: Action | undefined, remap: readonly Remap[]): RemapChoice[] {
   return (parent?.outputs ?? []).map((output) => {
     const name = flatName(output.path);
     const known = remap.find(({ source }) => source === name);
@@ -30,10 +30,10 @@ export function targets(
   child: Action | undefined,
   remap: readonly Remap[],
   type: string | null,
-): Choice[] {
+): RemapChoice[] {
   return (child?.inputs ?? []).map((input) => {
     const name = flatName(input.path);
-    const field = fieldOf(input.text);
+    const field = parameterValueOf(input.text);
     const known = remap.find(({ target }) => target === name);
     let reason: string | null = null;
     if (type !== null && field.type !== type)
@@ -58,7 +58,7 @@ export function misfit(
   if (child !== undefined && input === undefined)
     return `${child.name} takes no ${target}: nothing happens.`;
   if (output === undefined || input === undefined) return null;
-  const [from, to] = [fieldOf(output.text), fieldOf(input.text)];
+  const [from, to] = [parameterValueOf(output.text), parameterValueOf(input.text)];
   if (from.type !== to.type) {
     return `${target} takes ${to.type ?? "no type"}, not ${from.type ?? "no type"}: nothing happens.`;
   }
@@ -75,7 +75,7 @@ export function passed(
     const name = flatName(output.path);
     const renamed = remap.some(({ source, target }) => source === name || target === name);
     const input = named(child?.inputs, name);
-    if (renamed || input === undefined || fieldOf(input.text).locked) return [];
+    if (renamed || input === undefined || parameterValueOf(input.text).locked) return [];
     return typeOf(output) === typeOf(input) ? [name] : [];
   });
 }

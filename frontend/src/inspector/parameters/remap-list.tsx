@@ -8,13 +8,13 @@ import { setRemap } from "../../graph/edit";
 import type { Relation } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import style from "../inspector.module.css";
-import { type Choice, misfit, passed, sources, targets } from "./remap-choices";
+import { misfit, passed, type RemapChoice, sources, targets } from "./remap-choices";
 
-function labelOf({ name, type, reason }: Choice): string {
+function labelOf({ name, type, reason }: RemapChoice): string {
   return `${name} · ${reason ?? type ?? "no type"}`;
 }
 
-function options(choices: readonly Choice[], search: string) {
+function options(choices: readonly RemapChoice[], search: string) {
   const data = choices.map((choice) => ({
     value: choice.name,
     label: labelOf(choice),
@@ -28,7 +28,7 @@ function options(choices: readonly Choice[], search: string) {
 
 interface PickProps {
   label: string;
-  choices: readonly Choice[];
+  choices: readonly RemapChoice[];
   value: string | null;
   onPick: (name: string | null) => void;
 }
@@ -98,7 +98,7 @@ function AddRemap({ relation, onDone }: { relation: Relation; onDone: () => void
   );
 }
 
-export function Remaps({ relation }: { relation: Relation }) {
+export function RemapList({ relation }: { relation: Relation }) {
   const { doc, graph } = useEditorContext();
   const [adding, setAdding] = useState(false);
   const parent = graph.actions.find((action) => action.key === relation.parent);

@@ -4,8 +4,14 @@ import { TextInput } from "@mantine/core";
 import { useMemo, useState } from "react";
 import { authorName } from "../../api/graphs";
 import type { ReplayMark } from "../../api/review";
-import { placeOf, type Run } from "../../api/runs";
-import { atMost, begun, ended, endWords, type Tone } from "../../status/progress";
+import { type Run, runPlace } from "../../api/runs";
+import {
+  runEndText,
+  type Tone,
+  visitBegin,
+  visitDurationBound,
+  visitEnd,
+} from "../../status/progress";
 import { toneColor } from "../../status/state-label";
 import { clock, instant } from "../../ui/times";
 import { markText } from "../replay/replay-marks";
@@ -50,15 +56,15 @@ export function eventLines(
   const start = instant(run.started_at);
   for (const [name, action] of Object.entries(run.actions ?? {})) {
     action.visits.forEach((visit, i) => {
-      const from = begun(visit);
-      const until = ended(visit);
+      const from = visitBegin(visit);
+      const until = visitEnd(visit);
       const again = i > 0 ? `again (${i + 1}.)` : "";
       const who = { name: spaced(name), aid: action.aid };
       if (from !== null) all.push({ at: from, tone: "run", ...who, text: `runs ${again}`.trim() });
       if (until !== null) {
         const result = visit.result?.replace(/^on_/, "") ?? null;
         const tone = (result ?? "done") as Tone;
-        const last = atMost(visit) === null ? until : instant(visit.not_after);
+        const last = visitDurationBound(visit) === null ? until : instant(visit.not_after);
         const seen = visit.how === "inferred" ? " (inferred)" : "";
         const since =
           last === until || start === null ? "" : ` (not before ${after(start, until)})`;
@@ -99,11 +105,11 @@ export function eventLines(
       tone: "idle",
       name: null,
       aid: null,
-      text: `Run ${endWords(run)}${run.detail ? `: ${run.detail}` : ""}`,
+      text: `Run ${runEndText(run)}${run.detail ? `: ${run.detail}` : ""}`,
     });
   all.sort((a, b) => a.at - b.at);
   if (start === null) return all;
-  const where = run.engine === "simulator" ? "in the simulator" : `on ${placeOf(run)}`;
+  const where = run.engine === "simulator" ? "in the simulator" : `on ${runPlace(run)}`;
   const text = `${authorName(run.author)} started ${version} ${where}`;
   return [{ at: start, tone: "idle", name: null, aid: null, text }, ...all];
 }

@@ -1,7 +1,7 @@
 /** Asks for one fault, and starts the run once more with it, in the simulator. */
 import { Button, Modal, SegmentedControl, Select, Stack, Text } from "@mantine/core";
 import { useState } from "react";
-import { sentence } from "../../api/http";
+import { errorText } from "../../api/http";
 import type { InjectedFault } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { type Repeated, type RepeatedVersion, repeatRun } from "./repeat-run";
@@ -34,7 +34,7 @@ export function FaultDialog({ runner, run, onDone, onClose }: Props) {
       onClose();
       onDone(done);
     } catch (error) {
-      setRefused(sentence(error));
+      setRefused(errorText(error));
     }
   };
   return (

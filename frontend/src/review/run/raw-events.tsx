@@ -2,7 +2,7 @@
 import { Button } from "@mantine/core";
 import { IconDownload, IconRefresh } from "@tabler/icons-react";
 import { useState } from "react";
-import { sentence } from "../../api/http";
+import { errorText } from "../../api/http";
 import { exportUrl, useRawEvents } from "../../api/review";
 import type { Run } from "../../api/runs";
 import style from "./raw-events.module.css";
@@ -66,7 +66,7 @@ export function RawEvents({ runner, run }: { runner: string | undefined; run: Ru
           </Button>
         )}
       </div>
-      {found.isError && <p role="alert">{sentence(found.error)}</p>}
+      {found.isError && <p role="alert">{errorText(found.error)}</p>}
       {found.data?.lines.map((line) => (
         <Event key={line} line={line} />
       ))}

@@ -1,6 +1,6 @@
 /** A run once more in the simulator: the graph that it ran or the newest one, doing what it did then. */
 import { graphMoment, publish, type Version } from "../../api/graphs";
-import { askText } from "../../api/http";
+import { fetchText } from "../../api/http";
 import { type InjectedFault, recordedScriptFor, recordedScriptOf, umrfUrl } from "../../api/review";
 import { type Run, startRun } from "../../api/runs";
 import { memberText } from "../../graph/json-members";
@@ -47,7 +47,7 @@ export async function repeatRun(
       : {
           version: run.version ?? "",
           digest: run.digest,
-          umrf: await askText(umrfUrl(runner, run.id)),
+          umrf: await fetchText(umrfUrl(runner, run.id)),
         };
   const script =
     which === "newest"

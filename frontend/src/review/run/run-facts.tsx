@@ -1,9 +1,9 @@
 /** What a run was, in a table. */
 
 import { useRaw } from "../../api/review";
-import { placeOf, type Run, whence } from "../../api/runs";
-import { spanWords } from "../../status/durations";
-import { endWords } from "../../status/progress";
+import { type Run, requesterPlace, runPlace } from "../../api/runs";
+import { boundsText } from "../../status/durations";
+import { runEndText } from "../../status/progress";
 import { clock, day, instant, useNow } from "../../ui/times";
 import style from "./run-facts.module.css";
 
@@ -17,7 +17,7 @@ interface Props {
 }
 
 function restWords(rest: Rest, moment: (at: number | null) => string): string {
-  const who = rest.by ? `by ${rest.by.name}${whence(rest.by)}` : "by the runner";
+  const who = rest.by ? `by ${rest.by.name}${requesterPlace(rest.by)}` : "by the runner";
   return `${moment(instant(rest.at))} ${who}: “${rest.how}”`;
 }
 
@@ -31,15 +31,20 @@ export function RunFacts({ runner, run, version, by }: Props) {
     ["Graph", run.graph_name],
     ["Version", version],
     ["Digest", run.digest],
-    ["Engine", placeOf(run)],
-    ["Started by", `${by}${whence(run.author)}`],
+    ["Engine", runPlace(run)],
+    ["Started by", `${by}${requesterPlace(run.author)}`],
     ["Started", moment(start)],
     ...(run.stopped_by
-      ? [["Stopped by", `${run.stopped_by.name}${whence(run.stopped_by)}`] as [string, string]]
+      ? [
+          ["Stopped by", `${run.stopped_by.name}${requesterPlace(run.stopped_by)}`] as [
+            string,
+            string,
+          ],
+        ]
       : []),
     ["End known", moment(end)],
-    ["Took", (end !== null && spanWords(run.took)) || "—"],
-    ["End", end === null ? "goes on" : endWords(run)],
+    ["Took", (end !== null && boundsText(run.took)) || "—"],
+    ["End", end === null ? "goes on" : runEndText(run)],
     ["Result", run.result?.replace(/^on_/, "") ?? "—"],
     ["Why", run.detail || "—"],
     ["Recorded", run.recorded ? "all of it" : "NOT all of it: the journal could not be written"],

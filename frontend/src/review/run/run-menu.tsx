@@ -14,7 +14,7 @@ import {
 import { useState } from "react";
 import { useLocation } from "wouter";
 import { graphMoment, useVersions, versionName } from "../../api/graphs";
-import { sentence } from "../../api/http";
+import { errorText } from "../../api/http";
 import { expectRun, exportUrl } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { FaultDialog } from "./fault-dialog";
@@ -53,7 +53,7 @@ function ExpectDialog({ runner, run, onClose }: Props & { onClose: () => void })
         message: "“action-assistant runs verify” tells when it would go another way.",
       });
     } catch (error) {
-      setRefused(sentence(error));
+      setRefused(errorText(error));
     }
   };
   return (
@@ -92,7 +92,7 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
   const version = versions.find((each) => each.id === run.version);
   const where = engines.join(", ");
   const complain = (error: unknown) =>
-    notifications.show({ color: "red", title: "Not started", message: sentence(error) });
+    notifications.show({ color: "red", title: "Not started", message: errorText(error) });
   const show = ({ run: fresh, doubts }: Repeated) => {
     go(`/runs/${fresh}`);
     if (doubts.length === 0) return;

@@ -4,7 +4,7 @@ import { notifications } from "@mantine/notifications";
 import { IconPin, IconPinFilled } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useEffect, useState } from "react";
-import { sentence } from "../../api/http";
+import { errorText } from "../../api/http";
 import { type RunMarks, setMarks, useLabels, useMarks } from "../../api/review";
 import style from "./run-notes.module.css";
 
@@ -23,7 +23,7 @@ function useEditedMarks(runner: string | undefined, run: string) {
       void client.invalidateQueries({ queryKey: ["runs", "labels"] });
     } catch (error) {
       client.setQueryData(key, before);
-      notifications.show({ color: "red", title: "Not noted", message: sentence(error) });
+      notifications.show({ color: "red", title: "Not noted", message: errorText(error) });
     }
   };
   return { marks: marks.data, change };

@@ -5,14 +5,14 @@ import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useState } from "react";
 import { Link, useSearch } from "wouter";
 import { authorName } from "../../api/graphs";
-import { sentence } from "../../api/http";
+import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import { type ReplayMark, useReplayData, useRunsOfSameStart } from "../../api/review";
 import { type Run, useRun } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
 import { GraphView } from "../../canvas/graph-view";
-import { endWords, type Progress, progressByAid, runWord } from "../../status/progress";
-import { StateWord } from "../../status/state-label";
+import { type Progress, progressByAid, runEndText, runLabel } from "../../status/progress";
+import { StateLabel } from "../../status/state-label";
 import { Timeline, type Track } from "../../status/timeline";
 import { lanesOf } from "../../status/timeline-lanes";
 import { Empty } from "../../ui/empty";
@@ -132,7 +132,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
     replay.seek(at);
     if (aid !== null) setSelected(aid);
   };
-  const { tone, word } = runWord(run);
+  const { tone, word } = runLabel(run);
   const since = `unknown since ${clock(live.since)}`;
   const seen = unsure && !past;
   return (
@@ -148,10 +148,10 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
         ],
         status: (
           <>
-            <StateWord
+            <StateLabel
               pill
               tone={seen ? "unknown" : tone}
-              word={seen ? since : run.ended_at === null ? word : endWords(run)}
+              word={seen ? since : run.ended_at === null ? word : runEndText(run)}
             />
             {past && <span className={style.simulated}>as it was then</span>}
             {newest.simulated && <span className={style.simulated}>simulated</span>}
@@ -186,7 +186,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
           <PlayerControls replay={replay} goes={goes} />
           {replay.failed !== null && (
             <p className={style.failed} role="alert">
-              The replay cannot be loaded: {sentence(replay.failed)}
+              The replay cannot be loaded: {errorText(replay.failed)}
             </p>
           )}
           <Timeline
@@ -261,7 +261,7 @@ export function RunPage({ id, bar, start }: Props) {
       <main className={style.page}>
         {stored.isError ? (
           <Empty icon={<IconAlertTriangle size={22} />} title="This run cannot be shown">
-            {sentence(stored.error)}
+            {errorText(stored.error)}
           </Empty>
         ) : (
           <section className={style.canvas} aria-busy="true">

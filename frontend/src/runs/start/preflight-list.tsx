@@ -1,7 +1,7 @@
 /** What was looked at on one engine, item by item, in words. */
 import { Loader } from "@mantine/core";
 import { IconAlertTriangle, IconCheck, IconX } from "@tabler/icons-react";
-import type { Item, Preflight } from "../../api/robots";
+import type { Preflight, PreflightItem } from "../../api/robots";
 import { SIMULATOR } from "../../api/robots";
 import { colorOfName } from "../../ui/name-colors";
 import style from "./preflight-list.module.css";
@@ -21,7 +21,7 @@ const WAITING: Readonly<Record<string, string>> = {
 const SIGNS = { passed: IconCheck, warned: IconAlertTriangle, blocked: IconX } as const;
 const READ = { passed: "Fine", warned: "Note", blocked: "In the way" } as const;
 
-function Line({ item }: { item: Item }) {
+function Line({ item }: { item: PreflightItem }) {
   const Sign = SIGNS[item.verdict];
   return (
     <li className={style.line} data-verdict={item.verdict}>

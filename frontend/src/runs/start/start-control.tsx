@@ -3,13 +3,13 @@ import { ActionIcon, Button } from "@mantine/core";
 import { IconChevronDown, IconPlayerPlayFilled } from "@tabler/icons-react";
 import { useState } from "react";
 import { useVersions } from "../../api/graphs";
-import { sentence } from "../../api/http";
+import { errorText } from "../../api/http";
 import { openRuns, useLive } from "../../api/live/use-live";
 import { SIMULATOR } from "../../api/robots";
 import { HoldButton } from "../../ui/hold-button";
 import style from "./start-control.module.css";
 import { StartDialog } from "./start-dialog";
-import { complain, lastEngines, nextLabel, useStart } from "./use-start";
+import { lastEngines, nextLabel, notifyFailure, useStart } from "./use-start";
 
 interface Props {
   graph: string;
@@ -41,7 +41,7 @@ export function StartControl({ graph, name, seq, settle, obstacle, compact = fal
   const words = start.isPending ? "Starting …" : `Start ${label}`;
   const where = engines.join(", ");
   const ask = () =>
-    void settle().then(setAsking, (error) => complain("Not started", sentence(error)));
+    void settle().then(setAsking, (error) => notifyFailure("Not started", errorText(error)));
   return (
     <span className={style.start}>
       {simulated ? (

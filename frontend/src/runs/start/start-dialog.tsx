@@ -4,12 +4,12 @@ import { IconPlayerPlayFilled, IconRefresh } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { Link } from "wouter";
-import { askText, sentence } from "../../api/http";
+import { errorText, fetchText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
-import { lookBefore, type Preflight, type Robot, SIMULATOR } from "../../api/robots";
+import { type Preflight, type Robot, runPreflight, SIMULATOR } from "../../api/robots";
 import type { Run } from "../../api/runs";
 import { useMay } from "../../api/use-person";
-import { EngineWord } from "../../status/engine-label";
+import { EngineLabel } from "../../status/engine-label";
 import { HoldButton } from "../../ui/hold-button";
 import { colorOfName } from "../../ui/name-colors";
 import { PreflightList } from "./preflight-list";
@@ -35,12 +35,12 @@ function useLook(graph: string, seq: number, engines: readonly string[]) {
   const umrf = useQuery({
     queryKey: ["umrf", graph, seq],
     queryFn: ({ signal }) =>
-      askText(`/api/graphs/${encodeURIComponent(graph)}/umrf?at=${seq}`, { signal }),
+      fetchText(`/api/graphs/${encodeURIComponent(graph)}/umrf?at=${seq}`, { signal }),
     staleTime: Number.POSITIVE_INFINITY,
   });
   const look = useQuery({
     queryKey: ["preflight", graph, seq, ...engines],
-    queryFn: ({ signal }) => lookBefore(runner ?? "", umrf.data ?? "", engines, signal),
+    queryFn: ({ signal }) => runPreflight(runner ?? "", umrf.data ?? "", engines, signal),
     enabled: umrf.data !== undefined && runner !== undefined && engines.length > 0,
     refetchInterval: LOOK_AGAIN,
     gcTime: 0,
@@ -74,7 +74,7 @@ function Choice(props: { robot: Robot; on: boolean; may: boolean; onToggle: () =
       {robot.simulated ? (
         <span className={style.quiet}>nothing moves</span>
       ) : (
-        <EngineWord robot={robot} />
+        <EngineLabel robot={robot} />
       )}
       {!robot.simulated && !may && <span className={style.quiet}>operators only</span>}
     </label>
@@ -205,7 +205,7 @@ export function StartDialog(props: Props) {
           </header>
           {error !== null && (
             <Text size="sm" c="var(--error)" role="alert">
-              {sentence(error)}
+              {errorText(error)}
             </Text>
           )}
           {engines.map((engine) => (

@@ -6,10 +6,10 @@ import { Link } from "wouter";
 import { useLive } from "../../api/live/use-live";
 import { SIMULATOR } from "../../api/robots";
 import { findStart, type Run, type StartFound } from "../../api/runs";
-import { runWord } from "../../status/progress";
+import { runLabel } from "../../status/progress";
 import { colorOfName } from "../../ui/name-colors";
 import style from "./unanswered-start-notice.module.css";
-import { type SentStart, unsureStarts } from "./unanswered-starts";
+import { type SentStart, unansweredStarts } from "./unanswered-starts";
 
 const AGAIN = 2_000; // ms between two looks
 const PATIENCE = 5_000; // ms that one look waits
@@ -42,7 +42,7 @@ function Found({ run }: { run: Run }) {
       <i style={{ background: colorOfName(run.engine) }} aria-hidden />
       <span>
         Started after all: <Link to={`/runs/${run.id}`}>run {run.number}</Link> on{" "}
-        {run.simulated ? "the simulator" : run.engine}, {runWord(run).word}.
+        {run.simulated ? "the simulator" : run.engine}, {runLabel(run).word}.
       </span>
     </p>
   );
@@ -77,7 +77,7 @@ function Start({ sent }: { sent: SentStart }) {
         <CloseButton
           size="sm"
           aria-label="Hide"
-          onClick={() => unsureStarts.settle(sent.request)}
+          onClick={() => unansweredStarts.settle(sent.request)}
         />
       ) : (
         <Loader size="xs" color="currentColor" aria-label="Looking" />
@@ -86,8 +86,8 @@ function Start({ sent }: { sent: SentStart }) {
   );
 }
 
-export function UnsureStartNotice() {
-  const starts = useSyncExternalStore(unsureStarts.subscribe, unsureStarts.list);
+export function UnansweredStartNotice() {
+  const starts = useSyncExternalStore(unansweredStarts.subscribe, unansweredStarts.list);
   if (starts.length === 0) return null;
   return (
     <section className={style.notice} aria-label="Starts that are not sure">

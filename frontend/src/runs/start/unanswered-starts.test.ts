@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { Run, StartFound } from "../../api/runs";
 import { missing, unknownWords } from "./unanswered-start-notice";
-import { type SentStart, UnsureStarts } from "./unanswered-starts";
+import { type SentStart, UnansweredStarts } from "./unanswered-starts";
 
 const sent: SentStart = {
   request: "q",
@@ -19,33 +19,33 @@ class Tab {
 
 test("a start that waits for its answer is not unsure, and one that was answered is forgotten", () => {
   const tab = new Tab();
-  const starts = new UnsureStarts(tab);
+  const starts = new UnansweredStarts(tab);
   starts.sends(sent);
   expect(starts.list()).toEqual([]);
   starts.settle("q");
-  expect(new UnsureStarts(tab).list()).toEqual([]);
+  expect(new UnansweredStarts(tab).list()).toEqual([]);
 });
 
 test("a start without an answer is unsure, and stays so when the page is loaded again", () => {
   const tab = new Tab();
-  const starts = new UnsureStarts(tab);
+  const starts = new UnansweredStarts(tab);
   let heard = 0;
   starts.subscribe(() => {
     heard += 1;
   });
   starts.sends(sent);
-  expect(new UnsureStarts(tab).list()).toEqual([sent]); // loaded again while it waits
+  expect(new UnansweredStarts(tab).list()).toEqual([sent]); // loaded again while it waits
   starts.doubt("q");
   expect(starts.list()).toEqual([sent]);
   expect(heard).toBe(2);
-  expect(new UnsureStarts(tab).list()).toEqual([sent]);
+  expect(new UnansweredStarts(tab).list()).toEqual([sent]);
 });
 
 test("what somebody else has put into the tab's store is no start", () => {
   const tab = new Tab();
   for (const text of ["", "{", "7", '{"a":1}', '[null, 1, {"request":"q"}]']) {
     tab.setItem("aa.starts", text);
-    expect(new UnsureStarts(tab).list()).toEqual([]);
+    expect(new UnansweredStarts(tab).list()).toEqual([]);
   }
   const throws = {
     getItem: () => {
@@ -55,7 +55,7 @@ test("what somebody else has put into the tab's store is no start", () => {
       throw new Error("full");
     },
   };
-  const starts = new UnsureStarts(throws);
+  const starts = new UnansweredStarts(throws);
   starts.sends(sent);
   starts.doubt("q");
   expect(starts.list()).toEqual([sent]);

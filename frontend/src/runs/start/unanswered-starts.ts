@@ -17,7 +17,7 @@ const MOST = 20;
 type Storing = Pick<Storage, "getItem" | "setItem">;
 
 /** Usable without React: `subscribe` and `list` fit `useSyncExternalStore`. */
-export class UnsureStarts {
+export class UnansweredStarts {
   readonly #storage: Storing | null;
   readonly #listeners = new Set<() => void>();
   #sent: readonly SentStart[];
@@ -93,4 +93,4 @@ function storage(): Storing | null {
   }
 }
 
-export const unsureStarts = new UnsureStarts(storage());
+export const unansweredStarts = new UnansweredStarts(storage());

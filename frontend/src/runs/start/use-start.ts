@@ -2,15 +2,15 @@
 import { notifications } from "@mantine/notifications";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import type { Script } from "../../api/dry-runs";
-import { keys, publish, type Version, versionName } from "../../api/graphs";
-import { leavesOpen, place, sentence } from "../../api/http";
+import { publish, queryKeys, type Version, versionName } from "../../api/graphs";
+import { errorPlace, errorText, isOutcomeUnknown } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import { type Started, type StartOrder, startRun } from "../../api/runs";
 import { newAid } from "../../graph/ids";
 import { memberText } from "../../graph/json-members";
-import { unsureStarts } from "./unanswered-starts";
+import { unansweredStarts } from "./unanswered-starts";
 
-export interface Order {
+export interface StartInput {
   /** The moment that shall run; awaited when the page has yet to hear its name. */
   seq: number | Promise<number>;
   engines: readonly string[];
@@ -22,7 +22,7 @@ export interface Order {
 }
 
 /** A moment as a version, and its graph exactly as the editor wrote it. */
-export async function published(
+export async function publishedVersion(
   graph: string,
   seq: number,
 ): Promise<{ version: Version; umrf: string }> {
@@ -38,7 +38,7 @@ export function nextLabel(versions: readonly Version[], seq: number): string {
   return same ? versionName(versions, same.id) : `v${versions.length + 1}`;
 }
 
-export function complain(title: string, message: string): void {
+export function notifyFailure(title: string, message: string): void {
   notifications.show({ color: "red", title, message, autoClose: 15_000 });
 }
 
@@ -46,14 +46,14 @@ export function useStart(graph: string) {
   const { live, runner } = useLive();
   const client = useQueryClient();
   return useMutation({
-    mutationFn: async ({ seq, engines, digest, script, override }: Order) => {
+    mutationFn: async ({ seq, engines, digest, script, override }: StartInput) => {
       if (runner === undefined) throw new Error("The runner is not known yet.");
-      const { version, umrf } = await published(graph, await seq);
-      void client.invalidateQueries({ queryKey: keys.versions(graph) });
+      const { version, umrf } = await publishedVersion(graph, await seq);
+      void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
       if (digest !== null && digest !== version.digest) {
         throw new Error("The graph is not the one that was looked at. Nothing was sent.");
       }
-      const versions = client.getQueryData<Version[]>(keys.versions(graph)) ?? [];
+      const versions = client.getQueryData<Version[]>(queryKeys.versions(graph)) ?? [];
       const what = `${nextLabel(versions, version.seq)} of ${nameIn(version)}`;
       const started = await surely(what, {
         runner,
@@ -70,11 +70,15 @@ export function useStart(graph: string) {
       return started;
     },
     onSuccess: ({ failed }) => {
-      for (const [robot, why] of Object.entries(failed)) complain(`Not started on ${robot}`, why);
+      for (const [robot, why] of Object.entries(failed))
+        notifyFailure(`Not started on ${robot}`, why);
     },
     onError: (error) => {
-      const where = place(error);
-      complain("Not started", where === "" ? sentence(error) : `${sentence(error)} (${where})`);
+      const where = errorPlace(error);
+      notifyFailure(
+        "Not started",
+        where === "" ? errorText(error) : `${errorText(error)} (${where})`,
+      );
     },
   });
 }
@@ -84,17 +88,17 @@ const NOTHING_KNOWN: Started = { runs: [], failed: {} };
 /** Sends a start. Where nobody says what became of it, that is looked for, and no failure is told. */
 async function surely(what: string, order: StartOrder): Promise<Started> {
   const { request, graph, engines } = order;
-  unsureStarts.sends({ request, graph, what, engines, at: Date.now() });
+  unansweredStarts.sends({ request, graph, what, engines, at: Date.now() });
   try {
     const started = await startRun(order);
-    unsureStarts.settle(request);
+    unansweredStarts.settle(request);
     return started;
   } catch (error) {
-    if (leavesOpen(error)) {
-      unsureStarts.doubt(request);
+    if (isOutcomeUnknown(error)) {
+      unansweredStarts.doubt(request);
       return NOTHING_KNOWN;
     }
-    unsureStarts.settle(request);
+    unansweredStarts.settle(request);
     throw error;
   }
 }

@@ -3,18 +3,18 @@ import { Button, Modal, Text, TextInput } from "@mantine/core";
 import { IconEye } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
-import { sentence } from "../../api/http";
+import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
-import { awaitsLook, confirmRest, type Run } from "../../api/runs";
+import { confirmRest, needsRestConfirmation, type Run } from "../../api/runs";
 import { useMay } from "../../api/use-person";
 import { HoldButton } from "../../ui/hold-button";
-import { complain } from "../start/use-start";
+import { notifyFailure } from "../start/use-start";
 import style from "./confirm-rest-button.module.css";
 
 const SHORTEST = 3; // characters, as the runner asks for
 
 /** `loud`: on the red of a notice. */
-export function RestButton({ run, loud = false }: { run: Run; loud?: boolean }) {
+export function ConfirmRestButton({ run, loud = false }: { run: Run; loud?: boolean }) {
   const { runner } = useLive();
   const may = useMay("operate");
   const [asking, setAsking] = useState(false);
@@ -22,9 +22,9 @@ export function RestButton({ run, loud = false }: { run: Run; loud?: boolean }) 
   const confirm = useMutation({
     mutationFn: () => confirmRest(runner ?? "", run.id, how.trim()),
     onSuccess: () => setAsking(false),
-    onError: (error) => complain("Not confirmed", sentence(error)),
+    onError: (error) => notifyFailure("Not confirmed", errorText(error)),
   });
-  if (!may || !awaitsLook(run)) return null;
+  if (!may || !needsRestConfirmation(run)) return null;
   const said = how.trim().length >= SHORTEST;
   return (
     <>

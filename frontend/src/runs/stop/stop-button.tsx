@@ -1,7 +1,7 @@
 /** STOP: one, always at the same place, never disabled; STOP ALL by keys from anywhere. */
 import { IconSquareFilled } from "@tabler/icons-react";
 import { useEffect } from "react";
-import type { Live, LiveLink } from "../../api/live/live-socket";
+import type { LiveLink, LiveSocket } from "../../api/live/live-socket";
 import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
 import type { Run } from "../../api/runs";
 import style from "./stop-button.module.css";
@@ -17,7 +17,7 @@ export function isStopAll(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKe
 }
 
 /** Also while somebody types, in dialogs and menus: nothing is asked before a Stop. */
-function useStopKey(live: Live | null): void {
+function useStopKey(live: LiveSocket | null): void {
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
       if (!isStopAll(event) || event.repeat) return;
@@ -30,7 +30,7 @@ function useStopKey(live: Live | null): void {
   }, [live]);
 }
 
-export function words(link: LiveLink, count: number): string {
+export function stopButtonText(link: LiveLink, count: number): string {
   if (link === "down") return "state unknown";
   if (link === "connecting") return "asking …";
   if (count === 0) return "nothing runs";
@@ -38,7 +38,7 @@ export function words(link: LiveLink, count: number): string {
 }
 
 /** What Stop means beside a graph: its one run, or its runs that were started together. */
-export function meantBy(here: readonly Run[]): { id: string; words: string } | null {
+export function runToStop(here: readonly Run[]): { id: string; words: string } | null {
   const [first, ...others] = here;
   if (first === undefined) return null;
   if (others.length === 0) {
@@ -56,7 +56,7 @@ export function StopButton({ graph }: Props) {
   useStopKey(live);
   const open = openRuns(now);
   const here = graph === undefined ? [] : open.filter((run) => run.graph === graph);
-  const meant = meantBy(here);
+  const meant = runToStop(here);
   const all = open.length + foreignGraphs(now).length;
   const calm = now.link === "live" && all === 0;
   const target = meant?.words ?? "everything that runs";
@@ -76,7 +76,7 @@ export function StopButton({ graph }: Props) {
           STOP<span aria-hidden>{meant || all === 0 ? "" : " ALL"}</span>
         </span>
         <span className={style.count} aria-hidden>
-          {words(now.link, meant ? here.length : all)}
+          {stopButtonText(now.link, meant ? here.length : all)}
         </span>
       </button>
       {beside && (

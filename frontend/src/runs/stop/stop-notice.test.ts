@@ -1,12 +1,12 @@
 import { expect, test } from "vitest";
-import type { LiveNow, StopAsked } from "../../api/live/live-socket";
-import { awaitsLook, type Run } from "../../api/runs";
-import { meantBy, words } from "./stop-button";
-import { movingAgain, noticeOf, othersNotice, unreached } from "./stop-notice";
+import type { LiveState, StopRequest } from "../../api/live/live-socket";
+import { needsRestConfirmation, type Run } from "../../api/runs";
+import { runToStop, stopButtonText } from "./stop-button";
+import { movingAgain, noticeOf, othersNotice, unreachableNotice } from "./stop-notice";
 
-const stop: StopAsked = { id: "s", run: "r", at: 1000, state: "heard", detail: "" };
+const stop: StopRequest = { id: "s", run: "r", at: 1000, state: "heard", detail: "" };
 
-function now(part: Partial<Run> | null, link: LiveNow["link"] = "live"): LiveNow {
+function now(part: Partial<Run> | null, link: LiveState["link"] = "live"): LiveState {
   const run = {
     id: "r",
     number: 7,
@@ -86,21 +86,23 @@ test("what an engine gave up is shouted whoever asked for it, until somebody has
 test("a person's word is asked for only where no answer can prove rest", () => {
   const run = { ended_at: null, simulated: false, started_at: "", unknown_since: null } as Run;
   const moving = { a: { state: "RUNNING" } } as unknown as NonNullable<Run["actions"]>;
-  expect(awaitsLook({ ...run, state: "running" })).toBe(false);
-  expect(awaitsLook({ ...run, state: "lost" })).toBe(true);
-  expect(awaitsLook({ ...run, state: "unknown", unknown_since: "1970" })).toBe(true);
-  expect(awaitsLook({ ...run, state: "stopping", unconfirmed: "why" })).toBe(true);
-  expect(awaitsLook({ ...run, state: "running", unconfirmed: "why", actions: moving })).toBe(false);
-  expect(awaitsLook({ ...run, state: "lost", simulated: true })).toBe(false);
+  expect(needsRestConfirmation({ ...run, state: "running" })).toBe(false);
+  expect(needsRestConfirmation({ ...run, state: "lost" })).toBe(true);
+  expect(needsRestConfirmation({ ...run, state: "unknown", unknown_since: "1970" })).toBe(true);
+  expect(needsRestConfirmation({ ...run, state: "stopping", unconfirmed: "why" })).toBe(true);
+  expect(
+    needsRestConfirmation({ ...run, state: "running", unconfirmed: "why", actions: moving }),
+  ).toBe(false);
+  expect(needsRestConfirmation({ ...run, state: "lost", simulated: true })).toBe(false);
 });
 
 test("beside a graph, Stop means its run or the group it is in, and else everything", () => {
   const one = { id: "a", number: 1, graph_name: "patrol", group: "g" } as Run;
   const two = { ...one, id: "b", number: 2 };
-  expect(meantBy([])).toBeNull();
-  expect(meantBy([one])?.id).toBe("a");
-  expect(meantBy([one, two])).toEqual({ id: "g", words: "the 2 runs of patrol" });
-  expect(meantBy([one, { ...two, group: null }])).toBeNull();
+  expect(runToStop([])).toBeNull();
+  expect(runToStop([one])?.id).toBe("a");
+  expect(runToStop([one, two])).toEqual({ id: "g", words: "the 2 runs of patrol" });
+  expect(runToStop([one, { ...two, group: null }])).toBeNull();
 });
 
 test("a run that was called stopped and moves again is shouted before anything else", () => {
@@ -119,18 +121,18 @@ test("a run that was called stopped and moves again is shouted before anything e
 test("a runner that is not reached is never silence", () => {
   for (const link of ["connecting", "down"] as const) {
     const why = "The runner does not answer.";
-    const lost: LiveNow = { ...now(null, link), unreached: { kind: "silent", why } };
-    expect(unreached(lost, 1_000)).toBeNull(); // a moment is nothing to shout about
-    const notice = unreached(lost, 60_000);
+    const lost: LiveState = { ...now(null, link), unreached: { kind: "silent", why } };
+    expect(unreachableNotice(lost, 1_000)).toBeNull(); // a moment is nothing to shout about
+    const notice = unreachableNotice(lost, 60_000);
     expect(notice?.tone).toBe("loud");
     expect(notice?.text).toContain("The runner does not answer.");
     expect(notice?.text).toContain("hardware stop");
-    expect(words(link, 0)).not.toBe("nothing runs");
+    expect(stopButtonText(link, 0)).not.toBe("nothing runs");
   }
-  expect(unreached(now(null), 60_000)).toBeNull();
+  expect(unreachableNotice(now(null), 60_000)).toBeNull();
   const mute = {
     ...now(null, "down"),
     unreached: { kind: "mute", why: "No socket opens." },
   } as const;
-  expect(unreached(mute, 60_000)?.text).toContain("CANNOT BE PROVEN");
+  expect(unreachableNotice(mute, 60_000)?.text).toContain("CANNOT BE PROVEN");
 });

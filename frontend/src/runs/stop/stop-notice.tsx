@@ -1,11 +1,11 @@
 /** What became of a Stop, in words, until it is proven. */
 import { CloseButton } from "@mantine/core";
 import { useState } from "react";
-import type { LiveNow, StopAsked } from "../../api/live/live-socket";
+import type { LiveState, StopRequest } from "../../api/live/live-socket";
 import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
-import { awaitsLook, type Run } from "../../api/runs";
+import { needsRestConfirmation, type Run } from "../../api/runs";
 import { clock, duration, useNow } from "../../ui/times";
-import { RestButton } from "./confirm-rest-button";
+import { ConfirmRestButton } from "./confirm-rest-button";
 import style from "./stop-notice.module.css";
 
 const LOUD = 2_500; // ms without proof until the notice shouts
@@ -13,14 +13,14 @@ const HEARD = 1_200; // ms within which the runner answers a Stop, if it does
 const GONE = 6_000; // ms that a proven stop stays to be read
 
 /** `since` goes on with each moment, so it is seen but not announced again and again. */
-export type Notice = {
+export type StopNoticeText = {
   tone: "quiet" | "loud" | "done";
   text: string;
   since?: string;
   stays?: true;
 } | null;
 
-function targets(stop: StopAsked, now: LiveNow): Run[] {
+function targets(stop: StopRequest, now: LiveState): Run[] {
   if (stop.run !== "all") {
     return [...now.runs.values()].filter((run) => [run.id, run.group].includes(stop.run));
   }
@@ -36,7 +36,7 @@ function reasonOf(run: Run): string {
   return alarm ? alarm.text.replace(/^STOP UNCONFIRMED: /, "") : "";
 }
 
-function unconfirmed(runs: readonly Run[], since?: string): Notice {
+function unconfirmed(runs: readonly Run[], since?: string): StopNoticeText {
   const each = runs.map((run) => `run ${run.number} on ${run.engine}`).join(", ");
   const why = runs.map(reasonOf).find((reason) => reason !== "") ?? "no proof has come.";
   const look = runs.some((run) => run.unconfirmed)
@@ -47,7 +47,7 @@ function unconfirmed(runs: readonly Run[], since?: string): Notice {
 }
 
 /** Never says "stopped" without the runs' own state saying so. */
-export function noticeOf(stop: StopAsked, now: LiveNow, at: number): Notice {
+export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNoticeText {
   const waited = at - stop.at;
   const since = `asked ${duration(waited)} ago`;
   if (stop.state === "refused") {
@@ -91,7 +91,7 @@ export function noticeOf(stop: StopAsked, now: LiveNow, at: number): Notice {
 }
 
 /** A run that was said to be over and is not: nothing else is as urgent. */
-export function movingAgain(now: LiveNow): Notice {
+export function movingAgain(now: LiveState): StopNoticeText {
   const runs = openRuns(now).filter((run) => run.moves_again_at);
   if (runs.length === 0) return null;
   const each = runs.map((run) => {
@@ -107,7 +107,7 @@ export function movingAgain(now: LiveNow): Notice {
 }
 
 /** What somebody else has asked for and what is not proven either: everybody is told. */
-export function othersNotice(now: LiveNow): Notice {
+export function othersNotice(now: LiveState): StopNoticeText {
   if (now.link === "down") return null;
   const shouting = openRuns(now).filter(
     (run) => Boolean(run.unconfirmed) || (run.desired === "stopped" && reasonOf(run) !== ""),
@@ -123,7 +123,7 @@ export function othersNotice(now: LiveNow): Notice {
 const UNREACHED = 6_000; // ms that the runner may take to answer before a page says that it does not
 
 /** Stop looks as always: where it would reach nobody that has to be said before it is needed. */
-export function unreached(now: LiveNow, at: number): Notice {
+export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
   if (now.link === "live" || at - now.since < UNREACHED) return null;
   const { kind, why } = now.unreached ?? { kind: "silent", why: "The runner does not answer." };
   const head = kind === "mute" ? "STOP CANNOT BE PROVEN HERE" : "STOP MAY REACH NOBODY";
@@ -144,10 +144,12 @@ export function StopNotice() {
     movingAgain(now) ??
     (watching ? noticeOf(last, now, at) : null) ??
     othersNotice(now) ??
-    unreached(now, at);
+    unreachableNotice(now, at);
   if (notice === null) return null;
   const looked =
-    notice.tone === "loud" && now.link !== "down" ? openRuns(now).find(awaitsLook) : undefined;
+    notice.tone === "loud" && now.link !== "down"
+      ? openRuns(now).find(needsRestConfirmation)
+      : undefined;
   return (
     <div
       className={style.notice}
@@ -162,7 +164,7 @@ export function StopNotice() {
           </span>
         )}
       </span>
-      {looked && <RestButton run={looked} loud />}
+      {looked && <ConfirmRestButton run={looked} loud />}
       {!notice.stays && (
         <CloseButton size="sm" aria-label="Hide" onClick={() => setDismissed(last?.id ?? "")} />
       )}
