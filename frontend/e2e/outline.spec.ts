@@ -1,4 +1,4 @@
-/** The twin of the canvas: outline and search by keyboard alone, comments between two people. */
+/** The outline and search by keyboard alone, comments between two people. */
 
 import { expect, type Page, test } from "@playwright/test";
 import { card, saved } from "./canvas";

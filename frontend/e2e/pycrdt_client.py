@@ -1,6 +1,6 @@
 """pycrdt's own client in a room: adds an action, prints the names it sees whenever they change.
 
-Usage: stock.py ROOM_URL TOKEN NAME. Ends when its input ends; exit code 1 if the room dropped it.
+Usage: pycrdt_client.py ROOM_URL TOKEN NAME. Ends when its input ends; exit code 1 if the room dropped it.
 """
 
 import sys

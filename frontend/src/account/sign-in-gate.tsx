@@ -75,7 +75,7 @@ function inside(gate: Gate, person: Person): Gate & { at: "inside" } {
   return { at: "inside", person: same ? known : person, visit: visitOf(gate) + 1 };
 }
 
-/** A link that does not open the door puts nobody out who is inside already. */
+/** A link that is refused puts nobody out who is inside already. */
 const stay = (gate: Gate, next: Gate): Gate =>
   gate.at === "inside" && next.at === "outside" ? gate : next;
 

@@ -1,4 +1,4 @@
-/** Rehearsals: what a graph would do by the engine's rules. Nothing is recorded. */
+/** Dry-runs: what a graph would do by the engine's rules. Nothing is recorded. */
 import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { fetchJson } from "./http";
 

@@ -1,4 +1,4 @@
-/** What the runner tells of past runs: films, marks, comparisons, statistics, files. */
+/** What the runner tells of past runs: replays, marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
 import { fetchJson, fetchLines } from "./http";
 import { type ActionRun, type DurationBounds, getRun, type Run, type Visit } from "./runs";
@@ -34,7 +34,7 @@ export interface ReplayMark {
   since?: string;
 }
 
-/** A page of a run's film: `base` after `after` events, then the frames of the next ones. */
+/** A page of a run's replay: `base` after `after` events, then the frames of the next ones. */
 export interface Replay {
   run: string;
   after: number;

@@ -73,7 +73,7 @@ export interface IndexedByRobot {
   unread: number;
 }
 
-/** A line of a robot's flight record. */
+/** A line of a robot's log. */
 export interface RobotLogLine {
   seq: number;
   at: string;

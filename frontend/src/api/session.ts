@@ -12,7 +12,7 @@ export interface Person {
 
 const NAME_KEY = "aa.name";
 
-/** What opens the door: the server's token, or an invitation (`ID.SECRET`). */
+/** What signs somebody in: the server's token, or an invitation (`ID.SECRET`). */
 export type Credential =
   | { readonly kind: "token"; readonly text: string }
   | { readonly kind: "invitation"; readonly text: string };

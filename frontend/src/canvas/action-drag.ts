@@ -1,4 +1,4 @@
-/** Carries actions from the list to the canvas. */
+/** Dragging actions from the library to the canvas. */
 import type { NewAction } from "../graph/edit";
 import { PointerDrag } from "../ui/pointer-drag";
 

@@ -1,4 +1,4 @@
-/** What cards show besides themselves: whether their robot is in the light, and how much is said. */
+/** Highlights on cards: whose robot's actions stand out, and how many open threads each has. */
 import { useSyncExternalStore } from "react";
 import type { Key } from "../graph/model";
 

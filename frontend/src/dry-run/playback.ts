@@ -1,4 +1,4 @@
-/** A trace as something to play: moments, what is seen at each, and what it says in words. Pure. */
+/** Playback of a trace: moments, what is seen at each, and what it says in words. Pure. */
 
 import type { TraceEvent } from "../api/dry-runs";
 import { fullName, type Graph, type Key } from "../graph/model";

@@ -1,4 +1,4 @@
-/** Every deed there is, in the order in which menus and help list them. */
+/** Every edit action, in the order in which menus and help list them. */
 import { ALIGN, DISTRIBUTE, NUDGE, snap, tidy, tidySelection } from "./arrange";
 import * as draw from "./draw";
 import { DRY_RUN } from "./dry-run-actions";

@@ -1,4 +1,4 @@
-/** Deeds that put things in their place: align, distribute, tidy, nudge, snap. */
+/** Edit actions that place things: align, distribute, tidy, nudge, snap. */
 import {
   IconArrowDown,
   IconArrowLeft,

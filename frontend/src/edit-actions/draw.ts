@@ -1,4 +1,4 @@
-/** Deeds that draw: add, copy, paste, delete, connect. */
+/** Edit actions that draw: add, copy, paste, delete, connect. */
 import {
   IconArrowBackUp,
   IconArrowForwardUp,

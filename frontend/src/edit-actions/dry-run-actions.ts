@@ -1,4 +1,4 @@
-/** Deeds of a dry-run: play the graph on the canvas, step by step, and decide how things end. */
+/** Edit actions of a dry-run: play the graph on the canvas, step by step, and decide how things end. */
 import {
   IconCheck,
   IconExclamationMark,

@@ -1,4 +1,4 @@
-/** A deed: something a person can do, as a value. Toolbar, menus, palette, keys and help are made of these. */
+/** An edit action: something a person can do in the editor, as a value. Toolbar, menus, palette, keys and help are made of these. */
 import type { Icon } from "@tabler/icons-react";
 import type { EditorContext } from "./editor-context";
 
@@ -92,7 +92,7 @@ export function printedKeys(shortcut: string, mac = onMac): string[] {
   });
 }
 
-/** The deed that a key press asks for. */
+/** The edit action that a key press asks for. */
 export function editActionFor(
   editActions: readonly EditAction[],
   event: Pressed,

@@ -1,4 +1,4 @@
-/** What a deed works on: the open graph, what is selected, and the view of it. */
+/** What edit actions work on: the open graph, what is selected, and the view of it. */
 import { createContext, use } from "react";
 import type * as Y from "yjs";
 import { CARD, unplaced } from "../canvas/geometry/arrange";

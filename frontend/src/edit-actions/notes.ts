@@ -1,4 +1,4 @@
-/** Deeds with notes and frames, and those that open what is chosen. */
+/** Edit actions for notes and frames, and those that open what is chosen. */
 import {
   IconFrame,
   IconLayoutSidebarRight,

@@ -1,4 +1,4 @@
-/** Deeds that look for something in the graph, or at another side of it. */
+/** Edit actions that open a panel, find or a dry-run. */
 import { IconListTree, IconMessageCircle, IconSearch } from "@tabler/icons-react";
 import type { EditAction } from "./edit-action";
 

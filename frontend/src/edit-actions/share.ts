@@ -1,4 +1,4 @@
-/** Deeds about the graph as a whole: take it elsewhere, point others to it. */
+/** Edit actions for the whole graph: export it, copy a link to it. */
 
 import { IconDownload, IconLink, IconPhoto, IconVectorTriangle } from "@tabler/icons-react";
 import { copyLinkTo } from "./clipboard";

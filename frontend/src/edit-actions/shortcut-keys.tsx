@@ -1,4 +1,4 @@
-/** A deed's first shortcut, as it is printed on keys. */
+/** The first shortcut of an edit action, as it is printed on keys. */
 import { Kbd } from "@mantine/core";
 import style from "../editor/menus/toolbar.module.css";
 import { type EditAction, printedKeys } from "./edit-action";

@@ -1,4 +1,4 @@
-/** Shortcuts of deeds, where nobody is typing; and the clipboard's own events. */
+/** Keyboard shortcuts of edit actions, where nobody is typing; and the clipboard's own events. */
 import { useLocalStorage } from "@mantine/hooks";
 import { useEffect, useRef } from "react";
 import { EDIT_ACTIONS } from "./all";

@@ -1,4 +1,4 @@
-/** Deeds that change what is seen, not what is drawn. */
+/** Edit actions that change the view, not the graph. */
 import {
   IconArrowGuide,
   IconBraces,

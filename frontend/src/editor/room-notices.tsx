@@ -1,4 +1,4 @@
-/** What the room has to say beside the graph: calm words over the canvas, each with a way out. */
+/** Notices of the room over the canvas: what happened to edits, each with what one can do. */
 import { Button, CloseButton, Modal, Text } from "@mantine/core";
 import { IconArchive, IconHistory, IconInfoCircle, IconLock, IconUsers } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";

@@ -1,4 +1,4 @@
-/** Whether what is on screen is safe, in words. */
+/** Whether what is on screen is stored, in words. */
 import { Tooltip } from "@mantine/core";
 import {
   IconAlertTriangle,

@@ -185,7 +185,7 @@ function Answers({ choice, taken, some, onLater, onSave }: AnswersProps) {
   );
 }
 
-/** A deed that takes its time and may fail. When it succeeds the dialog is gone. */
+/** Something that takes its time and may fail. When it succeeds the dialog is gone. */
 function useWork() {
   const [busy, setBusy] = useState(false);
   const [trouble, setTrouble] = useState<string | null>(null);

@@ -1,4 +1,4 @@
-/** The state of an open editor, and the bench that deeds work on. */
+/** The state of an open editor, and the context that edit actions work on. */
 
 import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";

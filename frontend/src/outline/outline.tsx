@@ -1,7 +1,7 @@
 /**
- * The graph as a tree grid: the twin of the canvas for keyboards, fingers and ears.
+ * The graph as a tree grid: everything the canvas does, for keyboard, touch and screen readers.
  *
- * Rows are walked with the arrow keys (right opens, left closes or goes up) and each has its deeds
+ * Rows are walked with the arrow keys (right opens, left closes or goes up) and each has its actions
  * by key and in a menu. What is selected here is selected on the canvas, and the other way round.
  */
 import { Button, Kbd } from "@mantine/core";

@@ -1,4 +1,4 @@
-/** The robots of a graph: what each is called, its colour, and putting one in the light. */
+/** The robots of a graph: what each is called, its colour, and highlighting the actions of one. */
 import { memo, useMemo } from "react";
 import { cardHighlights, useHighlightedRobot } from "../canvas/card-highlights";
 import { useEditorContext } from "../edit-actions/editor-context";

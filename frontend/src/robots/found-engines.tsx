@@ -1,4 +1,4 @@
-/** Engines in sight that nobody registered: one tap takes them in. */
+/** Engines that were found and that nobody registered: one tap registers them. */
 import { Button } from "@mantine/core";
 import { IconRadar2 } from "@tabler/icons-react";
 import { useLive } from "../api/live/use-live";

@@ -1,4 +1,4 @@
-/** The flight record of a robot: what others told it and how its engine was, newest first. */
+/** The log of a robot: what others told it and how its engine was, newest first. */
 import { Button, Text } from "@mantine/core";
 import { IconFileImport } from "@tabler/icons-react";
 import { Link } from "wouter";

@@ -1,5 +1,5 @@
 /**
- * Whether the server knows this browser as the person whose edits wait here.
+ * Admission to a room: whether the server knows this browser as the person whose edits wait here.
  *
  * Asked before each attempt to enter a room, since a browser does not tell a page why an upgrade was
  * refused, and since somebody else may have signed in with another tab meanwhile: the edits of one

@@ -1,5 +1,5 @@
 /**
- * Whether the page shows what the server has: compared when nothing has happened for a while.
+ * A fingerprint of the document, to tell whether the page shows what the server has: compared when nothing has happened for a while.
  *
  * Equal state vectors do not prove equal documents. So of all entries of the shared maps the CRC-32
  * of root, key and value is summed up, which needs no order and no secure context. The server's

@@ -1,5 +1,5 @@
 /**
- * A person's stay at a graph: one room, and the next one when history changes under it.
+ * The page's connection to a graph: one room, and the next one when the server changes its history.
  *
  * A room whose history the server has left is followed by one that shows what the server has now;
  * edits that wait on the old one are laid aside for the person to decide about, never merged. A page

@@ -1,5 +1,5 @@
 /**
- * What this device keeps of graphs that were open here: a copy to open offline, and the edits that
+ * What IndexedDB keeps of graphs that were open here: a copy to open offline, and the edits that
  * no server has stored yet.
  *
  * Everything is kept per graph, epoch and person, so that on a shared tablet nobody's edits are ever

@@ -1,5 +1,5 @@
 /**
- * Which of a person's edits are durable.
+ * The person's edits that the server has not stored yet.
  *
  * The room acknowledges by counting this socket's document messages (sync step 2 and updates), so
  * each waiting edit remembers the message that carried it. A new socket counts from nothing: what

@@ -1,5 +1,5 @@
 /**
- * A room's dealings with the device: edits are stored as they are made and let go once durable.
+ * Persistence of a room's edits on this device: they are stored as they are made and let go once durable.
  *
  * Writes are grouped: while one is under way, what comes next waits for the one after it. What
  * others change is written with the next edit that may build on it, or a little later.

@@ -1,7 +1,7 @@
 /**
- * A socket that comes back: dials, waits longer each time, notices when the other end is dead.
+ * A WebSocket that reconnects: dials, waits longer each time, notices when the other end is dead.
  *
- * Knows nothing of documents. Whether to dial at all is asked at the door (`admit`); when to stop is
+ * Knows nothing of documents. Whether to dial at all is asked before (`admit`); when to stop is
  * said by close codes.
  */
 
@@ -30,14 +30,14 @@ export interface ReconnectingSocketOptions {
   readonly admit: AdmissionCheck | null;
 }
 
-/** Who speaks over the line. */
+/** Who sends and receives over the socket. */
 export interface SocketHandler {
   /** Whether something waits to be sent: then a hidden page hurries too. */
   hasWork(): boolean;
   /** A question that any living server answers at once. */
   probe(): Uint8Array<ArrayBuffer>;
   onOpen(): void;
-  /** Throws what cannot be read; the line then begins anew. */
+  /** Throws what cannot be read; the socket then begins anew. */
   onMessage(data: Uint8Array): void;
   /** The socket is gone, whatever comes next. */
   onDrop(): void;
@@ -58,7 +58,7 @@ export class ReconnectingSocket {
   private probedAt: number | null = null;
   private turn = 0;
   private attempts = 0;
-  /** Sockets in a row that did not open although the door had let us in. */
+  /** Sockets in a row that did not open although admission was granted. */
   private unopened = 0;
   private retry: ReturnType<typeof setTimeout> | undefined;
   private readonly watch: ReturnType<typeof setInterval>;

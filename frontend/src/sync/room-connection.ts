@@ -221,7 +221,7 @@ class Connection implements Room, SocketHandler {
       ? Y.encodeStateAsUpdate(this.doc)
       : null;
 
-  // -- the line -------------------------------------------------------------------------------
+  // -- socket ---------------------------------------------------------------------------------
 
   private url(): string {
     const url = new URL(this.address);

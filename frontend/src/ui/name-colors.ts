@@ -1,4 +1,4 @@
-/** A robot's colour: stable for its name, the same for everybody. */
+/** Colours and initials for names: stable, the same for everybody. */
 const COLOURS = 6;
 
 function hash(text: string): number {

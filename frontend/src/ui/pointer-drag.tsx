@@ -1,4 +1,4 @@
-/** Something carried by the pointer from a list to a place that takes it. By pointer events: works for fingers. */
+/** Drag and drop by pointer events, so that it works for fingers too. */
 import { type PointerEvent as ReactPointerEvent, useEffect, useSyncExternalStore } from "react";
 import style from "./pointer-drag.module.css";
 

@@ -1,4 +1,4 @@
-/** The ways of arrows: down, down a lane beside cards, or back up on one. Pure. */
+/** The paths of arrows: down, down a lane beside cards, or back up on one. Pure. */
 import { getBezierPath, Position } from "@xyflow/react";
 import { anchorOf } from "./label-places";
 

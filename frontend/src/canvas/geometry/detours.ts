@@ -1,4 +1,4 @@
-/** Ways round: an arrow that would pass behind cards gets a lane beside them. Pure. */
+/** Detours: an arrow that would pass behind cards gets a lane beside them. Pure. */
 
 export interface Rectangle {
   readonly x: number;

@@ -1,4 +1,4 @@
-/** Where to look: views of the canvas that keep text readable. Pure. */
+/** Viewports of the canvas (offset and zoom) that keep text readable. Pure. */
 import type { Positions, Sizes } from "./arrange";
 import { CARD } from "./arrange";
 

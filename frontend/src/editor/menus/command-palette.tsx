@@ -1,4 +1,4 @@
-/** The palette: every deed with its shortcut, and every place to go to. */
+/** The command palette: every edit action with its shortcut, and every place to go to. */
 import { Modal } from "@mantine/core";
 import { IconRouteSquare2, IconSquareRounded } from "@tabler/icons-react";
 import { useMemo, useRef } from "react";
@@ -12,7 +12,7 @@ import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
 
 const MOST = 60;
-/** Names of deeds that were done from here, the last first. */
+/** Names of edit actions that were done from here, the last first. */
 let recent: readonly string[] = [];
 
 function deedOptions(context: EditorContext): Option[] {

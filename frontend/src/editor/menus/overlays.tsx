@@ -1,4 +1,4 @@
-/** What opens over the editor, one at a time: menus, the palette, dialogs of single deeds. */
+/** What opens over the editor, one at a time: menus, the palette, dialogs of single edit actions. */
 
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import { ArrowDialog, RetargetDialog } from "./arrow-dialog";

@@ -1,4 +1,4 @@
-/** Tools on the canvas, and the menu of every deed. */
+/** Tools on the canvas, and the menu of every edit action. */
 import { ActionIcon, Menu, Tooltip } from "@mantine/core";
 import { IconDots } from "@tabler/icons-react";
 import { Fragment, memo } from "react";

@@ -1,4 +1,4 @@
-/** What of a film stands on the time axis, and what its marks say in words. */
+/** What of a replay stands on the time axis, and what its marks say in words. */
 import type { Replay, ReplayMark } from "../../api/review";
 import type { Run } from "../../api/runs";
 import type { TimeGap, TimeSign } from "../../status/timeline";

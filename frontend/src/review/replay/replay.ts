@@ -1,4 +1,4 @@
-/** A run at any moment of its film: what was known then, and nothing that was learned later. */
+/** A run at any moment of its replay: what was known then, and nothing that was learned later. */
 import type { ActionFrame, Frame, Replay } from "../../api/review";
 import type { ActionRun, Run } from "../../api/runs";
 import { instant } from "../../ui/times";
@@ -75,7 +75,7 @@ export function shows(frame: Frame): boolean {
   );
 }
 
-/** A film that can be asked for any number of its frames, quickly in any order. */
+/** A replay that can be asked for any number of its frames, quickly in any order. */
 export class ReplayPlayer {
   readonly replay: Replay;
   private readonly known: Run[];
@@ -121,7 +121,7 @@ export class ReplayPlayer {
   }
 }
 
-/** The page of a film in which `time` lies: how many events come before it. */
+/** The page of a replay in which `time` lies: how many events come before it. */
 export function chapterAt(chapters: Replay["chapters"], time: number): number {
   let after = 0;
   for (const chapter of chapters) {

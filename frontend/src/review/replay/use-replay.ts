@@ -15,7 +15,7 @@ export interface ReplayCursor {
   end: number;
   playing: boolean;
   speed: number;
-  /** The film is on its way. */
+  /** The replay is on its way. */
   waiting: boolean;
   failed: unknown;
   /** The run as it was known at the cursor. */
@@ -27,7 +27,7 @@ export interface ReplayCursor {
   step: (direction: 1 | -1) => void;
 }
 
-const AGAIN = 3_000; // ms between two looks at the film of a run that goes on
+const AGAIN = 3_000; // ms between two requests for the replay of a run that goes on
 
 /** `newest`: the run as it is known now; `end`: the right edge of its time. */
 export function useReplay(

@@ -1,4 +1,4 @@
-/** Whom this page follows: it looks where they look until either side has enough of it. */
+/** The person whose view this page follows, until either side ends it. */
 
 import { isSameView, type PresenceSource, type SharedView } from "./presence";
 

@@ -1,5 +1,5 @@
 /**
- * The pace of a page: what comes from others is told with a frame, what comes together once.
+ * Schedules updates with animation frames: what comes from others is told with a frame, what comes together once.
  *
  * A message with an edit is followed by one that names its place in the log, and twenty people send
  * many of both. Drawing after each would only make frames late that nobody sees.

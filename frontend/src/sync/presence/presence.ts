@@ -1,5 +1,5 @@
 /**
- * Who else is in the room and what they are at: cursors, selections, drags, the field they edit.
+ * Presence: who else is in the room and what they do: cursors, selections, drags, the field they edit.
  *
  * Travels by awareness and is stored nowhere. The server stamps `user` on what a page sends, so
  * names and colours here are the server's word; everything else is another page's word and is taken
