@@ -1,8 +1,7 @@
 /** The bar on top of every page: where one is, what one may do, and STOP at its right end. */
 
 import { Fragment, type ReactNode } from "react";
-import { Link } from "wouter";
-import { serverPath } from "../api/page-url";
+import { Link, useRouter } from "wouter";
 import style from "./top-bar.module.css";
 
 export interface Crumb {
@@ -24,7 +23,8 @@ interface Props {
 }
 
 export function Logo() {
-  return <img src={serverPath("/mark.svg")} alt="" width={24} height={24} className={style.mark} />;
+  const { base } = useRouter();
+  return <img src={`${base}/mark.svg`} alt="" width={24} height={24} className={style.mark} />;
 }
 
 /** The focus goes past the bar. */
