@@ -1,7 +1,7 @@
 /** Five runs that failed in five ways: the page names the cause of each, and shows where. */
 
 import { expect, test } from "@playwright/test";
-import { card } from "./bench";
+import { card } from "./canvas";
 import { type Person, Product } from "./product";
 
 const product = new Product();

@@ -1,7 +1,7 @@
 /** Files of old dialects: what was translated is shown before anything is kept. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card, saved } from "./bench";
+import { card, saved } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();

@@ -1,9 +1,9 @@
 /** Everything without a pointer: a graph built from nothing, walked through, linked to. */
 
 import { expect, type Locator, type Page, test } from "@playwright/test";
-import { arrows, card, meaningOf, meant, saved } from "./bench";
+import { arrows, card, meaningOf, meant, saved } from "./canvas";
 import { Product } from "./product";
-import { semantics_test_5 } from "./semantics";
+import { semantics_test_5 } from "./task-graphs";
 
 const product = new Product();
 

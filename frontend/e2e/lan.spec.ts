@@ -4,7 +4,7 @@
  */
 
 import { type Browser, expect, type Page, test } from "@playwright/test";
-import { add, card, saved, start } from "./bench";
+import { add, card, saved, start } from "./canvas";
 import { type Person, Product, TOKEN } from "./product";
 
 const LAB = "lab.test";

@@ -2,7 +2,7 @@
 
 import { readFileSync } from "node:fs";
 import { expect, type Page, test } from "@playwright/test";
-import { add, card, saved, umrfOf } from "./bench";
+import { add, card, saved, umrfOf } from "./canvas";
 import { LONG, Product } from "./product";
 
 const product = new Product();

@@ -1,7 +1,7 @@
 /** On a phone, with fingers only: a graph is made, connected, given a parameter, started, stopped. */
 
 import { expect, type Locator, type Page, test } from "@playwright/test";
-import { saved } from "./bench";
+import { saved } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();

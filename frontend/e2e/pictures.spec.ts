@@ -2,9 +2,9 @@
 
 import { resolve } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
-import { card, saved } from "./bench";
+import { card, saved } from "./canvas";
+import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
 import { Product } from "./product";
-import { DOMAIN, NO_ROS, StandIn } from "./robot";
 
 test.skip(process.env.PICTURES !== "1", "takes pictures for the documentation: make pictures");
 

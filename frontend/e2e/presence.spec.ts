@@ -1,7 +1,7 @@
 /** Several people in one graph: whom they follow, who writes where, under whatever name. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { add, card, saved } from "./bench";
+import { add, card, saved } from "./canvas";
 import { type Person, Product } from "./product";
 
 const product = new Product();

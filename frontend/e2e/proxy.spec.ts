@@ -4,7 +4,7 @@
  */
 
 import { type Browser, expect, type Page, test } from "@playwright/test";
-import { add, card, saved, start } from "./bench";
+import { add, card, saved, start } from "./canvas";
 import { freePort, LONG, type Person, Product, TOKEN } from "./product";
 import { type Kind, missing, NAME, ProxyServer } from "./proxies";
 

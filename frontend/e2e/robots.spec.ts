@@ -1,9 +1,9 @@
 /** Robots, from the page to stand-ins over real rclpy and back: to the end, to a stop, and worse. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { saved, seenRunning, watch } from "./bench";
+import { saved, seenRunning, watch } from "./canvas";
+import { DOMAIN, NO_ROS, OlderEngine, StandIn, Stranger } from "./emulated-robot";
 import { type Person, Product } from "./product";
-import { DOMAIN, NO_ROS, OlderEngine, StandIn, Stranger } from "./robot";
 
 test.skip(NO_ROS !== "", NO_ROS);
 test.describe.configure({ mode: "serial" });

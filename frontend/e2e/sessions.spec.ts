@@ -2,7 +2,7 @@
 
 import { createHash, createHmac } from "node:crypto";
 import { type BrowserContext, expect, test } from "@playwright/test";
-import { add, card, saved, start } from "./bench";
+import { add, card, saved, start } from "./canvas";
 import { Product, TOKEN } from "./product";
 
 const product = new Product();

@@ -4,7 +4,7 @@ import { spawn } from "node:child_process";
 import { mkdirSync, writeFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
-import { boxOf, saved } from "./bench";
+import { boxOf, saved } from "./canvas";
 import { Product, pause, TOKEN } from "./product";
 
 const ROOT = resolve(import.meta.dirname, "../..");

@@ -2,7 +2,7 @@
 
 import { execFileSync } from "node:child_process";
 import { expect, type Page, test } from "@playwright/test";
-import { saved, start } from "./bench";
+import { saved, start } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();

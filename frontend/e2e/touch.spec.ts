@@ -1,7 +1,7 @@
 /** With fingers only: a tablet does the whole job, and a phone does it too. */
 
 import { type CDPSession, expect, type Locator, type Page, test } from "@playwright/test";
-import { arrows, card, saved } from "./bench";
+import { arrows, card, saved } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();

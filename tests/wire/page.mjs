@@ -26,10 +26,10 @@ async function bundled() {
   try {
     const entry = join(frontend, "wire-test-entry.js");
     const source = `
-      export * as edit from "./src/graph/edit.ts";
-      export * as layout from "./src/graph/layout.ts";
+      export * as edit from "./src/graph/edit/index.ts";
+      export * as layout from "./src/graph/document-keys.ts";
       export * as read from "./src/graph/read.ts";
-      export * as room from "./src/room/connect.ts";
+      export * as room from "./src/sync/room-connection.ts";
       export * as Y from "yjs";
       export { WebsocketProvider } from "y-websocket";
     `;
@@ -110,7 +110,7 @@ const operations = {
   /** Joins a room as the page does. */
   join({ name, url, token }) {
     const Socket = socketWith(token);
-    const room = page.room.connect({ url, open: (address) => new Socket(address) });
+    const room = page.room.connectRoom({ url, open: (address) => new Socket(address) });
     rooms.set(name, { doc: room.doc, room, leave: () => room.close() });
     return {};
   },

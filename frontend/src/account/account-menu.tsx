@@ -13,11 +13,11 @@ import {
 } from "@mantine/core";
 import { IconDeviceDesktop, IconLogout, IconMoon, IconShare, IconSun } from "@tabler/icons-react";
 import { useState } from "react";
-import { sentence } from "../api/http";
-import { usePerson } from "../api/person";
+import { errorText } from "../api/http";
+import { useLive } from "../api/live/use-live";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
-import { useLive } from "../api/use-live";
-import { initials, personColor } from "../ui/robot";
+import { usePerson } from "../api/use-person";
+import { colorOfId, initials } from "../ui/name-colors";
 
 const schemes = [
   { value: "light", label: <IconSun size={15} aria-label="Light" /> },
@@ -38,7 +38,7 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
       await rename(name.trim());
       setOpen(false);
     } catch (error) {
-      setProblem(sentence(error));
+      setProblem(errorText(error));
     }
   };
   const leave = async () => {
@@ -46,7 +46,7 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
       await signOut(runner);
       location.reload();
     } catch (error) {
-      setProblem(sentence(error));
+      setProblem(errorText(error));
     }
   };
   return (
@@ -57,7 +57,7 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
           aria-label={`You are ${person.name || "Guest"}. Name and appearance`}
           title={person.name || "Guest"}
         >
-          <Avatar size={28} radius="xl" variant="filled" color={personColor(person.id)}>
+          <Avatar size={28} radius="xl" variant="filled" color={colorOfId(person.id)}>
             <Text span size="xs" fw={650} c="var(--on-accent)" aria-hidden>
               {initials(person.name || "Guest")}
             </Text>

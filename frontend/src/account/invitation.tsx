@@ -1,25 +1,25 @@
 /** The page for somebody who comes by a link: says what it leads to, and asks for a name, once. */
 import { Button, Paper, Text, TextInput, Title } from "@mantine/core";
 import {
-  type Invited,
-  type Key,
+  type Credential,
+  type InvitationPreview,
   openSession,
   type Person,
   ROLE_WORDS,
   rememberName,
 } from "../api/session";
-import { Mark } from "../ui/top-bar";
+import { Logo } from "../ui/top-bar";
 import style from "./sign-in.module.css";
-import { useEntry } from "./use-entry";
+import { useSignInField } from "./use-sign-in-field";
 
 interface Props {
-  link: Key;
-  invited: Invited;
+  link: Credential;
+  invited: InvitationPreview;
   onOpen: (person: Person) => void;
 }
 
 export function Invitation({ link, invited, onOpen }: Props) {
-  const entry = useEntry(async (name) => {
+  const entry = useSignInField(async (name) => {
     const person = await openSession(link, name);
     rememberName(person.name);
     return person;
@@ -27,7 +27,7 @@ export function Invitation({ link, invited, onOpen }: Props) {
   return (
     <main className={style.page}>
       <Paper className={style.card} withBorder radius="lg">
-        <Mark />
+        <Logo />
         <Title order={1} size="h3" mt="md">
           {invited.by === "" ? "You are invited" : `${invited.by} invites you`} as {invited.role}
         </Title>

@@ -3,8 +3,8 @@ import { Button, Group, Modal, SegmentedControl, Select, Text, TextInput } from 
 import { useMediaQuery } from "@mantine/hooks";
 import { IconLock, IconLockOpen2, IconPlugConnectedX } from "@tabler/icons-react";
 import { useState } from "react";
-import { sentence } from "../api/http";
-import { pageUrl } from "../api/place";
+import { errorText } from "../api/http";
+import { pageUrl } from "../api/page-url";
 import { ROLE_WORDS, type Role } from "../api/session";
 import { type Sharing, useInvite, useSharing } from "../api/sharing";
 import style from "./share-dialog.module.css";
@@ -98,7 +98,7 @@ function NewLink() {
           placeholder="A person, a tablet, a class …"
           maxLength={60}
           value={label}
-          error={invite.isError ? sentence(invite.error) : undefined}
+          error={invite.isError ? errorText(invite.error) : undefined}
           onChange={(event) => setLabel(event.currentTarget.value)}
         />
         <Button type="submit" variant="filled" loading={invite.isPending}>
@@ -112,7 +112,7 @@ function NewLink() {
 function Body() {
   const sharing = useSharing();
   const [chosen, setChosen] = useState<string | null>(null);
-  if (sharing.isError) return <Text>{sentence(sharing.error)}</Text>;
+  if (sharing.isError) return <Text>{errorText(sharing.error)}</Text>;
   if (!sharing.data) return <div className={style.waiting} aria-busy="true" />;
   const origins = originsOf(sharing.data, { page: pageUrl(), hostname: location.hostname });
   const origin = origins.find((each) => each === chosen) ?? origins[0] ?? pageUrl();

@@ -2,11 +2,11 @@
 import { Button, TextInput } from "@mantine/core";
 import { IconCheck, IconCopy, IconQrcode } from "@tabler/icons-react";
 import { useState } from "react";
-import { sentence } from "../api/http";
+import { errorText } from "../api/http";
+import { useLive } from "../api/live/use-live";
 import { codeUrl, type Invitation, useRevoke } from "../api/sharing";
-import { useLive } from "../api/use-live";
 import { copyText } from "../ui/copy-text";
-import { ago, instant, useNow } from "../ui/when";
+import { ago, instant, useNow } from "../ui/times";
 import style from "./share-dialog.module.css";
 
 const MOST_GUESTS = 6;
@@ -100,7 +100,7 @@ export function ShareLink({ invitation, origin }: { invitation: Invitation; orig
       )}
       {revoke.isError && (
         <p className={style.problem} role="alert">
-          {sentence(revoke.error)}
+          {errorText(revoke.error)}
         </p>
       )}
       {code && (

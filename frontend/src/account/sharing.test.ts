@@ -1,22 +1,25 @@
 import { expect, test } from "vitest";
-import { keyIn } from "../api/session";
+import { credentialIn } from "../api/session";
 import type { Guest, Sharing } from "../api/sharing";
 import { originsOf } from "./share-dialog";
 import { guestWords } from "./share-link";
-import { pastedKey } from "./sign-in";
+import { pastedCredential } from "./sign-in";
 
 const at = "2026-01-01T00:00:00Z";
 const guest = (name: string): Guest => ({ person: { id: name, name }, at });
 
 test("a link is told from a token, wherever it stands", () => {
-  expect(keyIn("http://lab:8000/#i=abc.DEF-_1")).toEqual({
+  expect(credentialIn("http://lab:8000/#i=abc.DEF-_1")).toEqual({
     kind: "invitation",
     text: "abc.DEF-_1",
   });
-  expect(keyIn("#t=secret")).toEqual({ kind: "token", text: "secret" });
-  expect(keyIn("http://lab:8000/graphs/x")).toBeNull();
-  expect(pastedKey("  secret ")).toEqual({ kind: "token", text: "secret" });
-  expect(pastedKey("http://lab:8000/#i=abc.D")).toEqual({ kind: "invitation", text: "abc.D" });
+  expect(credentialIn("#t=secret")).toEqual({ kind: "token", text: "secret" });
+  expect(credentialIn("http://lab:8000/graphs/x")).toBeNull();
+  expect(pastedCredential("  secret ")).toEqual({ kind: "token", text: "secret" });
+  expect(pastedCredential("http://lab:8000/#i=abc.D")).toEqual({
+    kind: "invitation",
+    text: "abc.D",
+  });
 });
 
 test("links begin with the place where the owner has the page, unless others cannot reach it", () => {

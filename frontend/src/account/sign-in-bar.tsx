@@ -1,12 +1,12 @@
 /** Asks to sign in again in place: the session has ended, the page and its edits have not. */
 import { Button, PasswordInput } from "@mantine/core";
 import { openSession, type Person } from "../api/session";
-import { pastedKey } from "./sign-in";
+import { pastedCredential } from "./sign-in";
 import style from "./sign-in-bar.module.css";
-import { useEntry } from "./use-entry";
+import { useSignInField } from "./use-sign-in-field";
 
 export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
-  const entry = useEntry((pasted) => openSession(pastedKey(pasted)), onOpen);
+  const entry = useSignInField((pasted) => openSession(pastedCredential(pasted)), onOpen);
   return (
     <form className={style.bar} aria-label="Sign in again" {...entry.form}>
       <p role="status">

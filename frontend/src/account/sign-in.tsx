@@ -1,9 +1,9 @@
 /** The page for somebody whom the server does not know: says how to get in. */
 import { Button, Paper, PasswordInput, Text, Title } from "@mantine/core";
-import { type Key, keyIn, openSession, type Person } from "../api/session";
-import { Mark } from "../ui/top-bar";
+import { type Credential, credentialIn, openSession, type Person } from "../api/session";
+import { Logo } from "../ui/top-bar";
 import style from "./sign-in.module.css";
-import { useEntry } from "./use-entry";
+import { useSignInField } from "./use-sign-in-field";
 
 interface Props {
   /** Why nobody is signed in, when a link was tried. */
@@ -12,16 +12,16 @@ interface Props {
 }
 
 /** What has no fragment is taken for the token itself. */
-export function pastedKey(pasted: string): Key {
-  return keyIn(pasted) ?? { kind: "token", text: pasted.trim() };
+export function pastedCredential(pasted: string): Credential {
+  return credentialIn(pasted) ?? { kind: "token", text: pasted.trim() };
 }
 
 export function SignIn({ why, onOpen }: Props) {
-  const entry = useEntry((pasted) => openSession(pastedKey(pasted)), onOpen, why);
+  const entry = useSignInField((pasted) => openSession(pastedCredential(pasted)), onOpen, why);
   return (
     <main className={style.page}>
       <Paper className={style.card} withBorder radius="lg">
-        <Mark />
+        <Logo />
         <Title order={1} size="h3" mt="md">
           TeMoto Action Assistant
         </Title>

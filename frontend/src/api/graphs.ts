@@ -1,7 +1,7 @@
 /** Graphs, versions and problems as the editor answers them. */
 import { type QueryClient, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
-import { ask, askMoment, askText } from "./http";
+import { fetchJson, fetchMoment, fetchText } from "./http";
 
 export interface Config {
   mode: string;
@@ -20,7 +20,7 @@ export interface GraphSummary {
   robots?: string[];
   labels?: string[];
   /** Who is in it now. */
-  people?: Author[];
+  people?: VersionAuthor[];
 }
 
 /** One parameter of a known action; `text` is its JSON without a value. */
@@ -42,7 +42,7 @@ export interface KnownActionAnswer {
   used_in: string[];
 }
 
-export interface Author {
+export interface VersionAuthor {
   id: string;
   name: string;
 }
@@ -53,13 +53,13 @@ export interface Version {
   label: string;
   digest: string;
   seq: number;
-  author: Author;
+  author: VersionAuthor;
   at: string;
   umrf?: unknown;
 }
 
 /** A place: a JSON pointer into a text, with line and column where that text is known. */
-export interface Where {
+export interface ProblemPlace {
   path?: string;
   aid?: string;
   relation?: string;
@@ -70,7 +70,7 @@ export interface Where {
 export interface Problem {
   code: string;
   severity: "error" | "warning";
-  where: Where;
+  where: ProblemPlace;
   message: string;
   fix?: string | null;
   /** The other places of the same thing, which is told once. */
@@ -82,7 +82,7 @@ export interface Problems {
   problems: Problem[];
 }
 
-export const keys = {
+export const queryKeys = {
   config: ["config"] as const,
   graphs: ["graphs"] as const,
   graph: (id: string) => ["graphs", id] as const,
@@ -93,8 +93,8 @@ export const keys = {
 
 export function useConfig() {
   return useQuery({
-    queryKey: keys.config,
-    queryFn: ({ signal }) => ask<Config>("/api/config", { signal }),
+    queryKey: queryKeys.config,
+    queryFn: ({ signal }) => fetchJson<Config>("/api/config", { signal }),
     staleTime: Number.POSITIVE_INFINITY,
     // Without it there is no way to the runner, nor for Stop.
     refetchInterval: (query) => (query.state.status === "error" ? 5_000 : false),
@@ -103,8 +103,8 @@ export function useConfig() {
 
 export function useGraphs() {
   return useQuery({
-    queryKey: keys.graphs,
-    queryFn: ({ signal }) => ask<GraphSummary[]>("/api/graphs", { signal }),
+    queryKey: queryKeys.graphs,
+    queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/graphs", { signal }),
     refetchInterval: 8_000,
   });
 }
@@ -113,7 +113,7 @@ export function useGraphs() {
 export function useActions() {
   return useQuery({
     queryKey: ["actions"],
-    queryFn: ({ signal }) => ask<KnownActionAnswer[]>("/api/actions", { signal }),
+    queryFn: ({ signal }) => fetchJson<KnownActionAnswer[]>("/api/actions", { signal }),
     refetchInterval: 15_000,
   });
 }
@@ -123,14 +123,14 @@ export function useVersions(graph: string, wanted: string | null = null) {
   const client = useQueryClient();
   const versions = useQuery({
     enabled: graph !== "",
-    queryKey: keys.versions(graph),
+    queryKey: queryKeys.versions(graph),
     queryFn: ({ signal }) =>
-      ask<Version[]>(`/api/graphs/${encodeURIComponent(graph)}/versions`, { signal }),
+      fetchJson<Version[]>(`/api/graphs/${encodeURIComponent(graph)}/versions`, { signal }),
   });
   const missing =
     wanted !== null && versions.data?.every((version) => version.id !== wanted) === true;
   useEffect(() => {
-    if (missing) void client.invalidateQueries({ queryKey: keys.versions(graph) });
+    if (missing) void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
   }, [missing, client, graph]);
   return versions;
 }
@@ -138,9 +138,11 @@ export function useVersions(graph: string, wanted: string | null = null) {
 /** Problems of the moment `seq`; the last known ones stay until the next answer is there. */
 export function useProblems(graph: string, seq: number) {
   return useQuery({
-    queryKey: keys.problems(graph, seq),
+    queryKey: queryKeys.problems(graph, seq),
     queryFn: ({ signal }) =>
-      ask<Problems>(`/api/graphs/${encodeURIComponent(graph)}/problems?seq=${seq}`, { signal }),
+      fetchJson<Problems>(`/api/graphs/${encodeURIComponent(graph)}/problems?seq=${seq}`, {
+        signal,
+      }),
     enabled: seq > 0,
     placeholderData: (before) => before,
     staleTime: Number.POSITIVE_INFINITY,
@@ -148,13 +150,13 @@ export function useProblems(graph: string, seq: number) {
 }
 
 export function createGraph(name: string): Promise<GraphSummary> {
-  return ask("/api/graphs", { method: "POST", body: { name } });
+  return fetchJson("/api/graphs", { method: "POST", body: { name } });
 }
 
 /** Something that was translated or left out, with its place in the file that was sent. */
 export interface Remark {
   message: string;
-  where: Where;
+  where: ProblemPlace;
   /** How often; once when it is not there. */
   times?: number;
 }
@@ -172,17 +174,17 @@ export interface Preview {
 }
 
 export function previewGraph(text: string): Promise<Preview> {
-  return ask("/api/graphs?preview=true", { method: "POST", body: text });
+  return fetchJson("/api/graphs?preview=true", { method: "POST", body: text });
 }
 
 /** Imports a file's text as it is. */
 export function importGraph(text: string): Promise<GraphSummary> {
-  return ask("/api/graphs", { method: "POST", body: text });
+  return fetchJson("/api/graphs", { method: "POST", body: text });
 }
 
 /** An edit of the graph's own document: whoever has it open sees it. */
 export function renameGraph(id: string, name: string): Promise<GraphSummary> {
-  return ask(`/api/graphs/${encodeURIComponent(id)}`, { method: "PATCH", body: { name } });
+  return fetchJson(`/api/graphs/${encodeURIComponent(id)}`, { method: "PATCH", body: { name } });
 }
 
 /** The same graph once more under another name; edits of one do not touch the other. */
@@ -197,21 +199,21 @@ export async function duplicateGraph(id: string, name: string): Promise<GraphSum
 }
 
 export function deleteGraph(id: string): Promise<void> {
-  return ask(`/api/graphs/${encodeURIComponent(id)}`, { method: "DELETE" });
+  return fetchJson(`/api/graphs/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 
 /** Brings a deleted graph back. */
 export function recoverGraph(id: string): Promise<unknown> {
-  return ask(`/api/graphs/${encodeURIComponent(id)}/recover`, { method: "POST" });
+  return fetchJson(`/api/graphs/${encodeURIComponent(id)}/recover`, { method: "POST" });
 }
 
 export function graphText(id: string): Promise<string> {
-  return askText(`/api/graphs/${encodeURIComponent(id)}/umrf`);
+  return fetchText(`/api/graphs/${encodeURIComponent(id)}/umrf`);
 }
 
 /** The text of a graph as it is, and the moment that it is of. */
 export function graphMoment(id: string): Promise<{ text: string; seq: number }> {
-  return askMoment(`/api/graphs/${encodeURIComponent(id)}/umrf`);
+  return fetchMoment(`/api/graphs/${encodeURIComponent(id)}/umrf`);
 }
 
 /** One key of the document; a value that is not there is `undefined`. */
@@ -223,27 +225,27 @@ export interface KeyChange {
 }
 
 /** What an edited text would change, and the errors that would come with it. */
-export interface Rewriting {
+export interface TextChanges {
   seq: number;
   changes: KeyChange[];
   problems: Problem[];
 }
 
 /** What the text, edited from that of the moment `seq`, would change. Nothing is stored. */
-export function rewritingOf(id: string, seq: number, text: string): Promise<Rewriting> {
+export function textChangesOf(id: string, seq: number, text: string): Promise<TextChanges> {
   const route = `/api/graphs/${encodeURIComponent(id)}/rewriting?seq=${seq}`;
-  return ask(route, { method: "POST", body: text });
+  return fetchJson(route, { method: "POST", body: text });
 }
 
 /** The version of what the page shows at `seq`, as text, because its numbers must stay as written. */
 export function publish(graph: string, seq: number): Promise<string> {
-  return askText(`/api/graphs/${encodeURIComponent(graph)}/versions`, {
+  return fetchText(`/api/graphs/${encodeURIComponent(graph)}/versions`, {
     method: "POST",
     body: { seq },
   });
 }
 
-export function authorName(author: Author | null | undefined): string {
+export function authorName(author: VersionAuthor | null | undefined): string {
   return author?.name || "somebody";
 }
 
@@ -256,5 +258,5 @@ export function versionName(versions: readonly Version[] | undefined, id: string
 }
 
 export function refreshGraphs(client: QueryClient): Promise<void> {
-  return client.invalidateQueries({ queryKey: keys.graphs, exact: true });
+  return client.invalidateQueries({ queryKey: queryKeys.graphs, exact: true });
 }

@@ -1,7 +1,7 @@
 /** Requests to editor and runner, and how they refuse. */
 
-import { sessionEnd } from "./ended";
-import { here } from "./place";
+import { serverPath } from "./page-url";
+import { sessionEnd } from "./session-end";
 
 /** RFC 9457 as both processes answer it. */
 export interface ProblemDetails {
@@ -31,7 +31,7 @@ export class Unreachable extends Error {
 }
 
 /** Whether an error leaves open what became of a request: nobody said no to it. */
-export function leavesOpen(error: unknown): boolean {
+export function isOutcomeUnknown(error: unknown): boolean {
   if (!(error instanceof Refusal)) return true;
   const { status, type } = error.details;
   return status >= 500 && (status !== 503 || type === UNKNOWN_TYPE);
@@ -46,29 +46,29 @@ export function isFinal(error: unknown): boolean {
   return error.details.status < 500 && error.details.type !== UNKNOWN_TYPE;
 }
 
-export interface Ask {
+export interface RequestOptions {
   method?: "GET" | "POST" | "PATCH" | "DELETE";
   /** An object is sent as JSON, a string as it is (also JSON). */
   body?: unknown;
   signal?: AbortSignal;
   /** Milliseconds until an answer must be there. */
-  patience?: number;
+  timeoutMs?: number;
 }
 
 const PATIENCE = 20_000; // ms
 const SESSION = "/api/session";
 
 /** Whether the editor knows who we are; "unsure" when it does not answer. */
-export async function knowsUs(): Promise<"yes" | "no" | "unsure"> {
+export async function isSignedIn(): Promise<"yes" | "no" | "unsure"> {
   const init: RequestInit = { credentials: "include", signal: AbortSignal.timeout(5_000) };
-  const answer = await fetch(here(SESSION), init).catch(() => null);
+  const answer = await fetch(serverPath(SESSION), init).catch(() => null);
   if (answer?.status === 401) sessionEnd.notice();
   return answer === null ? "unsure" : answer.status === 401 ? "no" : "yes";
 }
 
 /** The editor tells when a session has ended. The runner may only lack what the cookie is for. */
 async function heard401(isEditor: boolean): Promise<void> {
-  if (isEditor || (await knowsUs()) === "unsure") sessionEnd.notice();
+  if (isEditor || (await isSignedIn()) === "unsure") sessionEnd.notice();
 }
 
 const ENDED: ProblemDetails = {
@@ -79,7 +79,7 @@ const ENDED: ProblemDetails = {
 };
 
 /** Looks that would only be refused again: what refetches itself would ask for ever. */
-function isIdle(url: string, ask: Ask): boolean {
+function isIdle(url: string, ask: RequestOptions): boolean {
   return sessionEnd.now() && (ask.method ?? "GET") === "GET" && !url.startsWith(SESSION);
 }
 
@@ -107,10 +107,10 @@ async function problemOf(response: Response): Promise<ProblemDetails> {
   }
 }
 
-async function send(url: string, ask: Ask): Promise<Response> {
+async function send(url: string, ask: RequestOptions): Promise<Response> {
   if (isIdle(url, ask)) throw new Refusal(ENDED);
   const isEditor = url.startsWith("/");
-  const patience = AbortSignal.timeout(ask.patience ?? PATIENCE);
+  const patience = AbortSignal.timeout(ask.timeoutMs ?? PATIENCE);
   const init: RequestInit = {
     method: ask.method ?? "GET",
     credentials: "include",
@@ -121,7 +121,7 @@ async function send(url: string, ask: Ask): Promise<Response> {
     init.body = typeof ask.body === "string" ? ask.body : JSON.stringify(ask.body);
   }
   try {
-    const response = await fetch(isEditor ? here(url) : url, init);
+    const response = await fetch(isEditor ? serverPath(url) : url, init);
     if (response.status === 401) void heard401(isEditor);
     return response;
   } catch (error) {
@@ -131,7 +131,7 @@ async function send(url: string, ask: Ask): Promise<Response> {
 }
 
 /** What a route answers, as JSON. Throws `Refusal` or `Unreachable`. */
-export async function ask<T>(url: string, request: Ask = {}): Promise<T> {
+export async function fetchJson<T>(url: string, request: RequestOptions = {}): Promise<T> {
   const response = await send(url, request);
   if (!response.ok) throw new Refusal(await problemOf(response));
   if (response.status === 204) return undefined as T;
@@ -139,17 +139,17 @@ export async function ask<T>(url: string, request: Ask = {}): Promise<T> {
 }
 
 /** What a route answers, as the text it sent, so that `5` and `5.0` stay what they are. */
-export async function askText(url: string, request: Ask = {}): Promise<string> {
+export async function fetchText(url: string, request: RequestOptions = {}): Promise<string> {
   const response = await send(url, request);
   if (!response.ok) throw new Refusal(await problemOf(response));
   return response.text();
 }
 
 /** The first `most` lines of what a route answers, and whether there are more. */
-export async function askLines(
+export async function fetchLines(
   url: string,
   most: number,
-  request: Ask = {},
+  request: RequestOptions = {},
 ): Promise<{ lines: string[]; more: boolean }> {
   const response = await send(url, request);
   if (!response.ok) throw new Refusal(await problemOf(response));
@@ -167,25 +167,25 @@ export async function askLines(
 }
 
 /** The text that a route answers, and which moment of the graph it is of. */
-export async function askMoment(url: string): Promise<{ text: string; seq: number }> {
+export async function fetchMoment(url: string): Promise<{ text: string; seq: number }> {
   const response = await send(url, {});
   if (!response.ok) throw new Refusal(await problemOf(response));
   return { text: await response.text(), seq: Number(response.headers.get("x-seq")) };
 }
 
 /** One sentence for people, whatever went wrong. */
-export function sentence(error: unknown): string {
+export function errorText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
 /** Where in a file a refusal points, in words; empty when that is nowhere, or said already. */
-export function place(error: unknown): string {
+export function errorPlace(error: unknown): string {
   if (!(error instanceof Refusal)) return "";
-  const words = placeOf(error);
+  const words = placeInFile(error);
   return error.message.includes(words) ? "" : words;
 }
 
-function placeOf(error: Refusal): string {
+function placeInFile(error: Refusal): string {
   const where = error.details.where;
   if (where?.line !== undefined) {
     return `line ${where.line}${where.column === undefined ? "" : `, column ${where.column}`}`;

@@ -1,7 +1,7 @@
-/** What the runner tells of past runs: films, marks, comparisons, statistics, files. */
+/** What the runner tells of past runs: replays, marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
-import { ask, askLines } from "./http";
-import { type ActionRun, getRun, type Run, type Took, type Visit } from "./runs";
+import { fetchJson, fetchLines } from "./http";
+import { type ActionRun, type DurationBounds, getRun, type Run, type Visit } from "./runs";
 
 /** What became of an action. From the visit number `first` on, its visits are now `visits`. */
 export interface ActionFrame {
@@ -25,7 +25,7 @@ export interface Frame {
 }
 
 /** Something that happened around the actions: a wish, a message sent, a silence, a proof. */
-export interface FilmMark {
+export interface ReplayMark {
   seq: number;
   at: string;
   kind: string;
@@ -34,15 +34,15 @@ export interface FilmMark {
   since?: string;
 }
 
-/** A page of a run's film: `base` after `after` events, then the frames of the next ones. */
-export interface Film {
+/** A page of a run's replay: `base` after `after` events, then the frames of the next ones. */
+export interface Replay {
   run: string;
   after: number;
   newest: number;
   base: Run | null;
   frames: Frame[];
   chapters: { after: number; at: string }[];
-  marks: FilmMark[];
+  marks: ReplayMark[];
 }
 
 export interface RunMarks {
@@ -65,18 +65,18 @@ export interface Cause {
   quote: string;
 }
 
-export interface Field {
+export interface ComparedField {
   field: string;
   before: unknown;
   after: unknown;
 }
 
-export interface Change {
+export interface ComparedChange {
   change: "added" | "removed" | "changed";
-  fields: Field[];
+  fields: ComparedField[];
 }
 
-export interface Step {
+export interface ComparedStep {
   action: string;
   aid: string | null;
   visit: number;
@@ -92,13 +92,13 @@ export interface Comparison {
   same_graph: boolean;
   same_engine: boolean;
   graph: {
-    fields: Field[];
-    actions: (Change & { aid: string; name: string })[];
-    relations: (Change & { parent: string; child: string })[];
+    fields: ComparedField[];
+    actions: (ComparedChange & { aid: string; name: string })[];
+    relations: (ComparedChange & { parent: string; child: string })[];
   };
-  steps: Step[];
+  steps: ComparedStep[];
   left_out: number;
-  parting: { step: Step; text: string; messages_a: string[]; messages_b: string[] } | null;
+  parting: { step: ComparedStep; text: string; messages_a: string[]; messages_b: string[] } | null;
   text: string;
 }
 
@@ -115,7 +115,7 @@ export interface ActionStatistics {
   p90: number | null;
   p99: number | null;
   longest: number | null;
-  spans: Record<"p50" | "p90" | "p99" | "longest", Took | null>;
+  spans: Record<"p50" | "p90" | "p99" | "longest", DurationBounds | null>;
 }
 
 export interface Statistics {
@@ -125,7 +125,7 @@ export interface Statistics {
     state: Run["state"];
     result: Run["result"];
     took: number | null;
-    span: Took | null;
+    span: DurationBounds | null;
   }[];
   judged: number;
   succeeded: number;
@@ -151,7 +151,7 @@ export interface RunFilter {
   until: string;
 }
 
-export const EVERYTHING: RunFilter = {
+export const NO_FILTER: RunFilter = {
   text: "",
   graph: "",
   robot: "",
@@ -204,14 +204,19 @@ export function listRuns(
   const query = queryOf(filter);
   query.set("limit", String(limit));
   if (before !== null) query.set("before", before);
-  return ask(`${runner}/api/runs?${query}`, signal ? { signal } : {});
+  return fetchJson(`${runner}/api/runs?${query}`, signal ? { signal } : {});
 }
 
-export function useFilm(runner: string | undefined, run: string, after: number, asked: boolean) {
+export function useReplayData(
+  runner: string | undefined,
+  run: string,
+  after: number,
+  asked: boolean,
+) {
   return useQuery({
     queryKey: ["runs", "film", run, after],
     queryFn: ({ signal }) =>
-      ask<Film>(`${runner}${path(run)}/film?after=${after}`, { signal, patience: 60_000 }),
+      fetchJson<Replay>(`${runner}${path(run)}/film?after=${after}`, { signal, timeoutMs: 60_000 }),
     enabled: asked && runner !== undefined,
   });
 }
@@ -220,38 +225,38 @@ export function useFilm(runner: string | undefined, run: string, after: number, 
 export function useCauses(runner: string | undefined, run: Run) {
   return useQuery({
     queryKey: ["runs", "causes", run.id, run.state, run.alarms.length],
-    queryFn: ({ signal }) => ask<Cause[]>(`${runner}${path(run.id)}/causes`, { signal }),
-    enabled: runner !== undefined && wentWrong(run),
+    queryFn: ({ signal }) => fetchJson<Cause[]>(`${runner}${path(run.id)}/causes`, { signal }),
+    enabled: runner !== undefined && needsExplanation(run),
   });
 }
 
 /** Whether there is something to explain. */
-export function wentWrong(run: Run): boolean {
+export function needsExplanation(run: Run): boolean {
   if (run.state === "finished") return run.result !== "on_true";
   return run.ended_at !== null || run.state === "unknown" || run.alarms.length > 0;
 }
 
 /** Takes in the recorded runs that the product brings along; their ids. */
-export function takeInExamples(runner: string): Promise<string[]> {
-  return ask(`${runner}/api/examples`, { method: "POST", body: {} });
+export function importExamples(runner: string): Promise<string[]> {
+  return fetchJson(`${runner}/api/examples`, { method: "POST", body: {} });
 }
 
 export function useMarks(runner: string | undefined, run: string) {
   return useQuery({
     queryKey: ["runs", "marks", run],
-    queryFn: ({ signal }) => ask<RunMarks>(`${runner}${path(run)}/marks`, { signal }),
+    queryFn: ({ signal }) => fetchJson<RunMarks>(`${runner}${path(run)}/marks`, { signal }),
     enabled: runner !== undefined,
   });
 }
 
 export function setMarks(runner: string, run: string, marks: Partial<RunMarks>): Promise<RunMarks> {
-  return ask(`${runner}${path(run)}/marks`, { method: "PATCH", body: marks });
+  return fetchJson(`${runner}${path(run)}/marks`, { method: "PATCH", body: marks });
 }
 
 export function useLabels(runner: string | undefined) {
   return useQuery({
     queryKey: ["runs", "labels"],
-    queryFn: ({ signal }) => ask<string[]>(`${runner}/api/labels`, { signal }),
+    queryFn: ({ signal }) => fetchJson<string[]>(`${runner}/api/labels`, { signal }),
     enabled: runner !== undefined,
   });
 }
@@ -260,7 +265,9 @@ export function useComparison(runner: string | undefined, a: string, b: string) 
   return useQuery({
     queryKey: ["runs", "comparison", a, b],
     queryFn: ({ signal }) =>
-      ask<Comparison>(`${runner}/api/comparison?${new URLSearchParams({ a, b })}`, { signal }),
+      fetchJson<Comparison>(`${runner}/api/comparison?${new URLSearchParams({ a, b })}`, {
+        signal,
+      }),
     enabled: runner !== undefined && a !== "" && b !== "",
   });
 }
@@ -269,43 +276,45 @@ export function useStatistics(runner: string | undefined, graph: string) {
   return useQuery({
     queryKey: ["runs", "statistics", graph],
     queryFn: ({ signal }) =>
-      ask<Statistics>(`${runner}/api/statistics?${new URLSearchParams({ graph })}`, { signal }),
+      fetchJson<Statistics>(`${runner}/api/statistics?${new URLSearchParams({ graph })}`, {
+        signal,
+      }),
     enabled: runner !== undefined && graph !== "",
   });
 }
 
-export type Fault = "error" | "false" | "hang" | "init_error";
+export type InjectedFault = "error" | "false" | "hang" | "init_error";
 
 /** What a run did, as a script for the simulator; with `fault` one action fails at its last visit. */
-export function scriptOf(
+export function recordedScriptOf(
   runner: string,
   run: string,
-  fault?: { action: string; fault: Fault },
+  fault?: { action: string; fault: InjectedFault },
 ): Promise<{ behaviours: unknown; doubts: { action: string; text: string }[] }> {
   const query = fault ? `?${new URLSearchParams({ ...fault })}` : "";
-  return ask(`${runner}${path(run)}/script${query}`);
+  return fetchJson(`${runner}${path(run)}/script${query}`);
 }
 
 /** The same for another version of the graph; `umrf` is JSON text. */
-export function fittedScriptOf(
+export function recordedScriptFor(
   runner: string,
   run: string,
   umrf: string,
-  fault?: { action: string; fault: Fault },
+  fault?: { action: string; fault: InjectedFault },
 ): Promise<{ behaviours: unknown; doubts: { action: string; text: string }[] }> {
   const head = JSON.stringify({ ...fault });
   const body = `${head.slice(0, -1)}${fault ? "," : ""}"umrf":${umrf}}`;
-  return ask(`${runner}${path(run)}/script`, { method: "POST", body });
+  return fetchJson(`${runner}${path(run)}/script`, { method: "POST", body });
 }
 
 /** Runs that one request has started together with this one. */
-export function useMates(runner: string | undefined, run: Run) {
+export function useRunsOfSameStart(runner: string | undefined, run: Run) {
   const around = (ms: number) => new Date(Date.parse(run.requested_at) + ms).toISOString();
   return useQuery({
     queryKey: ["runs", "mates", run.id],
     queryFn: async ({ signal }) => {
       const query = new URLSearchParams({ since: around(-10_000), until: around(10_000) });
-      const near = await ask<Run[]>(`${runner}/api/runs?${query}`, { signal });
+      const near = await fetchJson<Run[]>(`${runner}/api/runs?${query}`, { signal });
       const ids = near.filter((each) => each.group === run.group && each.id !== run.id);
       return Promise.all(ids.map((each) => getRun(runner ?? "", each.id, signal)));
     },
@@ -318,7 +327,7 @@ export function useRaw(runner: string | undefined, run: Run) {
   return useQuery({
     queryKey: ["runs", "raw", run.id],
     queryFn: ({ signal }) =>
-      ask<{ text: string; hours: { name: string }[] }>(`${runner}/api/runs/${run.id}/raw`, {
+      fetchJson<{ text: string; hours: { name: string }[] }>(`${runner}/api/runs/${run.id}/raw`, {
         signal,
       }),
     enabled: runner !== undefined && !run.simulated,
@@ -326,7 +335,7 @@ export function useRaw(runner: string | undefined, run: Run) {
 }
 
 export function expectRun(runner: string, run: string, name: string): Promise<unknown> {
-  return ask(`${runner}/api/expectations`, { method: "POST", body: { run, name } });
+  return fetchJson(`${runner}/api/expectations`, { method: "POST", body: { run, name } });
 }
 
 /** Where a run can be fetched as a file. */
@@ -339,7 +348,7 @@ export function useRawEvents(runner: string | undefined, run: Run, most: number)
   return useQuery({
     queryKey: ["runs", "raw", run.id, run.state, most],
     queryFn: ({ signal }) =>
-      askLines(exportUrl(runner ?? "", run.id, "jsonl"), most, { signal, patience: 30_000 }),
+      fetchLines(exportUrl(runner ?? "", run.id, "jsonl"), most, { signal, timeoutMs: 30_000 }),
     enabled: runner !== undefined,
   });
 }

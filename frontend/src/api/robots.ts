@@ -1,7 +1,7 @@
 /** Robots as the runner tells them, and what it looks at before a start. */
 import { useQuery } from "@tanstack/react-query";
 import type { Problem } from "./graphs";
-import { ask, askText } from "./http";
+import { fetchJson, fetchText } from "./http";
 import type { Run } from "./runs";
 
 export const SIMULATOR = "simulator";
@@ -10,7 +10,7 @@ export type EngineState = "answering" | "busy" | "gone" | "restarted" | "no_link
 export type Generation = "current" | "older" | "unknown";
 
 /** A graph that an engine holds, ended ones too. */
-export interface Held {
+export interface HeldGraph {
   graph: string;
   state: string;
   active: boolean;
@@ -41,7 +41,7 @@ export interface Robot {
   actor: string;
   /** Whether pausing is safe there. */
   pauses: boolean;
-  holds: Held[];
+  holds: HeldGraph[];
   /** How many it has indexed; null before its first answer. */
   actions: number | null;
   graphs: number | null;
@@ -56,7 +56,7 @@ export interface Registration {
 }
 
 /** An engine in sight that nobody registered. An idle one does not say its name. */
-export interface Candidate {
+export interface FoundEngine {
   domain: number;
   rmw: string;
   get_service: string;
@@ -66,15 +66,15 @@ export interface Candidate {
   problem: string;
 }
 
-export interface Known {
+export interface IndexedByRobot {
   actions: { name: string; inputs: Record<string, string>; outputs: Record<string, string> }[];
   graphs: string[];
   /** Files of its index that cannot be read. */
   unread: number;
 }
 
-/** A line of a robot's flight record. */
-export interface Told {
+/** A line of a robot's log. */
+export interface RobotLogLine {
   seq: number;
   at: string;
   kind: "commanded" | "became" | "stop_asked" | "stop_proven" | "stop_unproven";
@@ -90,7 +90,7 @@ export interface Told {
 }
 
 /** One thing that was looked at before a start. */
-export interface Item {
+export interface PreflightItem {
   code: string;
   verdict: "passed" | "warned" | "blocked";
   text: string;
@@ -102,14 +102,14 @@ export interface Item {
 export interface Preflight {
   engine: string;
   digest: string;
-  items: Item[];
+  items: PreflightItem[];
   /** The codes that a person would have to answer for. */
   override: string[];
   /** Something stands in the way that cannot be overridden. */
   never: boolean;
 }
 
-export interface Group {
+export interface StartedGroup {
   id: string;
   runs: Run[];
   /** Robots that nothing was sent to, and why. */
@@ -120,72 +120,72 @@ const path = (runner: string | undefined, name: string) =>
   `${runner ?? ""}/api/robots/${encodeURIComponent(name)}`;
 
 /** Whether robots can be reached over ROS 2 from the runner, and the reason where not. */
-export function useReach(runner: string | undefined) {
+export function useRosReach(runner: string | undefined) {
   return useQuery({
     queryKey: ["robots", "reach"],
     queryFn: ({ signal }) =>
-      ask<{ engines: Robot[]; no_reach: string }>(`${runner}/api/reach`, { signal }),
+      fetchJson<{ engines: Robot[]; no_reach: string }>(`${runner}/api/reach`, { signal }),
     enabled: runner !== undefined,
   });
 }
 
-export function useCandidates(runner: string | undefined, on: boolean) {
+export function useFoundEngines(runner: string | undefined, on: boolean) {
   return useQuery({
     queryKey: ["robots", "candidates"],
-    queryFn: ({ signal }) => ask<Candidate[]>(`${runner}/api/candidates`, { signal }),
+    queryFn: ({ signal }) => fetchJson<FoundEngine[]>(`${runner}/api/candidates`, { signal }),
     enabled: on && runner !== undefined,
     refetchInterval: 5_000,
   });
 }
 
-export function useKnown(runner: string | undefined, robot: string, on: boolean) {
+export function useIndexedByRobot(runner: string | undefined, robot: string, on: boolean) {
   return useQuery({
     queryKey: ["robots", "known", robot],
-    queryFn: ({ signal }) => ask<Known>(`${path(runner, robot)}/known`, { signal }),
+    queryFn: ({ signal }) => fetchJson<IndexedByRobot>(`${path(runner, robot)}/known`, { signal }),
     enabled: on && runner !== undefined,
     refetchInterval: 10_000,
   });
 }
 
-export function useFlight(runner: string | undefined, robot: string, on: boolean) {
+export function useRobotLog(runner: string | undefined, robot: string, on: boolean) {
   return useQuery({
     queryKey: ["robots", "flight", robot],
-    queryFn: ({ signal }) => ask<Told[]>(`${path(runner, robot)}/events`, { signal }),
+    queryFn: ({ signal }) => fetchJson<RobotLogLine[]>(`${path(runner, robot)}/events`, { signal }),
     enabled: on && runner !== undefined,
     refetchInterval: 3_000,
   });
 }
 
 export function registerRobot(runner: string, robot: Registration): Promise<Robot> {
-  return ask(`${runner}/api/robots`, { method: "POST", body: robot });
+  return fetchJson(`${runner}/api/robots`, { method: "POST", body: robot });
 }
 
 export function changeRobot(runner: string, robot: Registration): Promise<Robot> {
   const { name, ...body } = robot;
-  return ask(path(runner, name), { method: "PATCH", body });
+  return fetchJson(path(runner, name), { method: "PATCH", body });
 }
 
 export function forgetRobot(runner: string, name: string): Promise<unknown> {
-  return ask(path(runner, name), { method: "DELETE" });
+  return fetchJson(path(runner, name), { method: "DELETE" });
 }
 
 /** Stops whatever a robot runs, whoever started it. */
 export function stopRobot(runner: string, name: string): Promise<unknown> {
-  return ask(`${path(runner, name)}/stop`, { method: "POST", body: {}, patience: 6_000 });
+  return fetchJson(`${path(runner, name)}/stop`, { method: "POST", body: {}, timeoutMs: 6_000 });
 }
 
 /** A graph that a robot holds, as text to import. */
 export function heldGraph(runner: string, name: string, graph: string): Promise<string> {
-  return askText(`${path(runner, name)}/umrf?graph=${encodeURIComponent(graph)}`);
+  return fetchText(`${path(runner, name)}/umrf?graph=${encodeURIComponent(graph)}`);
 }
 
 /** The graph of a recorded command, as text to import. */
 export function commandedGraph(runner: string, name: string, seq: number): Promise<string> {
-  return askText(`${path(runner, name)}/events/${seq}/umrf`);
+  return fetchText(`${path(runner, name)}/events/${seq}/umrf`);
 }
 
 /** What stands between a graph and its start, engine by engine. Sends nothing but a get. */
-export function lookBefore(
+export function runPreflight(
   runner: string,
   umrf: string,
   engines: readonly string[],
@@ -193,5 +193,5 @@ export function lookBefore(
 ): Promise<Preflight[]> {
   const head = JSON.stringify({ engines });
   const body = `${head.slice(0, -1)},"umrf":${umrf}}`;
-  return ask(`${runner}/api/preflight`, { method: "POST", body, signal });
+  return fetchJson(`${runner}/api/preflight`, { method: "POST", body, signal });
 }

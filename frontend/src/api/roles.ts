@@ -16,10 +16,10 @@ const FROM = {
   restore: "owner",
 } as const satisfies Record<string, Role>;
 
-export type Deed = keyof typeof FROM;
+export type Permission = keyof typeof FROM;
 
-export function may(role: Role, deed: Deed): boolean {
-  return ROLES.indexOf(role) >= ROLES.indexOf(FROM[deed]);
+export function may(role: Role, permission: Permission): boolean {
+  return ROLES.indexOf(role) >= ROLES.indexOf(FROM[permission]);
 }
 
 /** What a role may do, to follow "may". */

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { alarmNow, playedBy, type Run } from "./runs";
+import { abilitiesOf, currentAlarm, type Run } from "./runs";
 
 const alarm = (code: string, second: number) => ({
   code,
@@ -15,13 +15,13 @@ function run(alarms: Run["alarms"], begun?: number): Run {
 
 test("that nothing moves is said for as long as nothing does", () => {
   const other = alarm("foreign_other", 2);
-  expect(alarmNow(run([]))).toBeUndefined();
-  expect(alarmNow(run([other, alarm("stalled", 5)], 3))?.code).toBe("stalled");
-  expect(alarmNow(run([other, alarm("stalled", 5)], 7))?.code).toBe("foreign_other");
-  expect(alarmNow(run([alarm("H4", 5)], 7))?.code).toBe("H4");
+  expect(currentAlarm(run([]))).toBeUndefined();
+  expect(currentAlarm(run([other, alarm("stalled", 5)], 3))?.code).toBe("stalled");
+  expect(currentAlarm(run([other, alarm("stalled", 5)], 7))?.code).toBe("foreign_other");
+  expect(currentAlarm(run([alarm("H4", 5)], 7))?.code).toBe("H4");
 });
 
 test("the simulator can what the robot can that it plays", () => {
-  expect(playedBy(run([]))).toBe("simulator");
-  expect(playedBy({ ...run([]), like: "David" })).toBe("David");
+  expect(abilitiesOf(run([]))).toBe("simulator");
+  expect(abilitiesOf({ ...run([]), like: "David" })).toBe("David");
 });

@@ -1,6 +1,6 @@
 /** Runs as the runner tells them. */
 import { useQuery } from "@tanstack/react-query";
-import { ask } from "./http";
+import { fetchJson } from "./http";
 
 export type RunState =
   | "requested"
@@ -21,7 +21,7 @@ export type RunResult = "on_true" | "on_false" | "on_error" | "on_stopped" | "on
 export type VisitResult = "true" | "false" | "error" | "stopped" | null;
 
 /** Seconds: at least `least`, at most `most`; null: nothing bounds it from above. */
-export interface Took {
+export interface DurationBounds {
   least: number;
   most: number | null;
 }
@@ -50,7 +50,7 @@ export interface ActionRun {
 }
 
 /** Who asked for something, and from where: `address` is missing for the runner's own computer. */
-export interface Asker {
+export interface Requester {
   id: string;
   name: string;
   by?: "browser" | "program";
@@ -58,7 +58,7 @@ export interface Asker {
 }
 
 /** Where somebody asked from, as words that follow the name; "" where it was not recorded. */
-export function whence(asker: Asker | null): string {
+export function requesterPlace(asker: Requester | null): string {
   if (asker?.by === undefined) return "";
   return ` · by ${asker.by}, from ${asker.address ?? "this computer"}`;
 }
@@ -79,7 +79,7 @@ export interface Run {
   /** Why no answer of its engine can show rest any more; null when one can. */
   unconfirmed?: string | null;
   /** Who has seen it at rest instead; `by` null: the runner, which saw the engine's process end. */
-  at_rest?: { by: Asker | null; at: string; how: string } | null;
+  at_rest?: { by: Requester | null; at: string; how: string } | null;
   /** It had ended, and its engine shows it moving; null at its next end. */
   moves_again_at: string | null;
   result: RunResult | null;
@@ -87,9 +87,9 @@ export interface Run {
   started_at: string | null;
   ended_at: string | null;
   /** From the start to when nothing of it moved any more, as far as that was seen. */
-  took?: Took | null;
-  author: Asker | null;
-  stopped_by: Asker | null;
+  took?: DurationBounds | null;
+  author: Requester | null;
+  stopped_by: Requester | null;
   /** Why it was refused, lost or ended so. */
   detail: string;
   alarms: { code: string; at: string; text: string }[];
@@ -113,18 +113,18 @@ export interface Run {
 }
 
 /** Where it ran, in a few words. */
-export function placeOf(run: Run): string {
+export function runPlace(run: Run): string {
   if (!run.simulated) return run.engine;
   return run.engine === "simulator" ? "simulator" : `${run.engine} (simulated)`;
 }
 
 /** The engine whose abilities count: the simulator has those of the robot that it plays. */
-export function playedBy(run: Run): string {
+export function abilitiesOf(run: Run): string {
   return run.like ?? run.engine;
 }
 
 /** The newest alarm that still holds: that nothing moves is over once something has begun. */
-export function alarmNow(run: Run): Run["alarms"][number] | undefined {
+export function currentAlarm(run: Run): Run["alarms"][number] | undefined {
   const begun = Object.values(run.actions ?? {}).map(({ visits }) => visits.at(-1)?.from ?? "");
   const newest = Math.max(0, ...begun.map((at) => Date.parse(at) || 0));
   return run.alarms.findLast(({ code, at }) => code !== "stalled" || Date.parse(at) >= newest);
@@ -138,7 +138,7 @@ export function hasEnded(run: Run): boolean {
 const MOVES: ReadonlySet<string> = new Set(["RUNNING", "STOPPING", "PAUSE_REQUESTED", "PAUSED"]);
 
 /** Whether a person's word can end the run, since no answer of its engine can. */
-export function awaitsLook(run: Run): boolean {
+export function needsRestConfirmation(run: Run): boolean {
   if (hasEnded(run) || run.simulated || run.started_at === null) return false;
   if (run.state === "lost" || run.unknown_since !== null) return true;
   const moves = Object.values(run.actions ?? {}).some((action) => MOVES.has(action.state));
@@ -148,7 +148,7 @@ export function awaitsLook(run: Run): boolean {
 /** Says that somebody has seen the run at rest, and how. */
 export function confirmRest(runner: string, run: string, how: string): Promise<Run> {
   const path = `/api/runs/${encodeURIComponent(run)}/at_rest`;
-  return ask(`${runner}${path}`, { method: "POST", body: { how } });
+  return fetchJson(`${runner}${path}`, { method: "POST", body: { how } });
 }
 
 export interface StartOrder {
@@ -186,8 +186,8 @@ export async function startRun(order: StartOrder): Promise<Started> {
     ...(order.script === undefined ? {} : { script: order.script }),
   });
   const body = `${head.slice(0, -1)},"umrf":${order.umrf}}`;
-  if (!alone) return ask(`${order.runner}/api/groups`, { method: "POST", body });
-  const run = await ask<Run>(`${order.runner}/api/runs`, { method: "POST", body });
+  if (!alone) return fetchJson(`${order.runner}/api/groups`, { method: "POST", body });
+  const run = await fetchJson<Run>(`${order.runner}/api/runs`, { method: "POST", body });
   return { runs: [run], failed: {} };
 }
 
@@ -205,22 +205,25 @@ export function findStart(
   signal?: AbortSignal,
 ): Promise<StartFound> {
   const path = `${runner}/api/starts/${encodeURIComponent(request)}`;
-  return ask(path, { patience, ...(signal ? { signal } : {}) });
+  return fetchJson(path, { timeoutMs: patience, ...(signal ? { signal } : {}) });
 }
 
 /** Asks to stop one run, or all of them. */
 export function postStop(runner: string, run: string | "all", stop: string): Promise<unknown> {
   const path = run === "all" ? "/api/stop" : `/api/runs/${encodeURIComponent(run)}/stop`;
-  return ask(`${runner}${path}`, {
+  return fetchJson(`${runner}${path}`, {
     method: "POST",
     body: { stop_id: stop },
-    patience: 3_000,
+    timeoutMs: 3_000,
   });
 }
 
 /** Pauses a run, or lets it go on. */
-export function steerRun(runner: string, run: string, way: "pause" | "resume"): Promise<Run> {
-  return ask(`${runner}/api/runs/${encodeURIComponent(run)}/${way}`, { method: "POST", body: {} });
+export function pauseOrResume(runner: string, run: string, way: "pause" | "resume"): Promise<Run> {
+  return fetchJson(`${runner}/api/runs/${encodeURIComponent(run)}/${way}`, {
+    method: "POST",
+    body: {},
+  });
 }
 
 /** Gives a run another version of its graph, by value. Its engine pauses it for that. */
@@ -231,20 +234,23 @@ export function modifyRun(
 ): Promise<Run> {
   const head = JSON.stringify({ version: version.id, digest: version.digest });
   const body = `${head.slice(0, -1)},"umrf":${version.umrf}}`;
-  return ask(`${runner}/api/runs/${encodeURIComponent(run)}/modify`, { method: "POST", body });
+  return fetchJson(`${runner}/api/runs/${encodeURIComponent(run)}/modify`, {
+    method: "POST",
+    body,
+  });
 }
 
 export function useRuns(runner: string | undefined, graph?: string) {
   const filter = graph === undefined ? "" : `&graph=${encodeURIComponent(graph)}`;
   return useQuery({
     queryKey: ["runs", "list", graph ?? ""],
-    queryFn: ({ signal }) => ask<Run[]>(`${runner}/api/runs?limit=200${filter}`, { signal }),
+    queryFn: ({ signal }) => fetchJson<Run[]>(`${runner}/api/runs?limit=200${filter}`, { signal }),
     enabled: runner !== undefined,
   });
 }
 
 export function getRun(runner: string, id: string, signal?: AbortSignal): Promise<Run> {
-  return ask(`${runner}/api/runs/${encodeURIComponent(id)}`, signal ? { signal } : {});
+  return fetchJson(`${runner}/api/runs/${encodeURIComponent(id)}`, signal ? { signal } : {});
 }
 
 /** The newest run of a graph, whole; null when it never ran. */
@@ -253,7 +259,7 @@ export function useLastRun(runner: string | undefined, graph: string) {
     queryKey: ["runs", "last", graph],
     queryFn: async ({ signal }) => {
       const path = `${runner}/api/runs?limit=1&graph=${encodeURIComponent(graph)}`;
-      const [newest] = await ask<Run[]>(path, { signal });
+      const [newest] = await fetchJson<Run[]>(path, { signal });
       return newest ? getRun(runner ?? "", newest.id, signal) : null;
     },
     enabled: runner !== undefined,

@@ -1,8 +1,8 @@
 /** Who this browser is: trades the token of the link for a cookie. */
-import { ask } from "./http";
+import { fetchJson } from "./http";
 import type { Role } from "./roles";
 
-export { type Deed, may, ROLE_WORDS, ROLES, type Role } from "./roles";
+export { may, type Permission, ROLE_WORDS, ROLES, type Role } from "./roles";
 
 export interface Person {
   id: string;
@@ -12,13 +12,13 @@ export interface Person {
 
 const NAME_KEY = "aa.name";
 
-/** What opens the door: the server's token, or an invitation (`ID.SECRET`). */
-export type Key =
+/** What signs somebody in: the server's token, or an invitation (`ID.SECRET`). */
+export type Credential =
   | { readonly kind: "token"; readonly text: string }
   | { readonly kind: "invitation"; readonly text: string };
 
 /** The key in a link or a fragment; null when it has none. */
-export function keyIn(link: string): Key | null {
+export function credentialIn(link: string): Credential | null {
   const found = /[#&](t|i)=([^&\s]+)/.exec(link);
   if (!found?.[1] || !found[2]) return null;
   const text = decodeURIComponent(found[2]);
@@ -26,8 +26,8 @@ export function keyIn(link: string): Key | null {
 }
 
 /** The key in the address, which is erased from it at once. */
-export function takeKey(): Key | null {
-  const key = keyIn(location.hash);
+export function takeCredential(): Credential | null {
+  const key = credentialIn(location.hash);
   if (key !== null) {
     history.replaceState(history.state, "", location.pathname + location.search);
   }
@@ -47,41 +47,41 @@ interface SessionAnswer {
 }
 
 /** What a link invites to, and by whom. */
-export interface Invited {
+export interface InvitationPreview {
   id: string;
   role: Role;
   by: string;
 }
 
 /** Throws `Refusal` when the link is none of this server, or was revoked. */
-export function lookAt(invitation: string): Promise<Invited> {
-  return ask("/api/session/invitation", { method: "POST", body: { invitation } });
+export function readInvitation(invitation: string): Promise<InvitationPreview> {
+  return fetchJson("/api/session/invitation", { method: "POST", body: { invitation } });
 }
 
 /** Trades a key for a session. Throws `Refusal` when it does not fit. */
-export async function openSession(key: Key, name = rememberedName()): Promise<Person> {
+export async function openSession(key: Credential, name = rememberedName()): Promise<Person> {
   const body = { [key.kind]: key.text, ...(name !== "" && { name }) };
-  return (await ask<SessionAnswer>("/api/session", { method: "POST", body })).person;
+  return (await fetchJson<SessionAnswer>("/api/session", { method: "POST", body })).person;
 }
 
 /** Who the cookie says we are. Throws a `Refusal` with status 401 without one. */
 export async function currentPerson(): Promise<Person> {
-  return (await ask<SessionAnswer>("/api/session")).person;
+  return (await fetchJson<SessionAnswer>("/api/session")).person;
 }
 
 /** Ends the session at the editor, and at a runner that has a data folder of its own: each ends it by
  * itself, so one that cannot be reached is told by the other. Throws when neither could. */
 export async function signOut(runner: string | undefined): Promise<void> {
   const places = ["", ...(runner === undefined ? [] : [runner])];
-  const told = places.map((place) => ask(`${place}/api/session`, { method: "DELETE" }));
+  const told = places.map((place) => fetchJson(`${place}/api/session`, { method: "DELETE" }));
   const outcomes = await Promise.allSettled(told);
   const failed = outcomes.find((each) => each.status === "rejected");
   if (failed && !outcomes.some((each) => each.status === "fulfilled")) throw failed.reason;
 }
 
 /** The same session under another name. */
-export async function rename(name: string): Promise<Person> {
-  const answer = await ask<SessionAnswer>("/api/session", { method: "POST", body: { name } });
+export async function renamePerson(name: string): Promise<Person> {
+  const answer = await fetchJson<SessionAnswer>("/api/session", { method: "POST", body: { name } });
   rememberName(name);
   return answer.person;
 }

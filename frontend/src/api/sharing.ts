@@ -1,12 +1,12 @@
 /** Links that let people in, as owners see them. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import type { Author } from "./graphs";
-import { ask } from "./http";
-import { here } from "./place";
+import type { VersionAuthor } from "./graphs";
+import { fetchJson } from "./http";
+import { serverPath } from "./page-url";
 import type { Role } from "./roles";
 
 export interface Guest {
-  person: Author;
+  person: VersionAuthor;
   at: string;
 }
 
@@ -15,12 +15,12 @@ export interface Invitation {
   role: Role;
   label: string;
   made_at: string;
-  made_by: Author;
+  made_by: VersionAuthor;
   guests: readonly Guest[];
   /** After the origin of the page; absent once the link is revoked. */
   path?: string;
   revoked_at?: string;
-  revoked_by?: Author;
+  revoked_by?: VersionAuthor;
   /** Nobody comes in by it any more, though the log could not take that up yet. */
   unrecorded?: boolean;
 }
@@ -40,7 +40,7 @@ const LOOK = 4_000; // ms: who came in is seen soon
 export function useSharing() {
   return useQuery({
     queryKey: KEY,
-    queryFn: ({ signal }) => ask<Sharing>("/api/invitations", { signal }),
+    queryFn: ({ signal }) => fetchJson<Sharing>("/api/invitations", { signal }),
     refetchInterval: LOOK,
   });
 }
@@ -49,7 +49,7 @@ export function useInvite() {
   const client = useQueryClient();
   return useMutation({
     mutationFn: (wanted: { role: Role; label: string }) =>
-      ask<Invitation>("/api/invitations", { method: "POST", body: wanted }),
+      fetchJson<Invitation>("/api/invitations", { method: "POST", body: wanted }),
     onSettled: () => client.invalidateQueries({ queryKey: KEY }),
   });
 }
@@ -60,9 +60,9 @@ export function useRevoke(runner: string | undefined) {
   return useMutation({
     mutationFn: async (invitation: string) => {
       const path = `/api/invitations/${encodeURIComponent(invitation)}/revoke`;
-      const told = [ask<unknown>(path, { method: "POST" })];
+      const told = [fetchJson<unknown>(path, { method: "POST" })];
       if (runner !== undefined) {
-        told.push(ask(`${runner}/api/revocations`, { method: "POST", body: { invitation } }));
+        told.push(fetchJson(`${runner}/api/revocations`, { method: "POST", body: { invitation } }));
       }
       // Each puts them out by itself, whatever the other says.
       const outcomes = await Promise.allSettled(told);
@@ -75,5 +75,5 @@ export function useRevoke(runner: string | undefined) {
 /** The code of a link as a picture. */
 export function codeUrl(invitation: string, origin: string): string {
   const path = `/api/invitations/${encodeURIComponent(invitation)}/qr`;
-  return here(`${path}?origin=${encodeURIComponent(origin)}`);
+  return serverPath(`${path}?origin=${encodeURIComponent(origin)}`);
 }

@@ -4,22 +4,22 @@ import { Notifications } from "@mantine/notifications";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { Route, Router, Switch } from "wouter";
-import { AskName } from "../account/ask-name";
-import { Gate } from "../account/gate";
+import { NamePrompt } from "../account/name-prompt";
+import { SignInGate } from "../account/sign-in-gate";
 import { Refusal } from "../api/http";
-import { usePerson } from "../api/person";
-import { base } from "../api/place";
-import { LiveProvider } from "../api/use-live";
-import { StopNotice } from "../runs/stop-notice";
-import { UnsureStartNotice } from "../runs/unsure-start";
+import { LiveProvider } from "../api/live/use-live";
+import { basePath } from "../api/page-url";
+import { usePerson } from "../api/use-person";
+import { actionDrag } from "../canvas/action-drag";
+import { UnansweredStartNotice } from "../runs/start/unanswered-start-notice";
+import { StopNotice } from "../runs/stop/stop-notice";
 import { LiveRegion } from "../ui/announcer";
-import { actionCarrier } from "../ui/carry";
-import { CarriedGhost } from "../ui/placing";
+import { DragPreview } from "../ui/pointer-drag";
 import { theme, variables } from "../ui/theme";
 import { DropFiles } from "./drop-files";
 import { GraphScreen } from "./graph-screen";
-import { Lost } from "./lost";
-import { ReviewDialog } from "./review-dialog";
+import { ImportReviewDialog } from "./import-review-dialog";
+import { NotFound } from "./not-found";
 import {
   CompareScreen,
   HomeScreen,
@@ -39,7 +39,7 @@ const client = new QueryClient({
 });
 
 /** The runner hears of a new name by a new socket. */
-function Live({ children }: { children: ReactNode }) {
+function LiveConnection({ children }: { children: ReactNode }) {
   const { person, visit } = usePerson();
   return (
     <LiveProvider who={`${visit} ${person.id} ${person.role} ${person.name}`}>
@@ -53,9 +53,9 @@ export function App() {
     <MantineProvider theme={theme} cssVariablesResolver={variables} defaultColorScheme="auto">
       <Notifications position="bottom-right" zIndex={350} />
       <QueryClientProvider client={client}>
-        <Router base={base}>
-          <Gate>
-            <Live>
+        <Router base={basePath}>
+          <SignInGate>
+            <LiveConnection>
               <DropFiles>
                 <Switch>
                   <Route path="/" component={HomeScreen} />
@@ -65,17 +65,17 @@ export function App() {
                   <Route path="/runs/compare" component={CompareScreen} />
                   <Route path="/runs/statistics" component={StatisticsScreen} />
                   <Route path="/runs/:id">{({ id }) => <RunScreen key={id} id={id} />}</Route>
-                  <Route component={Lost} />
+                  <Route component={NotFound} />
                 </Switch>
-                <AskName />
-                <ReviewDialog />
+                <NamePrompt />
+                <ImportReviewDialog />
                 <StopNotice />
-                <UnsureStartNotice />
-                <CarriedGhost carrier={actionCarrier} />
+                <UnansweredStartNotice />
+                <DragPreview carrier={actionDrag} />
                 <LiveRegion />
               </DropFiles>
-            </Live>
-          </Gate>
+            </LiveConnection>
+          </SignInGate>
         </Router>
       </QueryClientProvider>
     </MantineProvider>

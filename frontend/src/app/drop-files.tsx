@@ -1,9 +1,9 @@
 /** Takes files that are dropped anywhere on the page. */
 import { IconFileImport } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useRef, useState } from "react";
-import { useMay } from "../api/person";
+import { useMay } from "../api/use-person";
 import style from "./drop-files.module.css";
-import { useNewGraphs } from "./files";
+import { useNewGraphs } from "./new-graphs";
 
 function hasFiles(event: DragEvent): boolean {
   return [...(event.dataTransfer?.types ?? [])].includes("Files");

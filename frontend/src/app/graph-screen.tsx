@@ -4,24 +4,24 @@ import { IconMapOff } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 import { Link } from "wouter";
 import { useVersions, versionName } from "../api/graphs";
-import { useMay, usePerson } from "../api/person";
-import { progressByAid } from "../api/progress";
+import { newestRun, openRuns, useLive } from "../api/live/use-live";
 import { type Run, useLastRun } from "../api/runs";
-import { newestRun, openRuns, useLive } from "../api/use-live";
+import { useMay, usePerson } from "../api/use-person";
 import { Editor, type Shown } from "../editor/editor";
-import { useKnownActions } from "../library/known";
+import { useKnownActions } from "../library/known-actions";
 import { Sidebar } from "../library/sidebar";
-import { roomUrl } from "../room/connect";
-import { RoomProvider, useLinkPart, useRoom } from "../room/use-room";
-import { DraftWord } from "../runs/draft-word";
-import { LiveWord } from "../runs/live-word";
-import { RecordRehearsed } from "../runs/record-rehearsed";
+import { ConnectionStatus } from "../runs/connection-status";
+import { DraftStatus } from "../runs/draft-status";
 import { RunStrip } from "../runs/run-strip";
-import { StartControl } from "../runs/start-control";
+import { RecordDryRun } from "../runs/start/record-dry-run";
+import { StartControl } from "../runs/start/start-control";
+import { progressByAid } from "../status/progress";
+import { roomUrl } from "../sync/room-connection";
+import { RoomProvider, useLinkPart, useRoom } from "../sync/use-room";
 import { Empty } from "../ui/empty";
-import { useNewGraphs } from "./files";
-import { Bar, Frame } from "./frame";
-import { useTitle } from "./title";
+import { useNewGraphs } from "./new-graphs";
+import { PageBar, PageFrame } from "./page-frame";
+import { useTitle } from "./use-title";
 
 /** How long a start waits for the name of the moment on screen, ms. */
 const NAMED_MS = 3_000;
@@ -95,7 +95,7 @@ function Inside({ id }: { id: string }) {
       bar={(parts) => <TitledBar id={id} {...parts} />}
       list={(place) => <Sidebar current={id} onNew={create} onImport={choose} onPlace={place} />}
       status={(shown: Shown) => (
-        <DraftWord
+        <DraftStatus
           run={live}
           label={label}
           graph={shown.graph}
@@ -118,7 +118,7 @@ function Inside({ id }: { id: string }) {
       }
       record={(shown, script, onStarted) =>
         mayStart && (
-          <RecordRehearsed
+          <RecordDryRun
             graph={id}
             seq={shown.seq}
             obstacle={shown.obstacle}
@@ -140,22 +140,22 @@ function Inside({ id }: { id: string }) {
           onFold={shown.fold}
         />
       )}
-      corner={<LiveWord run={live} whose={going.length > 1} />}
+      corner={<ConnectionStatus run={live} whose={going.length > 1} />}
     />
   );
 }
 
-function TitledBar(props: { id: string } & Parameters<typeof Bar>[0]) {
+function TitledBar(props: { id: string } & Parameters<typeof PageBar>[0]) {
   const { id, ...parts } = props;
   const here = parts.crumbs.find(({ to, part }) => to === undefined && !part)?.label;
   useTitle(typeof here === "string" ? here : "Graph");
-  return <Bar graph={id} {...parts} />;
+  return <PageBar graph={id} {...parts} />;
 }
 
 function Gone() {
   return (
     <>
-      <Bar crumbs={[{ label: "Graphs", to: "/" }, { label: "Gone" }]} />
+      <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "Gone" }]} />
       <main>
         <Empty
           icon={<IconMapOff size={22} />}
@@ -176,14 +176,14 @@ function Gone() {
 export function GraphScreen({ id }: { id: string }): ReactNode {
   const { person } = usePerson();
   return (
-    <Frame>
+    <PageFrame>
       <RoomProvider
         url={roomUrl(id)}
         keep={{ graph: id, person }}
-        fallback={<Bar crumbs={[{ label: "Graphs", to: "/" }]} />}
+        fallback={<PageBar crumbs={[{ label: "Graphs", to: "/" }]} />}
       >
         <Inside id={id} />
       </RoomProvider>
-    </Frame>
+    </PageFrame>
   );
 }

@@ -1,55 +1,55 @@
 /** The screens around the features: home, runs, one run. */
 import { useLocation } from "wouter";
 import { useVersions } from "../api/graphs";
-import { ComparePage } from "../history/compare-page";
-import type { StartAgain } from "../history/run-menu";
-import { RunPage } from "../history/run-page";
-import { RunsPage } from "../history/runs-page";
-import { StatisticsPage } from "../history/statistics-page";
 import { Home } from "../library/home";
+import { ComparePage } from "../review/compare-page";
+import type { RepeatActions } from "../review/run/run-menu";
+import { RunPage } from "../review/run/run-page";
+import { RunsPage } from "../review/runs-page";
+import { StatisticsPage } from "../review/statistics-page";
 import { RobotsPage } from "../robots/robots-page";
-import { StartDialog } from "../runs/start-dialog";
-import { nextLabel } from "../runs/use-start";
-import { useNewGraphs } from "./files";
-import { Bar, Frame } from "./frame";
-import { useTitle } from "./title";
+import { StartDialog } from "../runs/start/start-dialog";
+import { nextLabel } from "../runs/start/use-start";
+import { useNewGraphs } from "./new-graphs";
+import { PageBar, PageFrame } from "./page-frame";
+import { useTitle } from "./use-title";
 
 export function HomeScreen() {
   const { create, choose } = useNewGraphs();
   useTitle("Graphs");
   return (
-    <Frame>
-      <Bar crumbs={[{ label: "Graphs" }]} />
+    <PageFrame>
+      <PageBar crumbs={[{ label: "Graphs" }]} />
       <Home onNew={create} onImport={choose} />
-    </Frame>
+    </PageFrame>
   );
 }
 
 export function RunsScreen() {
   useTitle("Runs");
   return (
-    <Frame>
-      <Bar at="runs" crumbs={[{ label: "Graphs", to: "/" }, { label: "Runs" }]} />
+    <PageFrame>
+      <PageBar at="runs" crumbs={[{ label: "Graphs", to: "/" }, { label: "Runs" }]} />
       <RunsPage />
-    </Frame>
+    </PageFrame>
   );
 }
 
 export function RunScreen({ id }: { id: string }) {
   useTitle("Run");
   return (
-    <Frame>
+    <PageFrame>
       <RunPage
         id={id}
-        bar={(parts) => <Bar at="runs" {...parts} />}
+        bar={(parts) => <PageBar at="runs" {...parts} />}
         start={(again, onClose) => <Again {...again} onClose={onClose} />}
       />
-    </Frame>
+    </PageFrame>
   );
 }
 
 /** A run once more: looked at, held, recorded like every other start. */
-function Again({ engines, onClose, ...what }: StartAgain & { onClose: () => void }) {
+function Again({ engines, onClose, ...what }: RepeatActions & { onClose: () => void }) {
   const [, go] = useLocation();
   const versions = useVersions(what.graph).data ?? [];
   return (
@@ -71,27 +71,27 @@ export function RobotsScreen() {
     void take([new File([text], `${name}.umrf.graph.json`, { type: "application/json" })]);
   };
   return (
-    <Frame>
-      <Bar at="robots" crumbs={[{ label: "Graphs", to: "/" }, { label: "Robots" }]} />
+    <PageFrame>
+      <PageBar at="robots" crumbs={[{ label: "Graphs", to: "/" }, { label: "Robots" }]} />
       <RobotsPage onImport={onImport} />
-    </Frame>
+    </PageFrame>
   );
 }
 
 export function CompareScreen() {
   useTitle("Compare runs");
   return (
-    <Frame>
-      <ComparePage bar={(parts) => <Bar at="runs" {...parts} />} />
-    </Frame>
+    <PageFrame>
+      <ComparePage bar={(parts) => <PageBar at="runs" {...parts} />} />
+    </PageFrame>
   );
 }
 
 export function StatisticsScreen() {
   useTitle("Statistics");
   return (
-    <Frame>
-      <StatisticsPage bar={(parts) => <Bar at="runs" {...parts} />} />
-    </Frame>
+    <PageFrame>
+      <StatisticsPage bar={(parts) => <PageBar at="runs" {...parts} />} />
+    </PageFrame>
   );
 }

@@ -3,34 +3,40 @@ import { ActionIcon, SegmentedControl } from "@mantine/core";
 import { useLocalStorage } from "@mantine/hooks";
 import { IconLayoutSidebar, IconLayoutSidebarRight } from "@tabler/icons-react";
 import { type ReactNode, useCallback, useMemo, useState, useSyncExternalStore } from "react";
+import type { Script } from "../api/dry-runs";
 import { type Problems, useProblems } from "../api/graphs";
-import type { Progress } from "../api/progress";
-import type { Script } from "../api/rehearsal";
+import { actionDrag } from "../canvas/action-drag";
+import { problemMarksOf } from "../canvas/problem-marks";
+import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
+import { scriptOf } from "../dry-run/script";
+import {
+  addActionAt,
+  type EditorContext,
+  EditorReactContext,
+  freePosition,
+  type Panel,
+} from "../edit-actions/editor-context";
+import { useShortcuts } from "../edit-actions/shortcuts";
+import { FindBar } from "../find/find-bar";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
-import type { Link } from "../room/connect";
-import { useCalmLink } from "../room/use-room";
-import { marksOf } from "../ui/canvas/marks";
-import { actionCarrier } from "../ui/carry";
-import { useIsPhone, useIsWide } from "../ui/screen";
+import { Inspector } from "../inspector/inspector";
+import { Outline } from "../outline/outline";
+import { People } from "../people/people";
+import type { Progress } from "../status/progress";
+import type { RoomLink } from "../sync/room-connection";
+import { useThrottledLink } from "../sync/use-room";
 import type { Crumb } from "../ui/top-bar";
-import { type Bench, BenchContext, freePlace, type Panel, placeAction } from "./bench";
-import { useShortcuts } from "./deeds/keys";
-import { Details } from "./details/details";
-import { scriptOf } from "./dry-run/script";
+import { useIsPhone, useIsWide } from "../ui/use-screen-size";
+import { QuickAdd } from "./canvas/quick-add";
+import { CanvasPane } from "./canvas-pane";
 import style from "./editor.module.css";
-import { FindBar } from "./find/find-bar";
-import { Notices } from "./notices";
-import { Outline } from "./outline/outline";
-import { People } from "./people";
-import { ProblemWord } from "./problem-word";
-import { QuickAdd } from "./quick-add";
-import { SavedWord } from "./saved-word";
-import { Stage } from "./stage";
-import { Surfaces } from "./surfaces";
-import { useTalkOnCards, useThreads } from "./talk/use-threads";
-import { useEditor } from "./use-bench";
-import { useRemoteNews, useRunNews } from "./use-news";
+import { Overlays } from "./menus/overlays";
+import { ProblemCount } from "./problem-count";
+import { RoomNotices } from "./room-notices";
+import { SaveStatus } from "./save-status";
+import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
+import { useEditor } from "./use-editor";
 
 /** What the page around the editor may want to know. */
 export interface Shown {
@@ -46,7 +52,7 @@ export interface Shown {
   fold: (folded: boolean) => void;
 }
 
-export interface BarParts {
+export interface EditorBarParts {
   crumbs: readonly Crumb[];
   status?: ReactNode;
   actions?: ReactNode;
@@ -60,7 +66,7 @@ interface Props {
   progress: ReadonlyMap<Key, Progress>;
   /** The run that goes, if one does. */
   run: string | null;
-  bar: (parts: BarParts) => ReactNode;
+  bar: (parts: EditorBarParts) => ReactNode;
   list: (place: (template: NewAction) => void) => ReactNode;
   strip: (shown: Shown) => ReactNode;
   start: (shown: Shown) => ReactNode;
@@ -72,7 +78,7 @@ interface Props {
 
 type Pane = "canvas" | "outline" | "details" | "run";
 
-type Side = "library" | "outline";
+type EditorSidePanel = "library" | "outline";
 
 const SIDES = [
   { value: "library", label: "Library" },
@@ -90,10 +96,10 @@ const PANES = [
   { value: "run", label: "Run" },
 ];
 
-function obstacleOf(bench: Bench, link: Link, problems: Problems | undefined) {
+function obstacleOf(context: EditorContext, link: RoomLink, problems: Problems | undefined) {
   if (link.state !== "live") return "not connected to the editor";
   if (link.unsaved > 0) return "saving";
-  if (bench.graph.actions.length === 0) return "nothing to run yet";
+  if (context.graph.actions.length === 0) return "nothing to run yet";
   const errors = problems?.problems.filter((problem) => problem.severity === "error").length ?? 0;
   if (errors > 0 && problems?.seq === link.seq) {
     return errors === 1 ? "1 problem must be solved" : `${errors} problems must be solved`;
@@ -102,12 +108,12 @@ function obstacleOf(bench: Bench, link: Link, problems: Problems | undefined) {
 }
 
 /** Where one is: the graphs, this one, and what of it is chosen. */
-function crumbsOf(bench: Bench): Crumb[] {
-  const [only, ...others] = bench.selection;
-  const action = bench.graph.actions.find(({ key }) => key === only);
+function crumbsOf(context: EditorContext): Crumb[] {
+  const [only, ...others] = context.selection;
+  const action = context.graph.actions.find(({ key }) => key === only);
   return [
     { label: "Graphs", to: "/" },
-    { label: bench.graph.name || "Untitled" },
+    { label: context.graph.name || "Untitled" },
     ...(action && others.length === 0
       ? [{ label: `${action.name} ${action.instanceId}`, part: true }]
       : []),
@@ -126,8 +132,8 @@ export function Editor(props: Props) {
     defaultValue: false,
     getInitialValueInEffect: false,
   });
-  const carrying = useSyncExternalStore(actionCarrier.subscribe, actionCarrier.now) !== null;
-  const [side, setSide] = useState<Side>("library");
+  const carrying = useSyncExternalStore(actionDrag.subscribe, actionDrag.now) !== null;
+  const [side, setSide] = useState<EditorSidePanel>("library");
   const onPanel = useCallback((next: Panel) => {
     const outline = next === "outline";
     if (outline) setSide("outline");
@@ -136,72 +142,80 @@ export function Editor(props: Props) {
     setPane((now) => (outline ? "outline" : now === "outline" ? "details" : now));
     if (outline) requestAnimationFrame(focusOutline);
   }, []);
-  const { bench, panel, adding, finding, surface, sight, closeAdd, closeFind, close } = useEditor(
-    id,
-    onPanel,
-  );
-  const link = useCalmLink();
+  const {
+    context,
+    panel,
+    adding,
+    finding,
+    overlay,
+    canvasHandle,
+    closeAdd,
+    closeFind,
+    closeOverlay: close,
+  } = useEditor(id, onPanel);
+  const link = useThrottledLink();
   const problems = useProblems(id, link.seq).data;
-  const marks = useMemo(() => marksOf(problems?.problems ?? []), [problems]);
+  const marks = useMemo(() => problemMarksOf(problems?.problems ?? []), [problems]);
   const threads = useThreads();
-  useTalkOnCards(threads);
-  useRemoteNews(bench.graph, link.seq > 0);
-  useRunNews(bench.graph, progress);
-  useShortcuts(bench);
+  useOpenThreadsOnCards(threads);
+  useRemoteEditAnnouncements(context.graph, link.seq > 0);
+  useRunAnnouncements(context.graph, progress);
+  useShortcuts(context);
 
   const place = (template: NewAction) => {
-    if (!bench.mayEdit) return;
-    const at = freePlace(bench);
-    bench.select([placeAction(bench, template, at)]);
-    bench.view.reveal(at);
+    if (!context.mayEdit) return;
+    const at = freePosition(context);
+    context.select([addActionAt(context, template, at)]);
+    context.view.reveal(at);
     setLeft(false);
   };
-  const [selected = null] = bench.graph.actions
-    .filter((action) => bench.selection.has(action.key))
+  const [selected = null] = context.graph.actions
+    .filter((action) => context.selection.has(action.key))
     .map((action) => action.key);
   const shown: Shown = {
-    graph: bench.graph,
+    graph: context.graph,
     seq: link.seq,
-    obstacle: obstacleOf(bench, link, problems),
+    obstacle: obstacleOf(context, link, problems),
     selected,
     pick: (aid) => {
-      bench.select([aid]);
-      bench.view.show([aid]);
+      context.select([aid]);
+      context.view.show([aid]);
     },
     compact: !wide,
     folded: phone ? null : folded,
     fold: setFolded,
   };
   const stage = (
-    <Stage
+    <CanvasPane
       me={props.me}
-      sight={sight}
+      canvasHandle={canvasHandle}
       progress={progress}
       marks={marks}
       compact={!wide}
       phone={phone}
       run={props.run}
       record={
-        bench.dryRun && props.record(shown, scriptOf(bench.dryRun.decided), bench.dryRun.close)
+        context.dryRun &&
+        props.record(shown, scriptOf(context.dryRun.decided), context.dryRun.close)
       }
-      writing={surface?.kind === "note" ? surface.key : null}
+      writing={overlay?.kind === "note" ? overlay.key : null}
       corner={phone ? null : props.corner}
     />
   );
   // A dry-run is told apart from runs that are over; one that goes on is never out of sight.
-  const strip = bench.dryRun && props.run === null ? null : props.strip(shown);
+  const strip = context.dryRun && props.run === null ? null : props.strip(shown);
   const details = (
-    <Details id={id} seq={link.seq} panel={panel} problems={problems} threads={threads} />
+    <Inspector id={id} seq={link.seq} panel={panel} problems={problems} threads={threads} />
   );
   const find = finding && <FindBar problems={problems?.problems ?? []} onClose={closeFind} />;
   return (
-    <BenchContext value={bench}>
+    <EditorReactContext value={context}>
       {props.bar({
-        crumbs: crumbsOf(bench),
+        crumbs: crumbsOf(context),
         status: (
           <>
-            <SavedWord />
-            <ProblemWord problems={problems} />
+            <SaveStatus />
+            <ProblemCount problems={problems} />
             {wide && props.status(shown)}
           </>
         ),
@@ -244,7 +258,7 @@ export function Editor(props: Props) {
               size="xs"
               data={SIDES}
               value={side}
-              onChange={(next) => setSide(next as Side)}
+              onChange={(next) => setSide(next as EditorSidePanel)}
             />
             <div className={style.side}>
               {side === "outline" ? <Outline progress={progress} /> : props.list(place)}
@@ -297,9 +311,9 @@ export function Editor(props: Props) {
           </aside>
         </main>
       )}
-      <Notices />
-      <Surfaces bench={bench} surface={surface} onClose={close} />
-      {adding && <QuickAdd bench={bench} request={adding} known={known} onClose={closeAdd} />}
-    </BenchContext>
+      <RoomNotices />
+      <Overlays context={context} overlay={overlay} onClose={close} />
+      {adding && <QuickAdd context={context} request={adding} known={known} onClose={closeAdd} />}
+    </EditorReactContext>
   );
 }

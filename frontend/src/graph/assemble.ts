@@ -5,7 +5,8 @@
  * replica shows the same without anybody having to write.
  */
 
-import { relationId } from "./layout";
+import { relationId } from "./document-keys";
+import { isEqual } from "./equal";
 import {
   type Action,
   EMPTY_GRAPH,
@@ -16,7 +17,6 @@ import {
   type Key,
   type Relation,
 } from "./model";
-import { same } from "./same";
 import { byText } from "./values";
 
 /** An action as its own keys tell it, with its place; numbering is not its own affair. */
@@ -168,7 +168,7 @@ function redirect(
     taken.add(relationId({ parent, child, listing }));
     const fresh = { ...relation, parent, child, listing };
     const known = before.get(relation);
-    const arrow = known && same(known, fresh) ? known : fresh;
+    const arrow = known && isEqual(known, fresh) ? known : fresh;
     redirected.set(relation, arrow);
     arrows.push(arrow);
   }
@@ -180,7 +180,7 @@ function byEnds(a: Relation, b: Relation): number {
 }
 
 function kept<T>(old: T, fresh: T): T {
-  return same(old, fresh) ? old : fresh;
+  return isEqual(old, fresh) ? old : fresh;
 }
 
 /** The old list when each element is the very same object. */

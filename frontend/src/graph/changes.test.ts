@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { changesOf, chosen, type Values } from "./changes";
+import { changesOf, onlyChanges, type ValuesByRoot } from "./changes";
+import { type Maps, mapsFrom, mapsOf, ROOTS, rootOf } from "./document-keys";
 import {
   addAction,
   addParameter,
@@ -10,24 +11,23 @@ import {
   setField,
   setGraphName,
 } from "./edit";
-import { type Maps, mapsFrom, mapsOf, ROOTS, rootOf } from "./layout";
+import { isEqual } from "./equal";
 import { ENTRY } from "./model";
-import { same } from "./same";
 
 /** What changed from one document to the next, both ways. */
-function between(then: Maps, here: Maps): { difference: Values; before: Values } {
+function between(then: Maps, here: Maps): { difference: ValuesByRoot; before: ValuesByRoot } {
   const [difference, before] = [mapsFrom({}), mapsFrom({})] as unknown as Record<
     (typeof ROOTS)[number],
     Map<string, unknown>
   >[];
   for (const root of ROOTS) {
     for (const key of new Set([...then[root].keys(), ...here[root].keys()])) {
-      if (same(then[root].get(key), here[root].get(key))) continue;
+      if (isEqual(then[root].get(key), here[root].get(key))) continue;
       difference?.[root].set(key, here[root].get(key));
       before?.[root].set(key, then[root].get(key));
     }
   }
-  return { difference: difference as Values, before: before as Values };
+  return { difference: difference as ValuesByRoot, before: before as ValuesByRoot };
 }
 
 function worked(work: (doc: Y.Doc, look: string, gone: string) => void) {
@@ -99,10 +99,10 @@ test("a part of the changes is the keys of just those", () => {
     rename(doc, action, "Peek");
     setGraphName(doc, "other");
   });
-  const part = chosen(given.difference, changes.slice(1));
+  const part = onlyChanges(given.difference, changes.slice(1));
   expect([...part.actions]).toEqual([[look, "Peek"]]);
   expect(part.meta.size).toBe(0);
-  const all = chosen(given.difference, changes);
+  const all = onlyChanges(given.difference, changes);
   expect(all).toEqual(given.difference);
 });
 

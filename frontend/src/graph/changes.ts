@@ -4,14 +4,14 @@
  * Pure. Each change keeps the keys it is made of, so that some of them can be taken and others not.
  */
 
-import { endsOf, type Maps, ROOTS, type Root, segmentsOf, splitKey } from "./layout";
+import { endsOf, type Maps, ROOTS, type Root, segmentsOf, splitKey } from "./document-keys";
+import { isEqual } from "./equal";
 import { ENTRY, EXIT, type Key, PRECONDITIONS } from "./model";
-import { same } from "./same";
 
 /** Values by key; `undefined` where there is none. */
-export type Values = { readonly [R in Root]: ReadonlyMap<string, unknown> };
+export type ValuesByRoot = { readonly [R in Root]: ReadonlyMap<string, unknown> };
 
-export interface Line {
+export interface ChangedField {
   readonly field: string;
   /** In words; null where there was nothing. */
   readonly before: string | null;
@@ -20,18 +20,18 @@ export interface Line {
   readonly now?: string | null;
 }
 
-export interface Change {
+export interface GraphChange {
   readonly id: string;
   readonly kind: "added" | "removed" | "changed";
   readonly thing: "graph" | "action" | "arrow" | "drawing" | "comment";
   readonly title: string;
-  readonly lines: readonly Line[];
+  readonly lines: readonly ChangedField[];
   readonly keys: readonly (readonly [Root, string])[];
 }
 
-interface Given {
-  readonly difference: Values;
-  readonly before: Values;
+interface ChangesInput {
+  readonly difference: ValuesByRoot;
+  readonly before: ValuesByRoot;
   /** The graph with these changes: names are looked up in it. */
   readonly here: Maps;
 }
@@ -55,7 +55,7 @@ const ORDER = ["graph", "action", "arrow", "drawing", "comment"] as const;
 const LONGEST = 120;
 
 /** The changes, as they stand against the graph as it is `now`. */
-export function changesOf(given: Given, now: Maps): readonly Change[] {
+export function changesOf(given: ChangesInput, now: Maps): readonly GraphChange[] {
   const groups = new Map<string, [Root, string][]>();
   for (const root of ROOTS) {
     for (const key of given.difference[root].keys()) {
@@ -68,7 +68,10 @@ export function changesOf(given: Given, now: Maps): readonly Change[] {
 }
 
 /** Only the keys of these changes. */
-export function chosen(difference: Values, changes: readonly Change[]): Values {
+export function onlyChanges(
+  difference: ValuesByRoot,
+  changes: readonly GraphChange[],
+): ValuesByRoot {
   const keys = new Set(changes.flatMap((change) => change.keys.map(([r, key]) => `${r}/${key}`)));
   const part = (root: Root) =>
     new Map([...difference[root]].filter(([key]) => keys.has(`${root}/${key}`)));
@@ -89,7 +92,7 @@ function groupOf(root: Root, key: string): string {
   return `${root}/${root === "comments" ? key : head}`;
 }
 
-function changeOf(id: string, keys: [Root, string][], given: Given, now: Maps): Change {
+function changeOf(id: string, keys: [Root, string][], given: ChangesInput, now: Maps): GraphChange {
   const slash = id.indexOf("/");
   const [root, head] = slash < 0 ? [id, ""] : [id.slice(0, slash), id.slice(slash + 1)];
   const thing = thingOf(root);
@@ -98,7 +101,7 @@ function changeOf(id: string, keys: [Root, string][], given: Given, now: Maps): 
   return { id, kind, thing, title: titleOf(thing, head, given), lines, keys };
 }
 
-function thingOf(root: string): Change["thing"] {
+function thingOf(root: string): GraphChange["thing"] {
   switch (root) {
     case "meta":
       return "graph";
@@ -114,11 +117,11 @@ function thingOf(root: string): Change["thing"] {
 }
 
 function kindOf(
-  thing: Change["thing"],
+  thing: GraphChange["thing"],
   head: string,
   keys: readonly (readonly [Root, string])[],
-  given: Given,
-): Change["kind"] {
+  given: ChangesInput,
+): GraphChange["kind"] {
   const marks = marksOf(thing, head, keys);
   if (marks.length === 0) return "changed";
   const was = marks.some(([root, key]) => valueBefore(root, key, given) !== undefined);
@@ -129,7 +132,7 @@ function kindOf(
 
 /** The keys by which a thing exists. */
 function marksOf(
-  thing: Change["thing"],
+  thing: GraphChange["thing"],
   head: string,
   keys: readonly (readonly [Root, string])[],
 ): readonly (readonly [Root, string])[] {
@@ -146,11 +149,11 @@ function marksOf(
   }
 }
 
-function valueBefore(root: Root, key: string, { difference, before, here }: Given): unknown {
+function valueBefore(root: Root, key: string, { difference, before, here }: ChangesInput): unknown {
   return difference[root].has(key) ? before[root].get(key) : here[root].get(key);
 }
 
-function titleOf(thing: Change["thing"], head: string, given: Given): string {
+function titleOf(thing: GraphChange["thing"], head: string, given: ChangesInput): string {
   switch (thing) {
     case "graph":
       return "Graph";
@@ -167,20 +170,20 @@ function titleOf(thing: Change["thing"], head: string, given: Given): string {
   }
 }
 
-function nameOf(key: Key, { here, before }: Given): string {
+function nameOf(key: Key, { here, before }: ChangesInput): string {
   if (key === ENTRY) return "Entry";
   if (key === EXIT) return "Exit";
   const name = here.actions.get(key) ?? before.actions.get(key);
   return typeof name === "string" && name !== "" ? name : "an action";
 }
 
-function lineOf(root: Root, key: string, given: Given, now: Maps): Line | null {
+function lineOf(root: Root, key: string, given: ChangesInput, now: Maps): ChangedField | null {
   const rest = root === "meta" ? key : splitKey(key).rest;
   if (SILENT.has(rest) || (root === "comments" && rest !== "")) return null;
   const [was, is] = [given.before[root].get(key), given.difference[root].get(key)];
   const there = now[root].get(key);
   const line = { field: fieldOf(root, rest), before: words(root, was), after: words(root, is) };
-  const other = !same(there, was) && !same(there, is);
+  const other = !isEqual(there, was) && !isEqual(there, is);
   return other ? { ...line, now: words(root, there) } : line;
 }
 

@@ -123,6 +123,6 @@ export function fullName(action: Pick<Action, "name" | "instanceId">): string {
 }
 
 /** The outcomes for which the child does something. */
-export function spoken(conditions: Conditions): Precondition[] {
+export function spokenOutcomes(conditions: Conditions): Precondition[] {
   return PRECONDITIONS.filter((outcome) => conditions[outcome] !== "ignore");
 }

@@ -3,7 +3,7 @@ import { fileURLToPath } from "node:url";
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { mapsFrom, mapsOf, ROOTS, type Root } from "./layout";
+import { mapsFrom, mapsOf, ROOTS, type Root } from "./document-keys";
 import type { Graph } from "./model";
 import { followGraph, readGraph } from "./read";
 

@@ -7,7 +7,6 @@
 
 import type * as Y from "yjs";
 import { type Assembly, assemble, emptyAssembly, type RawAction } from "./assemble";
-import { isAid } from "./ids";
 import {
   endsOf,
   type Maps,
@@ -17,7 +16,9 @@ import {
   relationId,
   rootOf,
   splitKey,
-} from "./layout";
+} from "./document-keys";
+import { isEqual } from "./equal";
+import { isAid } from "./ids";
 import {
   type Action,
   ENTRY,
@@ -34,7 +35,6 @@ import {
   type Remap,
   type Response,
 } from "./model";
-import { same } from "./same";
 import {
   asInstanceId,
   asJsonText,
@@ -47,7 +47,7 @@ import {
 } from "./values";
 
 /** The fields of one owner: what stands right of its first `|`. */
-type Fields = ReadonlyMap<string, unknown>;
+type OwnerFields = ReadonlyMap<string, unknown>;
 
 /** Reads one document state. Never throws. */
 export function readGraph(maps: Maps): Graph {
@@ -218,11 +218,11 @@ function owner(owners: Map<string, Map<string, unknown>>, key: string): Map<stri
 /** Puts a freshly read value in the place of the old one, which stays when it says the same. */
 function replace<T>(map: Map<string, T>, key: string, fresh: T | null): void {
   if (fresh === null) map.delete(key);
-  else if (!same(map.get(key), fresh)) map.set(key, fresh);
+  else if (!isEqual(map.get(key), fresh)) map.set(key, fresh);
 }
 
 /** The JSON texts under a prefix, by name. */
-function under(fields: Fields, prefix: string): Extra {
+function under(fields: OwnerFields, prefix: string): Extra {
   const found: [string, JsonText][] = [];
   for (const [key, value] of fields) {
     if (!key.startsWith(prefix)) continue;
@@ -233,12 +233,12 @@ function under(fields: Fields, prefix: string): Extra {
 }
 
 /** Unknown fields in the order of their list, the others after them by name. */
-function extraOf(fields: Fields, head: string): Extra {
+function extraOf(fields: OwnerFields, head: string): Extra {
   const texts = new Map(under(fields, `${head}/`));
   return listed(texts.keys(), fields.get(head)).map((name) => [name, texts.get(name) ?? ""]);
 }
 
-function readAction(key: Key, fields: Fields, position: unknown): RawAction | null {
+function readAction(key: Key, fields: OwnerFields, position: unknown): RawAction | null {
   const name = asText(fields.get(""));
   if (name === undefined) return null;
   const action: Action = {
@@ -258,7 +258,7 @@ function readAction(key: Key, fields: Fields, position: unknown): RawAction | nu
   return { action, order: asNumber(fields.get("order")) ?? 0 };
 }
 
-function readParameters(fields: Fields, side: "in" | "out"): readonly Parameter[] {
+function readParameters(fields: OwnerFields, side: "in" | "out"): readonly Parameter[] {
   const texts = new Map(under(fields, `${side}/`));
   return listed(texts.keys(), fields.get(side)).map((path) => ({
     path,
@@ -273,7 +273,7 @@ function listed(names: Iterable<string>, order: unknown): readonly string[] {
   return [...new Set([...first, ...known])];
 }
 
-function readRelation(id: string, fields: Fields): Relation | null {
+function readRelation(id: string, fields: OwnerFields): Relation | null {
   const ends = endsOf(id);
   if (ends === null) return null;
   const answers = new Map<Precondition, Response>();
@@ -305,7 +305,7 @@ function readRelation(id: string, fields: Fields): Relation | null {
   };
 }
 
-function readRemaps(fields: Fields): readonly Remap[] {
+function readRemaps(fields: OwnerFields): readonly Remap[] {
   const targets = new Map<string, string>();
   for (const [key, value] of fields) {
     const target = asText(value);

@@ -4,7 +4,7 @@
  * Values keep their spelling, since they are JSON text all along. The server writes whole files.
  */
 
-import { segmentsOf } from "./layout";
+import { segmentsOf } from "./document-keys";
 import {
   type Action,
   type Extra,

@@ -3,9 +3,9 @@ import { ActionIcon, Menu } from "@mantine/core";
 import { IconGripVertical, IconInfoCircle } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { useGraphs } from "../api/graphs";
+import { actionDrag } from "../canvas/action-drag";
 import type { NewAction } from "../graph/edit";
-import { actionCarrier } from "../ui/carry";
-import { type KnownAction, signature } from "./known";
+import { type KnownAction, signature } from "./known-actions";
 import style from "./sidebar.module.css";
 
 function About({ known }: { known: KnownAction }) {
@@ -58,7 +58,7 @@ export function ActionRow({ known, onPlace }: Props) {
         type="button"
         className={style.row}
         title={template.description || template.name}
-        onPointerDown={(event) => actionCarrier.press(event, template, template.name)}
+        onPointerDown={(event) => actionDrag.press(event, template, template.name)}
         onClick={() => onPlace(template)}
       >
         <span className={style.grip} aria-hidden>

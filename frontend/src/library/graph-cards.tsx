@@ -5,18 +5,18 @@ import { IconAlertTriangle, IconSearch } from "@tabler/icons-react";
 import { useMemo, useState } from "react";
 import { Link } from "wouter";
 import type { GraphSummary } from "../api/graphs";
-import { endWords, runWord } from "../api/progress";
+import { newestRun, useLive } from "../api/live/use-live";
 import { type Run, useRuns } from "../api/runs";
-import { newestRun, useLive } from "../api/use-live";
+import { runEndText, runLabel } from "../status/progress";
+import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import { initials, personColor, robotColor } from "../ui/robot";
-import { StateWord } from "../ui/state-word";
-import { ago, instant, useNow } from "../ui/when";
-import { choose, labelsOf, lastRuns, ORDERS, type Order } from "./choose";
+import { colorOfId, colorOfName, initials } from "../ui/name-colors";
+import { ago, instant, useNow } from "../ui/times";
 import style from "./graph-cards.module.css";
 import { GraphMenu } from "./graph-menu";
+import { GraphPreview } from "./graph-preview";
+import { allLabels, type GraphOrder, lastRuns, ORDERS, selectGraphs } from "./graph-selection";
 import home from "./home.module.css";
-import { Preview } from "./preview";
 
 const FEW = 4; // robots or labels on a card
 
@@ -36,9 +36,9 @@ function LastRun({ run, now }: { run: Run; now: number }) {
   const going = run.ended_at === null;
   const at = instant(run.ended_at ?? run.started_at ?? run.requested_at);
   return (
-    <StateWord
-      tone={runWord(run).tone}
-      word={going ? runWord(run).word : endWords(run)}
+    <StateLabel
+      tone={runLabel(run).tone}
+      word={going ? runLabel(run).word : runEndText(run)}
       {...(at === null || going ? {} : { more: ago(at, now) })}
     />
   );
@@ -51,7 +51,7 @@ function People({ people }: { people: NonNullable<GraphSummary["people"]> }) {
     <span className={style.people} title={`Now here: ${names}`}>
       <span className="visually-hidden">Now here: {names}</span>
       {people.slice(0, FEW).map(({ id, name }) => (
-        <i key={id} style={{ background: personColor(id) }} aria-hidden>
+        <i key={id} style={{ background: colorOfId(id) }} aria-hidden>
           {initials(name || "Guest")}
         </i>
       ))}
@@ -60,13 +60,13 @@ function People({ people }: { people: NonNullable<GraphSummary["people"]> }) {
   );
 }
 
-interface CardProps {
+interface GraphCardProps {
   graph: GraphSummary;
   names: readonly string[];
   last: Run | null;
 }
 
-function GraphCard({ graph, names, last }: CardProps) {
+function GraphCard({ graph, names, last }: GraphCardProps) {
   const now = useNow(20_000);
   const at = instant(graph.updated_at);
   const { robots = [], labels = [], people = [] } = graph;
@@ -74,7 +74,7 @@ function GraphCard({ graph, names, last }: CardProps) {
     <article className={home.card}>
       <Link to={`/graphs/${graph.id}`} className={home.open}>
         <div className={home.preview}>
-          <Preview graph={graph.id} seq={graph.seq} />
+          <GraphPreview graph={graph.id} seq={graph.seq} />
           <People people={people} />
         </div>
         <div className={home.body}>
@@ -84,7 +84,7 @@ function GraphCard({ graph, names, last }: CardProps) {
             <p className={style.marks}>
               {robots.slice(0, FEW).map((robot) => (
                 <span key={robot} className={style.robot}>
-                  <i style={{ background: robotColor(robot) }} aria-hidden />
+                  <i style={{ background: colorOfName(robot) }} aria-hidden />
                   <span className="visually-hidden">robot </span>
                   {robot}
                 </span>
@@ -118,15 +118,15 @@ export function GraphCards({ graphs }: { graphs: readonly GraphSummary[] }) {
   const listed = useRuns(runner).data;
   const [search, setSearch] = useState("");
   const [label, setLabel] = useState<string | null>(null);
-  const [order, setOrder] = useLocalStorage<Order>({
+  const [order, setOrder] = useLocalStorage<GraphOrder>({
     key: "aa.graphs-by",
     defaultValue: "changed",
     getInitialValueInEffect: false,
   });
   const runs = useMemo(() => lastRuns([...(listed ?? []), ...live.runs.values()]), [listed, live]);
-  const labels = labelsOf(graphs);
+  const labels = allLabels(graphs);
   const wish = { search, label: label !== null && labels.includes(label) ? label : null, order };
-  const shown = choose(graphs, wish, runs);
+  const shown = selectGraphs(graphs, wish, runs);
   const names = graphs.map(({ name }) => name);
   return (
     <>
@@ -161,7 +161,7 @@ export function GraphCards({ graphs }: { graphs: readonly GraphSummary[] }) {
           aria-label="Sort by"
           data={Object.entries(ORDERS).map(([value, words]) => ({ value, label: words }))}
           value={order}
-          onChange={(next) => setOrder((next ?? "changed") as Order)}
+          onChange={(next) => setOrder((next ?? "changed") as GraphOrder)}
         />
       </search>
       <p className="visually-hidden" role="status">

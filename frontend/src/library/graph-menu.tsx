@@ -12,9 +12,9 @@ import {
   refreshGraphs,
   renameGraph,
 } from "../api/graphs";
-import { sentence } from "../api/http";
-import { useMay } from "../api/person";
-import { here } from "../api/place";
+import { errorText } from "../api/http";
+import { serverPath } from "../api/page-url";
+import { useMay } from "../api/use-person";
 import style from "./home.module.css";
 
 /** "x copy", "x copy 2" …: the first that no graph is called. */
@@ -36,7 +36,7 @@ async function attempt(
     await work();
     return true;
   } catch (error) {
-    notifications.show({ color: "red", title: failed, message: sentence(error) });
+    notifications.show({ color: "red", title: failed, message: errorText(error) });
     return false;
   } finally {
     await refreshGraphs(client);
@@ -134,7 +134,7 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
           </Menu.Item>
           <Menu.Item
             component="a"
-            href={here(`/api/graphs/${encodeURIComponent(graph.id)}/umrf`)}
+            href={serverPath(`/api/graphs/${encodeURIComponent(graph.id)}/umrf`)}
             download={`${graph.name || "graph"}.umrf.graph.json`}
             leftSection={<IconShare3 size={15} />}
           >

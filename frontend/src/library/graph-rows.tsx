@@ -3,10 +3,10 @@ import { Skeleton } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { Link } from "wouter";
 import type { GraphSummary } from "../api/graphs";
-import { endWords, runWord, type Tone } from "../api/progress";
-import { newestRun, useLive } from "../api/use-live";
-import { toneColor } from "../ui/state-word";
-import { ago, instant, stopwatch, useNow } from "../ui/when";
+import { newestRun, useLive } from "../api/live/use-live";
+import { runEndText, runLabel, type Tone } from "../status/progress";
+import { toneColor } from "../status/state-label";
+import { ago, instant, stopwatch, useNow } from "../ui/times";
 import style from "./sidebar.module.css";
 
 function subtitle(graph: GraphSummary, words: string | null, now: number): string {
@@ -28,12 +28,12 @@ export function GraphRow({ graph, current }: { graph: GraphSummary; current: boo
   let tone: Tone = "idle";
   let words: string | null = null;
   if (run) {
-    tone = runWord(run).tone;
+    tone = runLabel(run).tone;
     const start = instant(run.started_at) ?? now;
     const end = instant(run.ended_at) ?? now;
     words = goes
-      ? `${run.author?.name ?? ""} · ${runWord(run).word} · ${stopwatch(now - start)}`
-      : `${endWords(run)} · ${ago(end, now)}`;
+      ? `${run.author?.name ?? ""} · ${runLabel(run).word} · ${stopwatch(now - start)}`
+      : `${runEndText(run)} · ${ago(end, now)}`;
   }
   const errors = graph.problems?.error ?? 0;
   return (

@@ -2,8 +2,8 @@
 import { Button, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconFileImport, IconPlus } from "@tabler/icons-react";
 import { useGraphs } from "../api/graphs";
-import { sentence } from "../api/http";
-import { useMay } from "../api/person";
+import { errorText } from "../api/http";
+import { useMay } from "../api/use-person";
 import { Empty } from "../ui/empty";
 import { GraphCards } from "./graph-cards";
 import style from "./home.module.css";
@@ -59,7 +59,7 @@ export function Home({ onNew, onImport }: Props) {
         {graphs.isPending && <Skeletons />}
         {graphs.isError && (
           <Empty icon={<IconAlertTriangle size={22} />} title="The list cannot be read">
-            {sentence(graphs.error)}
+            {errorText(graphs.error)}
           </Empty>
         )}
         {graphs.isSuccess && list.length === 0 && (

@@ -3,12 +3,12 @@ import { ActionIcon, Kbd, TextInput, Tooltip } from "@mantine/core";
 import { IconFileImport, IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { useGraphs } from "../api/graphs";
-import { useMay } from "../api/person";
+import { useMay } from "../api/use-person";
 import type { NewAction } from "../graph/edit";
 import { ActionRow } from "./action-row";
-import { fits } from "./choose";
 import { GraphRow, RowSkeletons } from "./graph-rows";
-import { signature, useKnownActions } from "./known";
+import { matchesSearch } from "./graph-selection";
+import { signature, useKnownActions } from "./known-actions";
 import style from "./sidebar.module.css";
 
 interface Props {
@@ -22,7 +22,7 @@ interface Props {
 function ActionList({ search, onPlace }: { search: string; onPlace: (t: NewAction) => void }) {
   const { actions, ready } = useKnownActions();
   const shown = actions.filter(({ template }) =>
-    fits(search, template.name, template.description, signature(template)),
+    matchesSearch(search, template.name, template.description, signature(template)),
   );
   const fresh = search.trim();
   const exact = shown.some(({ template }) => template.name === fresh);
@@ -52,7 +52,13 @@ export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
   const mayEdit = useMay("edit");
   const graphs = useGraphs();
   const shown = (graphs.data ?? []).filter((graph) =>
-    fits(search, graph.name, graph.description, ...(graph.robots ?? []), ...(graph.labels ?? [])),
+    matchesSearch(
+      search,
+      graph.name,
+      graph.description,
+      ...(graph.robots ?? []),
+      ...(graph.labels ?? []),
+    ),
   );
   return (
     <div className={style.sidebar}>

@@ -4,17 +4,17 @@ import { notifications } from "@mantine/notifications";
 import { IconAlertTriangle, IconCheck, IconDots, IconPencil, IconTrash } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { sentence } from "../api/http";
-import { useMay } from "../api/person";
+import { errorText } from "../api/http";
+import { useLive, useRobotAnsweredAt } from "../api/live/use-live";
 import { forgetRobot, type Registration, type Robot } from "../api/robots";
-import { useHeard, useLive } from "../api/use-live";
-import { EngineWord } from "../ui/engine-word";
-import { robotColor } from "../ui/robot";
-import { ago, clock, instant, useNow } from "../ui/when";
-import { FlightRecord } from "./flight-record";
-import { KnownHere } from "./known-here";
+import { useMay } from "../api/use-person";
+import { EngineLabel } from "../status/engine-label";
+import { colorOfName } from "../ui/name-colors";
+import { ago, clock, instant, useNow } from "../ui/times";
+import { IndexedActions } from "./indexed-actions";
 import style from "./robot-card.module.css";
-import { RunsHere } from "./runs-here";
+import { RobotLog } from "./robot-log";
+import { RobotRuns } from "./robot-runs";
 
 interface Props {
   robot: Robot;
@@ -25,7 +25,7 @@ interface Props {
 type Sign = { good: boolean; text: string };
 
 /** What a person should know before trusting an answer or starting something. */
-export function signsOf(robot: Robot): Sign[] {
+export function robotSigns(robot: Robot): Sign[] {
   if (robot.state === "no_link") return [];
   const signs: Sign[] = [];
   if (robot.servers === 1)
@@ -51,7 +51,7 @@ export function signsOf(robot: Robot): Sign[] {
 
 function Facts({ robot }: { robot: Robot }) {
   const now = useNow(1000);
-  const heard = useHeard(robot.name) ?? instant(robot.heard_at);
+  const heard = useRobotAnsweredAt(robot.name) ?? instant(robot.heard_at);
   const restarted = instant(robot.restarted_at);
   const took = robot.took_ms === null ? "" : ` within ${Math.max(1, Math.round(robot.took_ms))} ms`;
   return (
@@ -74,7 +74,7 @@ function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
       await client.invalidateQueries({ queryKey: ["robots"] });
     } catch (error) {
       const title = `${robot.name} was not forgotten`;
-      notifications.show({ color: "red", title, message: sentence(error) });
+      notifications.show({ color: "red", title, message: errorText(error) });
     }
   };
   return (
@@ -121,17 +121,17 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
     n === null ? `${what}s` : `${n} ${what}${n === 1 ? "" : "s"}`;
   return (
     <article className={style.card} aria-label={robot.name}>
-      <i className={style.stripe} style={{ background: robotColor(robot.name) }} aria-hidden />
+      <i className={style.stripe} style={{ background: colorOfName(robot.name) }} aria-hidden />
       <header className={style.head}>
         <h3 className={style.name}>{robot.name}</h3>
-        <EngineWord robot={robot} />
+        <EngineLabel robot={robot} />
         <span className={style.gap} />
         <More robot={robot} onEdit={onEdit} />
       </header>
       <Facts robot={robot} />
       {robot.why !== "" && <p className={style.why}>{robot.why}</p>}
       <ul className={style.signs}>
-        {signsOf(robot).map(({ good, text }) => (
+        {robotSigns(robot).map(({ good, text }) => (
           <li key={text} data-good={good || undefined}>
             {good ? (
               <IconCheck size={14} aria-hidden />
@@ -142,7 +142,7 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
           </li>
         ))}
       </ul>
-      <RunsHere robot={robot} onImport={onImport} />
+      <RobotRuns robot={robot} onImport={onImport} />
       {linked && (
         <Tabs value={open} onChange={setOpen} className={style.tabs ?? ""} keepMounted={false}>
           <Tabs.List>
@@ -165,10 +165,10 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
             )}
           </Tabs.List>
           <Tabs.Panel value="known" className={style.panel ?? ""}>
-            <KnownHere robot={robot.name} />
+            <IndexedActions robot={robot.name} />
           </Tabs.Panel>
           <Tabs.Panel value="flight" className={style.panel ?? ""}>
-            <FlightRecord robot={robot.name} onImport={onImport} />
+            <RobotLog robot={robot.name} onImport={onImport} />
           </Tabs.Panel>
         </Tabs>
       )}

@@ -12,10 +12,10 @@ import {
 } from "@mantine/core";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { Refusal, sentence } from "../api/http";
+import { errorText, Refusal } from "../api/http";
+import { useLive } from "../api/live/use-live";
 import { changeRobot, type Registration, registerRobot } from "../api/robots";
-import { useLive } from "../api/use-live";
-import type { Editing } from "./robots-page";
+import type { EditedRobot } from "./robots-page";
 
 export const NEW: Registration = {
   name: "",
@@ -25,13 +25,13 @@ export const NEW: Registration = {
   profile: {},
 };
 
-type Field = "name" | "domain" | "get_service" | "rmw" | "profile";
+type RobotFormField = "name" | "domain" | "get_service" | "rmw" | "profile";
 
 /** The field that a refusal points at; "" when it is about all of it. */
-export function fieldOf(error: unknown): Field | "" {
+export function refusedField(error: unknown): RobotFormField | "" {
   const path = error instanceof Refusal ? (error.details.where?.path ?? "") : "";
   const found = /^\/(name|domain|get_service|rmw|profile)\b/.exec(path)?.[1];
-  return (found as Field | undefined) ?? "";
+  return (found as RobotFormField | undefined) ?? "";
 }
 
 function Profile(props: {
@@ -73,15 +73,15 @@ function Profile(props: {
   );
 }
 
-export function RobotForm({ editing, onClose }: { editing: Editing; onClose: () => void }) {
+export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose: () => void }) {
   const { runner } = useLive();
   const client = useQueryClient();
   const [robot, setRobot] = useState(editing.robot);
   const [more, setMore] = useState(!editing.isNew);
   const [error, setError] = useState<unknown>(null);
   const [busy, setBusy] = useState(false);
-  const place = fieldOf(error);
-  const at = (field: Field) => (place === field ? sentence(error) : undefined);
+  const place = refusedField(error);
+  const at = (field: RobotFormField) => (place === field ? errorText(error) : undefined);
   const save = async () => {
     setBusy(true);
     try {
@@ -91,7 +91,7 @@ export function RobotForm({ editing, onClose }: { editing: Editing; onClose: () 
     } catch (problem) {
       setError(problem);
       setBusy(false);
-      if (fieldOf(problem) !== "" && fieldOf(problem) !== "name") setMore(true);
+      if (refusedField(problem) !== "" && refusedField(problem) !== "name") setMore(true);
     }
   };
   const title = editing.isNew ? "Register a robot" : `Change ${editing.robot.name}`;
@@ -160,7 +160,7 @@ export function RobotForm({ editing, onClose }: { editing: Editing; onClose: () 
           </Collapse>
           {error !== null && place === "" && (
             <Text c="var(--error)" role="alert">
-              {sentence(error)}
+              {errorText(error)}
             </Text>
           )}
           <Group justify="flex-end">

@@ -2,12 +2,12 @@
 import { Button, Code, Skeleton } from "@mantine/core";
 import { IconPlus, IconRobot } from "@tabler/icons-react";
 import { useState } from "react";
-import { useMay } from "../api/person";
-import type { Candidate, Registration } from "../api/robots";
-import { useReach } from "../api/robots";
-import { useLive } from "../api/use-live";
+import { useLive } from "../api/live/use-live";
+import type { FoundEngine, Registration } from "../api/robots";
+import { useRosReach } from "../api/robots";
+import { useMay } from "../api/use-person";
 import { Empty } from "../ui/empty";
-import { Candidates } from "./candidates";
+import { FoundEngines } from "./found-engines";
 import { RobotCard } from "./robot-card";
 import { NEW, RobotForm } from "./robot-form";
 import style from "./robots-page.module.css";
@@ -17,7 +17,7 @@ interface Props {
   onImport: (text: string, name: string) => void;
 }
 
-export interface Editing {
+export interface EditedRobot {
   robot: Registration;
   isNew: boolean;
 }
@@ -45,13 +45,13 @@ function NoReach({ why }: { why: string }) {
 export function RobotsPage({ onImport }: Props) {
   const { runner, now } = useLive();
   const may = useMay("register");
-  const reach = useReach(runner).data;
-  const [editing, setEditing] = useState<Editing | null>(null);
+  const reach = useRosReach(runner).data;
+  const [editing, setEditing] = useState<EditedRobot | null>(null);
   const known = now.link !== "connecting" || reach !== undefined;
   const engines = now.engines.length > 0 ? now.engines : (reach?.engines ?? []);
   const robots = engines.filter((robot) => !robot.simulated);
   const add = (robot: Registration = NEW) => setEditing({ robot, isNew: true });
-  const take = (candidate: Candidate) =>
+  const take = (candidate: FoundEngine) =>
     add({
       ...NEW,
       name: candidate.actor,
@@ -99,7 +99,7 @@ export function RobotsPage({ onImport }: Props) {
             onImport={onImport}
           />
         ))}
-        <Candidates may={may} onTake={take} on={reach?.no_reach === ""} />
+        <FoundEngines may={may} onTake={take} on={reach?.no_reach === ""} />
       </div>
       {editing && <RobotForm editing={editing} onClose={() => setEditing(null)} />}
     </main>

@@ -3,21 +3,21 @@ import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconPlayerPause, IconPlayerPlay } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
-import { sentence } from "../api/http";
-import { useMay } from "../api/person";
-import { playedBy, type Run, steerRun } from "../api/runs";
-import { useLive } from "../api/use-live";
+import { errorText } from "../api/http";
+import { useLive } from "../api/live/use-live";
+import { abilitiesOf, pauseOrResume, type Run } from "../api/runs";
+import { useMay } from "../api/use-person";
 
 export function PauseButton({ run }: { run: Run }) {
   const { runner, now } = useLive();
   const may = useMay(run.simulated ? "simulate" : "operate");
-  const engine = now.engines.find((each) => each.name === playedBy(run));
+  const engine = now.engines.find((each) => each.name === abilitiesOf(run));
   const paused = run.desired === "paused";
   const steer = useMutation({
-    mutationFn: () => steerRun(runner ?? "", run.id, paused ? "resume" : "pause"),
+    mutationFn: () => pauseOrResume(runner ?? "", run.id, paused ? "resume" : "pause"),
     onError: (error) => {
       const title = paused ? "It does not go on" : "Not paused";
-      notifications.show({ color: "red", title, message: sentence(error) });
+      notifications.show({ color: "red", title, message: errorText(error) });
     },
   });
   const goes = run.state === "running" || run.state === "paused";

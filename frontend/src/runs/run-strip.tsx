@@ -4,19 +4,19 @@ import { IconChevronDown, IconChevronUp, IconTimeline } from "@tabler/icons-reac
 import { useMemo } from "react";
 import { Link } from "wouter";
 import { authorName } from "../api/graphs";
-import { endWords, runWord } from "../api/progress";
-import { alarmNow, type Run } from "../api/runs";
-import { useLive } from "../api/use-live";
+import { useLive } from "../api/live/use-live";
+import { currentAlarm, type Run } from "../api/runs";
 import type { Graph } from "../graph/model";
-import { lanesOf } from "../ui/lanes";
-import { robotColor } from "../ui/robot";
-import { StateWord } from "../ui/state-word";
-import { Timeline } from "../ui/timeline";
-import { spanWords } from "../ui/took";
-import { clock, day, instant, stopwatch, useNow } from "../ui/when";
+import { boundsText } from "../status/durations";
+import { runEndText, runLabel } from "../status/progress";
+import { StateLabel } from "../status/state-label";
+import { Timeline } from "../status/timeline";
+import { lanesOf } from "../status/timeline-lanes";
+import { colorOfName } from "../ui/name-colors";
+import { clock, day, instant, stopwatch, useNow } from "../ui/times";
 import { PauseButton } from "./pause-button";
-import { RestButton } from "./rest-button";
 import style from "./run-strip.module.css";
+import { ConfirmRestButton } from "./stop/confirm-rest-button";
 
 /** What the notice shouts on every page already. */
 const SHOUTED: ReadonlySet<string> = new Set(["stop_unconfirmed", "moves_again"]);
@@ -63,7 +63,7 @@ function Whose({ run, going, onChoose }: Pick<Props, "going" | "onChoose"> & { r
           key={each.id}
           type="button"
           aria-pressed={each.id === run.id}
-          aria-label={`Run ${each.number} on ${each.engine}, ${runWord(each).word}`}
+          aria-label={`Run ${each.number} on ${each.engine}, ${runLabel(each).word}`}
           onClick={() => onChoose(each.id)}
         >
           <Robot name={each.engine} />
@@ -76,7 +76,7 @@ function Whose({ run, going, onChoose }: Pick<Props, "going" | "onChoose"> & { r
 function Robot({ name }: { name: string }) {
   return (
     <span className={style.robot}>
-      <i style={{ background: robotColor(name) }} aria-hidden /> {name}
+      <i style={{ background: colorOfName(name) }} aria-hidden /> {name}
     </span>
   );
 }
@@ -85,7 +85,7 @@ const SHORT = 60; // characters that fit beside the rest
 
 /** What a person must know of it now, or why it ended so. */
 function toldOf(run: Run): string {
-  const alarm = alarmNow(run)?.text ?? "";
+  const alarm = currentAlarm(run)?.text ?? "";
   return run.ended_at === null ? alarm : run.detail || alarm;
 }
 
@@ -114,9 +114,9 @@ export function RunStrip(props: Props) {
   const until = down ? now.since : present;
   const when = day(start, present);
   const started = when === "today" ? `at ${clock(start)}` : `${when} ${clock(start)}`;
-  const { tone, word } = runWord(run);
+  const { tone, word } = runLabel(run);
   const told = toldOf(run);
-  const announces = goes && !SHOUTED.has(alarmNow(run)?.code ?? "");
+  const announces = goes && !SHOUTED.has(currentAlarm(run)?.code ?? "");
   const inLine = folded === true || told.length < SHORT;
   const unsure = down && goes;
   const silent = goes ? instant(run.unknown_since) : null;
@@ -131,15 +131,15 @@ export function RunStrip(props: Props) {
         <b>Run {run.number}</b>
         <Whose run={run} going={going} onChoose={onChoose} />
         <span className={style.version}>{versionLabel}</span>
-        <StateWord
+        <StateLabel
           pill
           tone={unsure ? "unknown" : tone}
-          word={unsure ? `unknown since ${clock(now.since)}` : goes ? word : endWords(run)}
+          word={unsure ? `unknown since ${clock(now.since)}` : goes ? word : runEndText(run)}
         />
         <Text span c="dimmed" size="xs" truncate>
           {run.simulated && "simulated · "}
           started by {authorName(run.author)} {started} ·{" "}
-          {(!goes && spanWords(run.took)) || stopwatch((instant(run.ended_at) ?? until) - start)}
+          {(!goes && boundsText(run.took)) || stopwatch((instant(run.ended_at) ?? until) - start)}
         </Text>
         <span className={style.gap} />
         {inLine && told !== "" && (
@@ -147,7 +147,7 @@ export function RunStrip(props: Props) {
             {told}
           </span>
         )}
-        {goes && <RestButton run={run} />}
+        {goes && <ConfirmRestButton run={run} />}
         {!run.recorded && <span className={style.alarm}>not recorded</span>}
         {goes && <PauseButton run={run} />}
         <Button

@@ -1,4 +1,4 @@
-/** Mantine dressed in the tokens of the look. */
+/** The Mantine theme, from the tokens of the design. */
 import {
   ActionIcon,
   Button,

@@ -1,8 +1,7 @@
 /** The bar on top of every page: where one is, what one may do, and STOP at its right end. */
 
 import { Fragment, type ReactNode } from "react";
-import { Link } from "wouter";
-import { here } from "../api/place";
+import { Link, useRouter } from "wouter";
 import style from "./top-bar.module.css";
 
 export interface Crumb {
@@ -23,8 +22,9 @@ interface Props {
   stop: ReactNode;
 }
 
-export function Mark() {
-  return <img src={here("/mark.svg")} alt="" width={24} height={24} className={style.mark} />;
+export function Logo() {
+  const { base } = useRouter();
+  return <img src={`${base}/mark.svg`} alt="" width={24} height={24} className={style.mark} />;
 }
 
 /** The focus goes past the bar. */
@@ -42,7 +42,7 @@ export function TopBar({ crumbs, status, actions, account, start, stop }: Props)
         Skip to the content
       </button>
       <Link to="/" className={style.home} aria-label="All graphs">
-        <Mark />
+        <Logo />
       </Link>
       <nav className={style.crumbs} aria-label="Where you are">
         {crumbs.map((crumb, i) => (

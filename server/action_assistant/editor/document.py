@@ -1,6 +1,6 @@
 """The shared document: a graph as root maps with flat string keys (docs/contracts.md 1).
 
-This module and `frontend/src/graph/layout.ts` are the only places that know the keys. Flat keys let
+This module and `frontend/src/graph/document-keys.ts` are the only places that know the keys. Flat keys let
 two people fill in different things of one action without replacing each other's container, and let
 an undone delete bring back what a colleague changed meanwhile.
 """

@@ -55,7 +55,7 @@ def example_of(text: JsonText) -> Json:
     """What the `pvf_example` of a parameter without a value would be as its value, or None.
 
     Old files spell examples as texts; one that is no value of the type is not made into one. Twin of
-    `frontend/src/graph/examples.ts`.
+    `frontend/src/graph/edit/examples.ts`.
     """
     leaf = parse_small(text)
     if not isinstance(leaf, dict) or "pvf_value" in leaf:

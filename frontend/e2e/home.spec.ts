@@ -1,0 +1,93 @@
+/** Home and keyboard: rename, duplicate, delete and bring back; Delete, Tab, select all, marquee. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { add, card, saved } from "./canvas";
+import { Product } from "./product";
+
+const product = new Product();
+
+test.beforeAll(() => product.start());
+test.afterAll(() => product.dispose());
+
+const menu = async (page: Page, graph: string, item: string) => {
+  await page.getByRole("button", { name: `More about ${graph}`, exact: true }).click();
+  await page.getByRole("menuitem", { name: item }).click();
+};
+
+test("a graph is renamed, duplicated, deleted and brought back", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  const heading = (name: string) => page.getByRole("heading", { name, exact: true });
+
+  await menu(page, "search_aisles", "Rename …");
+  const field = page.getByRole("textbox", { name: "Name of the graph" });
+  await field.fill("look_for_pallets");
+  await field.press("Enter");
+  await expect(heading("look_for_pallets")).toBeVisible();
+  await expect(heading("search_aisles")).toHaveCount(0);
+
+  await menu(page, "look_for_pallets", "Duplicate");
+  await expect(heading("look_for_pallets copy")).toBeVisible();
+  const graphs = await product.ask<{ id: string; name: string; actions: number }[]>("/api/graphs");
+  const [one, copy] = ["look_for_pallets", "look_for_pallets copy"].map((name) =>
+    graphs.find((graph) => graph.name === name),
+  );
+  expect(copy?.actions).toBe(one?.actions);
+  expect(copy?.id).not.toBe(one?.id);
+
+  await menu(page, "look_for_pallets copy", "Delete");
+  await expect(heading("look_for_pallets copy")).toHaveCount(0);
+  await page.getByRole("button", { name: "Bring it back" }).click();
+  await expect(heading("look_for_pallets copy")).toBeVisible();
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("keys and marquee: Tab searches, all are selected, Delete deletes, a frame selects", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.getByRole("button", { name: "New graph" }).first().click();
+  await page.waitForURL(/\/graphs\/.+/);
+  await add(page, "One");
+  await page.keyboard.press("Escape");
+
+  // Tab over the canvas opens the search; Enter takes what is typed.
+  const pane = page.locator(".react-flow__pane");
+  const box = await pane.boundingBox();
+  if (box === null) throw new Error("no canvas");
+  await page.mouse.click(box.x + 40, box.y + 300);
+  await page.evaluate(() => (document.activeElement as HTMLElement | null)?.blur());
+  await page.keyboard.press("Tab");
+  const search = page.getByRole("combobox", { name: "Name of an action" });
+  await expect(search).toBeFocused();
+  await search.fill("Two");
+  await search.press("Enter");
+  await expect(card(page, "Two")).toBeVisible();
+
+  const selected = page.locator(".react-flow__node-action.selected");
+  await page.mouse.click(box.x + box.width - 60, box.y + 300);
+  await expect(selected).toHaveCount(0);
+  await page.keyboard.press("ControlOrMeta+a");
+  await expect(selected).toHaveCount(2);
+  await page.keyboard.press("Delete");
+  await expect(page.locator(".react-flow__node-action")).toHaveCount(0);
+  await page.keyboard.press("ControlOrMeta+z");
+  await expect(page.locator(".react-flow__node-action")).toHaveCount(2);
+
+  // A frame drawn round one of them selects that one.
+  await page.getByRole("button", { name: "Select", exact: true }).click();
+  const two = await card(page, "Two").boundingBox();
+  if (two === null) throw new Error("no card");
+  await page.mouse.move(two.x - 14, two.y - 10);
+  await page.mouse.down();
+  await page.mouse.move(two.x + two.width / 2, two.y + two.height / 2, { steps: 6 });
+  await page.mouse.move(two.x + two.width + 10, two.y + two.height + 14, { steps: 6 });
+  await page.mouse.up();
+  await expect(card(page, "Two")).toHaveClass(/selected/);
+  await page.keyboard.press("Backspace");
+  await expect(card(page, "Two")).toHaveCount(0);
+  await expect(card(page, "One")).toBeVisible();
+  await saved(page);
+  expect(failures).toEqual([]);
+  await context.close();
+});

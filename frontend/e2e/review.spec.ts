@@ -1,0 +1,298 @@
+/** Looking back: find a run, replay it, compare it with another, run it again with a fault. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { card } from "./canvas";
+import { type Person, Product } from "./product";
+
+interface Run {
+  id: string;
+  number: number;
+  state: string;
+  result: string | null;
+}
+
+const product = new Product();
+let ada: Person;
+let graph: string;
+let good: Run;
+let bad: Run;
+
+const QUICK = { after_s: 0.25 };
+const JAMMED = { after_s: 0.25, result: "on_error", message: "gripper jammed" };
+
+async function version(of: string): Promise<{ id: string; digest: string; umrf: string }> {
+  const made = await product.ask<{ id: string; digest: string }>(`/api/graphs/${of}/versions`, {
+    method: "POST",
+    body: "{}",
+    headers: { "content-type": "application/json" },
+  });
+  const umrf = JSON.stringify(
+    (await product.ask<{ umrf: unknown }>(`/api/versions/${made.id}`)).umrf,
+  );
+  return { ...made, umrf };
+}
+
+/** Runs the graph's newest version with actions that do as they are told, to its end. */
+async function ran(behaviours: Record<string, unknown[]>, of = graph): Promise<Run> {
+  const { id, digest, umrf } = await version(of);
+  const head = {
+    version: id,
+    digest,
+    graph: of,
+    engine: "simulator",
+    request_id: `e2e-${Math.random()}`,
+  };
+  const body = `${JSON.stringify({ ...head, script: { behaviours } }).slice(0, -1)},"umrf":${umrf}}`;
+  const run = await product.ask<Run>("/api/runs", { method: "POST", body }, product.runnerUrl);
+  const now = () => product.ask<Run>(`/api/runs/${run.id}`, {}, product.runnerUrl);
+  await expect.poll(async () => (await now()).state, { timeout: 20_000 }).toMatch(/finished|error/);
+  return now();
+}
+
+/** The words on the cards, in their order on the canvas. */
+function words(page: Page): Promise<string[]> {
+  return page.locator(".react-flow__node-action span[data-tone]").allTextContents();
+}
+
+test.beforeAll(async ({ browser }) => {
+  await product.start();
+  graph = await product.chain(3);
+  good = await ran({ "*": [QUICK] });
+  bad = await ran({ Wait_1: [JAMMED], "*": [QUICK] });
+  ada = await product.person(browser, "Ada");
+});
+test.afterAll(async () => {
+  expect(ada.failures).toEqual([]);
+  await product.dispose();
+});
+
+test("a replay shows each moment as it was known then, by mouse and by keyboard", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${good.id}`);
+  await expect(card(page, "Wait").first().getByText("true")).toBeVisible();
+  await page.getByRole("button", { name: "To the start" }).click();
+  await expect(page.getByText("as it was then")).toBeVisible();
+  await page.keyboard.press("ArrowRight"); // from the request on, change by change
+  const next = page.getByRole("button", { name: "The next change" });
+  for (let i = 0; i < 12 && !(await words(page)).some((word) => word.includes("running")); i += 1) {
+    await next.click();
+  }
+  expect((await words(page)).filter((word) => word.includes("running"))).toHaveLength(1);
+  expect((await words(page)).some((word) => word.includes("true"))).toBe(false);
+  await expect.poll(() => new URL(page.url()).searchParams.get("t")).not.toBeNull();
+  const shared = page.url();
+  await page.getByLabel("Speed of the replay").selectOption("16");
+  await page.getByText("as it was then").click(); // keys belong to the button that was pressed last
+  await page.keyboard.press("Space");
+  await expect(page.getByText("as it was then")).toBeHidden();
+  expect((await words(page)).filter((word) => word.includes("true"))).toHaveLength(3);
+  await page.goto(shared); // a link carries the moment
+  await expect(page.getByText("as it was then")).toBeVisible();
+  await expect
+    .poll(async () => (await words(page)).filter((w) => w.includes("running")))
+    .toHaveLength(1);
+});
+
+test("what the page showed live is what the replay shows of that moment", async () => {
+  const { page } = ada;
+  const { id, digest, umrf } = await version(graph);
+  const script = { behaviours: { "*": [{ after_s: 1.8 }] } };
+  const head = { version: id, digest, graph, engine: "simulator", request_id: "e2e-live", script };
+  const body = `${JSON.stringify(head).slice(0, -1)},"umrf":${umrf}}`;
+  const { id: run } = await product.ask<Run>(
+    "/api/runs",
+    { method: "POST", body },
+    product.runnerUrl,
+  );
+  await page.goto(`${product.url}/runs/${run}`);
+  const states = async () => (await words(page)).map((word) => word.replace(/\W*[\d≤].*$/, ""));
+  const live: { at: number; states: string[] }[] = [];
+  await expect
+    .poll(
+      async () => {
+        const [before, at] = [await states(), Date.now()];
+        await page.waitForTimeout(200); // what is about to come has come then
+        if (String(await states()) !== String(before)) return false;
+        const known = live.map((each) => String(each.states));
+        if (before.length === 3 && !known.includes(String(before))) {
+          live.push({ at: at + 100, states: before });
+        }
+        return before.every((word) => word.includes("true"));
+      },
+      { timeout: 20_000, intervals: [50] },
+    )
+    .toBe(true);
+  expect(live.length).toBeGreaterThanOrEqual(3); // two that ran, and the end
+  const { started_at } = await product.ask<{ started_at: string }>(
+    `/api/runs/${run}`,
+    {},
+    product.runnerUrl,
+  );
+  for (const { at, states: then } of live.slice(0, -1)) {
+    await page.goto(`${product.url}/runs/${run}?t=${at - Date.parse(started_at)}`);
+    await expect(page.getByText("as it was then")).toBeVisible();
+    await expect.poll(states).toEqual(then);
+  }
+});
+
+test("a run is found by what was said in it, pinned, labelled and found by that", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${bad.id}`);
+  await page.getByRole("tab", { name: "Facts" }).click();
+  await page.getByRole("button", { name: "Pin this run" }).click();
+  const labels = page.getByRole("combobox", { name: "Labels" });
+  await labels.fill("gripper");
+  await labels.press("Enter");
+  const note = page.getByRole("textbox", { name: "Note" });
+  await note.fill("The finger was bent.");
+  await page.getByRole("button", { name: "Save note" }).click();
+  await expect(page.getByRole("button", { name: "Save note" })).toBeHidden();
+  await page.goto(`${product.url}/runs`);
+  await page.getByRole("textbox", { name: "Search runs" }).fill("finger was bent");
+  const rows = page.getByRole("row").filter({ hasText: "chain_3" });
+  await expect(rows).toHaveCount(1);
+  await expect(rows.getByText("gripper", { exact: true })).toBeVisible();
+  await expect(rows.getByLabel("pinned")).toBeVisible();
+  await page.getByRole("button", { name: "Saved" }).click();
+  await page.getByRole("menuitem", { name: /^Save “/ }).click();
+  await page.goto(`${product.url}/runs`);
+  await expect(rows).toHaveCount(3);
+  await page.getByText("Finished", { exact: true }).click();
+  await expect(rows).toHaveCount(2);
+  await page.getByText("Failed", { exact: true }).click();
+  await expect(rows).toHaveCount(1);
+  await expect(rows.getByText("finished: error")).toBeVisible();
+  await page.getByRole("button", { name: "Saved" }).click();
+  await page.getByRole("menuitem", { name: /finger was bent/ }).click();
+  await expect(rows).toHaveCount(1);
+});
+
+test("“worked yesterday, fails today” is answered in one look", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs`);
+  await page.getByLabel(`Choose run ${good.number} to compare`).check();
+  await page.getByLabel(`Choose run ${bad.number} to compare`).check();
+  await page.getByRole("button", { name: "Compare the two" }).click();
+  await expect(page.getByText(/then Wait_1: true in run \d+, error in run \d+/)).toBeVisible();
+  await expect(page.getByText("gripper jammed")).toBeVisible();
+  await expect(page.getByText("Both ran exactly the same graph.")).toBeVisible();
+  await expect(page.getByRole("row", { name: /Wait_1/ })).toContainText("here they part");
+});
+
+test("new runs wait behind a pill, so that nothing moves under the finger", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs`);
+  await expect(page.getByRole("row").filter({ hasText: "chain_3" })).toHaveCount(3);
+  await ran({ "*": [QUICK] });
+  await page.getByRole("button", { name: "1 new run" }).click();
+  await expect(page.getByRole("row").filter({ hasText: "chain_3" })).toHaveCount(4);
+});
+
+test("a run goes again with one fault, in the simulator", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${good.id}`);
+  await page.getByRole("button", { name: "Again" }).click();
+  await page.getByRole("menuitem", { name: "With one fault …" }).click();
+  await page.getByRole("combobox", { name: "Action" }).click();
+  await page.getByRole("option", { name: "Wait_2" }).click();
+  await page.getByRole("button", { name: "Run in the simulator" }).click();
+  await expect(page).not.toHaveURL(new RegExp(good.id));
+  await expect(card(page, "Wait", 2).getByText("error")).toBeVisible({ timeout: 15_000 });
+});
+
+/** A graph in which the first action hands a value to the second one. */
+async function handingOver(): Promise<string> {
+  const number = (value: number) => ({ value: { pvf_type: "number", pvf_value: value } });
+  const [first, second] = [
+    { name: "Measure", instance_id: 0 },
+    { name: "Move", instance_id: 0 },
+  ];
+  const body = JSON.stringify({
+    graph_name: "handing_over",
+    graph_entry: [first],
+    graph_exit: [second],
+    actions: [
+      { ...first, type: "sync", parents: [], children: [second], output_parameters: number(7) },
+      { ...second, type: "sync", parents: [first], children: [], input_parameters: number(5) },
+    ],
+  });
+  const headers = { "content-type": "application/json" };
+  return (await product.ask<{ id: string }>("/api/graphs", { method: "POST", body, headers })).id;
+}
+
+test("values as an action ran with them stand beside those that were sent", async () => {
+  const { page } = ada;
+  const run = await ran({ "*": [QUICK] }, await handingOver());
+  await page.goto(`${product.url}/runs/${run.id}`);
+  await page.getByRole("tab", { name: "Parameters" }).click();
+  const move = page.getByRole("region", { name: "Parameters of Move 0" });
+  await expect(move.getByRole("row", { name: /value/ })).toContainText("5≠ 7");
+});
+
+test("a run starts again through the dialog of every start, looked at and held", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${good.id}`);
+  await page.getByRole("button", { name: "Again" }).click();
+  await page.getByRole("menuitem", { name: "v1 again …" }).click();
+  const dialog = page.getByRole("dialog", { name: "Start v1 of chain_3" });
+  await expect(dialog.getByRole("radio", { name: /Simulator/ })).toBeChecked();
+  const hold = dialog.getByRole("button", { name: "Start v1 on the simulator" });
+  await expect(hold).toBeEnabled();
+  await hold.focus();
+  await page.keyboard.down("Enter");
+  await expect(dialog).toBeHidden();
+  await page.keyboard.up("Enter");
+  await expect(page).not.toHaveURL(new RegExp(good.id));
+  await expect(card(page, "Wait", 2).getByText("true")).toBeVisible({ timeout: 15_000 });
+});
+
+test("a run is repeated with the newest version of its graph", async () => {
+  const { page } = ada;
+  await product.ask(`/api/graphs/${graph}`, {
+    method: "PATCH",
+    body: JSON.stringify({ name: "chain_renamed" }),
+    headers: { "content-type": "application/json" },
+  });
+  await page.goto(`${product.url}/runs/${bad.id}`);
+  await page.getByRole("button", { name: "Again" }).click();
+  await page.getByRole("menuitem", { name: "As it went, with the newest version" }).click();
+  await expect(page.getByRole("link", { name: "chain_renamed" })).toBeVisible();
+  await expect(card(page, "Wait", 1).getByText("error")).toBeVisible({ timeout: 15_000 });
+  await expect(page.getByRole("region", { name: "Why" })).toContainText(
+    "Wait 1 ended in error: “gripper jammed”",
+  );
+});
+
+test("the rarer filters narrow the list, and what was stored can be read as it is", async () => {
+  const { page } = ada;
+  const rows = page.getByRole("row").filter({ has: page.getByRole("checkbox") });
+  await page.goto(`${product.url}/runs`);
+  await page.getByRole("button", { name: "More filters" }).click();
+  await page.getByRole("combobox", { name: "Graph" }).click();
+  await page.getByRole("option", { name: "handing_over" }).click();
+  await expect(rows).toHaveCount(1);
+  const person = page.getByRole("textbox", { name: "Started by" });
+  await person.fill("nobody of this name");
+  await person.press("Enter");
+  await expect(page.getByText("No run fits")).toBeVisible();
+  await person.fill("");
+  await person.press("Enter");
+  await page.getByLabel("From", { exact: true }).fill("2001-01-01");
+  await expect(rows).toHaveCount(1);
+  await page.getByLabel("To", { exact: true }).fill("2001-01-02");
+  await expect(page.getByText("No run fits")).toBeVisible();
+  await page.goto(`${product.url}/runs/${bad.id}`);
+  await page.getByRole("tab", { name: "Raw" }).click();
+  const stored = page.getByRole("group").filter({ hasText: "run.requested.v1" });
+  await stored.getByText("run.requested.v1").click();
+  await expect(stored.getByText('"graph_name": "chain_3"')).toBeVisible();
+});
+
+test("statistics tell how often it succeeds and which action fails", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs?graph=${graph}`);
+  await page.getByRole("link", { name: "Statistics" }).click();
+  await expect(page.getByText(/of \d+ runs finished true/)).toBeVisible();
+  await expect(page.getByRole("row", { name: /Wait_1/ })).toBeVisible();
+  await expect(page.getByText(/Wait_1.*visits|1 of \d+ visits/).first()).toBeVisible();
+});

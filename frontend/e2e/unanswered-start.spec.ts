@@ -1,0 +1,127 @@
+/** A start whose answer never comes: the page does not claim that it was not started, it looks. */
+
+import { expect, type Page, type Route, test } from "@playwright/test";
+import { saved, start } from "./canvas";
+import { type Person, Product } from "./product";
+
+const product = new Product();
+let ada: Person;
+
+test.beforeAll(async ({ browser }) => {
+  await product.start();
+  ada = await product.person(browser, "Ada");
+});
+test.afterAll(async () => {
+  expect(ada.failures).toEqual([]);
+  await product.dispose();
+});
+
+interface Run {
+  id: string;
+  number: number;
+  state: string;
+}
+
+const runs = () => product.ask<Run[]>("/api/runs", {}, product.runnerUrl);
+const notice = (page: Page) => page.getByRole("region", { name: "Starts that are not sure" });
+
+/** Every start that leaves the page, and what becomes of it on its way. */
+async function underWay(page: Page, then: (route: Route) => Promise<void>): Promise<string[]> {
+  const sent: string[] = [];
+  await page.route(`${product.runnerUrl}/api/runs`, async (route) => {
+    if (route.request().method() !== "POST") return route.fallback();
+    sent.push(route.request().postData() ?? "");
+    await then(route);
+  });
+  return sent;
+}
+
+async function open(page: Page): Promise<void> {
+  await page.goto(`${product.url}/graphs/${await product.chain(60)}`);
+  await saved(page);
+}
+
+async function stopAll(page: Page): Promise<void> {
+  await page.keyboard.press("Control+.");
+  await expect.poll(async () => (await runs())[0]?.state).toBe("stopped");
+}
+
+test("its answer gets lost: the run is found by its request, and nothing is sent again", async () => {
+  const { page } = ada;
+  await open(page);
+  const before = (await runs()).length;
+  const sent = await underWay(page, async (route) => {
+    await route.fetch(); // the runner has it, and the answer is lost
+    await route.abort("connectionreset");
+  });
+  await start(page);
+  await expect(notice(page)).toContainText(/Started after all: run \d+/);
+  await expect(page.getByText("Not started")).toHaveCount(0);
+  expect(sent).toHaveLength(1);
+  expect(await runs()).toHaveLength(before + 1);
+  await page.unrouteAll();
+  await stopAll(page);
+  await notice(page).getByRole("button", { name: "Hide" }).click();
+  await expect(notice(page)).toHaveCount(0);
+  await page.reload();
+  await saved(page);
+  await expect(notice(page)).toHaveCount(0);
+});
+
+test("the page is loaded again before the answer is there", async () => {
+  const { page } = ada;
+  await open(page);
+  let reached: (() => void) | undefined;
+  const arrived = new Promise<void>((done) => {
+    reached = done;
+  });
+  const sent = await underWay(page, async (route) => {
+    await route.fetch();
+    reached?.(); // and never answered
+  });
+  await start(page);
+  await arrived;
+  await page.reload();
+  await expect(notice(page)).toContainText(/Started after all: run \d+/);
+  expect(sent).toHaveLength(1);
+  await page.unrouteAll({ behavior: "ignoreErrors" });
+  await stopAll(page);
+});
+
+test("it never arrives: that is not known, and so it is said, for as long as it takes", async () => {
+  const { page } = ada;
+  await page.evaluate(() => sessionStorage.removeItem("aa.starts"));
+  await open(page);
+  const before = (await runs()).length;
+  const sent = await underWay(page, (route) => route.abort("connectionreset"));
+  await start(page);
+  await expect(notice(page)).toContainText("NOT KNOWN whether v1 of chain_60 started");
+  await expect(notice(page)).toContainText("has nothing of it so far");
+  await expect(notice(page)).toContainText("not sent again");
+  await page.screenshot({ path: test.info().outputPath("unsure.png") });
+  expect(sent).toHaveLength(1);
+  expect(await runs()).toHaveLength(before);
+  await page.unrouteAll();
+  await notice(page).getByRole("button", { name: "Hide" }).click();
+  await expect(notice(page)).toHaveCount(0);
+});
+
+test("what the runner refuses was not started, and that is certain", async () => {
+  const { page } = ada;
+  await open(page);
+  await underWay(page, (route) =>
+    route.fulfill({
+      status: 409,
+      contentType: "application/problem+json",
+      headers: {
+        "access-control-allow-origin": product.url,
+        "access-control-allow-credentials": "true",
+      },
+      body: JSON.stringify({ type: "conflict", title: "No", status: 409, detail: "It is taken." }),
+    }),
+  );
+  await start(page);
+  await expect(page.getByText("Not started")).toBeVisible();
+  await expect(notice(page)).toHaveCount(0);
+  await page.unrouteAll();
+});

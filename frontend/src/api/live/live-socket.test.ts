@@ -1,0 +1,275 @@
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import type { Run } from "../runs";
+import { sessionEnd } from "../session-end";
+import { LiveSocket } from "./live-socket";
+
+/** The browser's end of a socket whose other end is the test. */
+class Wire {
+  static readonly OPEN = 1;
+  static all: Wire[] = [];
+  readyState = 1;
+  sent: string[] = [];
+  onmessage: ((event: { data: string }) => void) | null = null;
+  onclose: ((event: { code: number }) => void) | null = null;
+  readonly url: string;
+  constructor(url: string) {
+    this.url = url;
+    Wire.all.push(this);
+  }
+  send(text: string) {
+    this.sent.push(text);
+  }
+  close(code = 1000) {
+    this.readyState = 3;
+    this.onclose?.({ code });
+  }
+  say(message: object) {
+    this.onmessage?.({ data: JSON.stringify(message) });
+  }
+}
+
+const newest = () => {
+  const wire = Wire.all.at(-1);
+  if (!wire) throw new Error("no socket was opened");
+  return wire;
+};
+
+const run = (state: string, ended: string | null = null) =>
+  ({ id: "r", number: 1, state, ended_at: ended }) as unknown as Run;
+
+const posted = vi.fn();
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  Wire.all = [];
+  posted.mockReset();
+  vi.stubGlobal("WebSocket", Wire);
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    posted(init.method, url);
+    const body = url.endsWith("/api/runs/r") ? run("lost", "2026-01-01T00:00:00Z") : {};
+    return new Response(JSON.stringify(body), { status: 200 });
+  });
+});
+
+afterEach(() => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+test("a socket that is closed because the session ended says so at once", () => {
+  const live = new LiveSocket("http://127.0.0.1:8001");
+  live.open();
+  newest().close(1006);
+  expect(sessionEnd.now()).toBe(false);
+  vi.advanceTimersByTime(1_000);
+  newest().close(4401);
+  expect(sessionEnd.now()).toBe(true);
+  sessionEnd.clear();
+  live.close();
+});
+
+test("one socket, by the runner's own address", () => {
+  const live = new LiveSocket("https://robots.example/runner");
+  live.open();
+  expect(Wire.all.map((wire) => wire.url)).toEqual(["wss://robots.example/runner/api/live"]);
+  live.close();
+});
+
+test("a runner that falls silent is unknown, and asked again", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  expect(live.state.link).toBe("live");
+  await vi.advanceTimersByTimeAsync(3_000);
+  expect(live.state.link).toBe("live");
+  newest().say({ type: "beat", at: "" });
+  await vi.advanceTimersByTimeAsync(4_000);
+  expect(live.state.link).toBe("down");
+  expect(live.state.runs.get("r")?.state).toBe("running");
+  await vi.advanceTimersByTimeAsync(1_000);
+  expect(Wire.all.length).toBe(2);
+  live.close();
+});
+
+test("Stop goes by socket and by POST at once", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  live.stop("r");
+  expect(JSON.parse(newest().sent[0] ?? "")).toMatchObject({ type: "stop", run: "r" });
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/r/stop");
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.state.stops.at(-1)?.state).toBe("heard");
+  expect(live.state.runs.get("r")?.state).toBe("running");
+  live.close();
+});
+
+test("a Stop that nobody hears is sent again until somebody does", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  newest().close();
+  let dead = true;
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    if (init.method === "POST") posted("POST", url);
+    if (dead) throw new TypeError("no network");
+    return new Response("{}", { status: 202 });
+  });
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(20_000);
+  expect(live.state.stops.at(-1)?.state).toBe("unheard");
+  const tries = posted.mock.calls.length;
+  expect(tries).toBeGreaterThan(10);
+  // After a while "all" means the runs that could be seen, none that somebody starts later.
+  expect(posted).toHaveBeenLastCalledWith("POST", "http://h:1/api/runs/r/stop");
+  dead = false;
+  await vi.advanceTimersByTimeAsync(2_000);
+  expect(live.state.stops.at(-1)?.state).toBe("heard");
+  const heard = posted.mock.calls.length;
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(posted.mock.calls.length).toBe(heard);
+  live.close();
+});
+
+test("when the runner has nothing to stop it with, a Stop is refused and not repeated", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  const problem = { type: "forbidden", title: "Forbidden", status: 403, detail: "not you" };
+  vi.stubGlobal("fetch", async () => new Response(JSON.stringify(problem), { status: 403 }));
+  live.stop("r");
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(live.state.stops.at(-1)).toMatchObject({ state: "refused", detail: "not you" });
+  live.close();
+});
+
+test("when only a proxy says no, a Stop is sent again", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  const asked = vi.fn(async () => new Response("<h1>429</h1>", { status: 429 }));
+  vi.stubGlobal("fetch", asked);
+  live.stop("r");
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(live.state.stops.at(-1)).toMatchObject({ state: "unheard" });
+  expect(asked.mock.calls.length).toBeGreaterThan(1);
+  live.close();
+});
+
+test("a run that ended while the link was down is asked for", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  newest().close();
+  await vi.advanceTimersByTimeAsync(1_000);
+  newest().say({ type: "hello", engines: [], runs: [] });
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.state.runs.get("r")?.state).toBe("lost");
+  live.close();
+});
+
+test("a new name dials anew without a moment of doubt", () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  live.redial();
+  expect(Wire.all.length).toBe(2);
+  expect(Wire.all[0]?.readyState).toBe(3);
+  expect(live.state.link).toBe("live");
+  live.close();
+});
+
+test("a beat says when each robot last answered, without another render of everything", () => {
+  const live = new LiveSocket("http://127.0.0.1:8001");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [] });
+  const all = vi.fn();
+  const seers = vi.fn();
+  live.subscribe(all);
+  live.subscribeSeen(seers);
+  newest().say({ type: "beat", at: "", seen: {}, heard: { David: "1970-01-01T00:00:02Z" } });
+  expect(live.robotAnsweredAt.get("David")).toBe(2000);
+  expect(seers).toHaveBeenCalledOnce();
+  expect(all).not.toHaveBeenCalled();
+  live.close();
+});
+
+/** What the runner and the editor answer when they are asked over HTTP. */
+function answering(answers: Record<string, number | [number, object]>) {
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    posted(init.method ?? "GET", url);
+    const [, found] = Object.entries(answers).find(([part]) => url.includes(part)) ?? [];
+    if (found === undefined) throw new TypeError("no network");
+    const [status, body] = Array.isArray(found) ? found : [found, {}];
+    return Response.json(body, { status });
+  });
+}
+
+/** The socket is refused before it opens, again and again. */
+async function refusing(seconds: number): Promise<void> {
+  for (let i = 0; i < seconds * 10; i += 1) {
+    if (newest().readyState === 1) newest().close(1006);
+    await vi.advanceTimersByTimeAsync(100);
+  }
+}
+
+test("a runner that an encrypted page may not ask is said to be so, and breaks nothing", async () => {
+  vi.stubGlobal("location", new URL("https://robots.example/"));
+  vi.stubGlobal("WebSocket", function refuse() {
+    throw new DOMException("insecure", "SecurityError");
+  });
+  const live = new LiveSocket("http://robots.example:8001");
+  live.open();
+  await vi.advanceTimersByTimeAsync(1_000);
+  expect(live.state.link).toBe("down");
+  expect(live.state.unreached?.why).toContain("--public-url https://robots.example/");
+  live.close();
+});
+
+test("once the session has ended nobody knocks again until somebody signs in", async () => {
+  answering({ "/api/session": 401, "/api/reach": 401 });
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  await refusing(10);
+  expect(sessionEnd.now()).toBe(true);
+  const dialled = Wire.all.length;
+  const asked = posted.mock.calls.length;
+  await refusing(120);
+  expect([Wire.all.length, posted.mock.calls.length]).toEqual([dialled, asked]);
+  sessionEnd.clear();
+  live.redial();
+  expect(Wire.all.length).toBe(dialled + 1);
+  live.close();
+});
+
+test("a runner that does not know a session which the editor knows ends no session", async () => {
+  answering({ "/api/session": 200, "/api/reach": 401 });
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  await refusing(60);
+  expect(sessionEnd.now()).toBe(false);
+  expect(live.state.unreached?.why).toContain("does not know your session");
+  expect(Wire.all.length).toBeLessThan(12);
+  live.close();
+});
+
+test("a proxy that passes no sockets on is told from a runner that does not answer", async () => {
+  answering({ "/api/reach": 200 });
+  const live = new LiveSocket("https://robots.example/runner");
+  live.open();
+  await refusing(3);
+  expect(live.state.unreached?.why).toContain("WebSockets");
+  answering({});
+  await refusing(10);
+  expect(live.state.unreached?.why).toContain("does not answer");
+  newest().say({ type: "hello", engines: [], runs: [] });
+  expect(live.state.unreached).toBeNull();
+  live.close();
+});
+
+test("a proxy that leads the runner's address elsewhere is told so", async () => {
+  answering({ "/api/reach": [502, { type: "misrouted", title: "T", detail: "To the runner!" }] });
+  const live = new LiveSocket("https://robots.example/runner");
+  live.open();
+  await refusing(3);
+  expect(live.state.unreached?.why).toContain("To the runner!");
+  live.close();
+});

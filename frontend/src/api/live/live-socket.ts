@@ -1,0 +1,301 @@
+/** The one socket to the runner: live state of runs, and the way for Stop. */
+import { newAid } from "../../graph/ids";
+import { errorText, isFinal } from "../http";
+import type { Robot } from "../robots";
+import { getRun, postStop, type Run } from "../runs";
+import { sessionEnd } from "../session-end";
+import {
+  blockedByBrowser,
+  findUnreachableReason,
+  type UnreachableReason,
+} from "./unreachable-runner";
+
+export type LiveLink = "connecting" | "live" | "down";
+
+/** A Stop that a person asked for. It is done when the run's own state says so, not before. */
+export interface StopRequest {
+  id: string;
+  run: string | "all";
+  at: number;
+  /**
+   * `asked`: nobody has answered yet; `unheard`: it could not be sent, and is sent again;
+   * `heard`: the runner is stopping; `refused`: it will not.
+   */
+  state: "asked" | "heard" | "refused" | "unheard";
+  detail: string;
+}
+
+export interface LiveState {
+  link: LiveLink;
+  /** When the link became what it is, ms. */
+  since: number;
+  /** Why the link is not there, as far as that was found out. */
+  unreached?: UnreachableReason | null;
+  engines: readonly Robot[];
+  runs: ReadonlyMap<string, Run>;
+  stops: readonly StopRequest[];
+}
+
+type RunnerMessage =
+  | { type: "hello"; engines: Robot[]; runs: Run[] }
+  | { type: "engines"; engines: Robot[] }
+  | { type: "run"; run: Run }
+  | {
+      type: "beat";
+      at: string;
+      seen?: Record<string, string>;
+      heard?: Record<string, string>;
+    }
+  | { type: "stopping"; stop_id: string; runs: string[] }
+  | { type: "refused"; stop_id: string; detail: string };
+
+const SESSION_ENDED = 4401;
+const SILENCE = 3_500; // ms; the runner beats each second
+const STOPS_KEPT = 5;
+const AGAIN = 1_000; // ms between two tries to send a Stop
+const SOON = 5_000; // ms; the longest wait for another try to reach the runner
+const SELDOM = 60_000; // ms; the same where trying soon has proven to be of no use
+const ALL_HOLDS = 5_000; // ms; later, "all" would mean runs that nobody had seen when it was asked
+
+/** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
+export class LiveSocket {
+  state: LiveState = {
+    link: "connecting",
+    since: Date.now(),
+    engines: [],
+    runs: new Map(),
+    stops: [],
+  };
+  /** When each open run was last shown by its engine, ms. Apart from `now`: it changes each second. */
+  runSeenAt: ReadonlyMap<string, number> = new Map();
+  /** When each robot last answered, ms. */
+  robotAnsweredAt: ReadonlyMap<string, number> = new Map();
+  readonly #seers = new Set<() => void>();
+  readonly #runner: string;
+  readonly #listeners = new Set<() => void>();
+  #socket: WebSocket | null = null;
+  #watch: ReturnType<typeof setTimeout> | undefined;
+  #again: ReturnType<typeof setTimeout> | undefined;
+  #tries = 0;
+  #closed = false;
+  /** What was found out about the last socket that did not open. */
+  #unreached: UnreachableReason | null = null;
+
+  constructor(runner: string) {
+    this.#runner = runner;
+  }
+
+  open(): void {
+    this.#closed = false;
+    this.#connect();
+  }
+
+  close(): void {
+    this.#closed = true;
+    clearTimeout(this.#watch);
+    clearTimeout(this.#again);
+    this.#socket?.close();
+    this.#socket = null;
+  }
+
+  /** A fresh socket in place of the old one: the runner knows a socket by the session it opened with. */
+  redial(): void {
+    if (this.#closed) return;
+    const old = this.#socket;
+    this.#socket = null;
+    this.#unreached = null;
+    this.#tries = 0;
+    old?.close();
+    this.#connect();
+  }
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  };
+
+  subscribeSeen = (seer: () => void): (() => void) => {
+    this.#seers.add(seer);
+    return () => this.#seers.delete(seer);
+  };
+
+  /**
+   * Sends Stop over the socket and by POST at once: whichever arrives first counts. While nobody
+   * hears it, it is sent again for as long as the page is open.
+   */
+  stop(run: string | "all"): void {
+    const id = newAid();
+    const at = Date.now();
+    const open = [...this.state.runs.values()].filter((each) => each.ended_at === null);
+    const meant = open.map((each) => each.id);
+    this.#putStop({ id, run, at, state: "asked", detail: "" });
+    void this.#keepStopping(id, run, at, meant);
+  }
+
+  async #keepStopping(id: string, run: string, at: number, meant: string[]): Promise<void> {
+    for (;;) {
+      const late = run === "all" && Date.now() - at > ALL_HOLDS;
+      try {
+        for (const each of late ? meant : [run]) await this.#sendStop(each, id);
+        this.#answerStop(id, "heard", "");
+      } catch (error) {
+        this.#answerStop(id, isFinal(error) ? "refused" : "unheard", errorText(error));
+      }
+      const now = this.state.stops.find((stop) => stop.id === id);
+      if (this.#closed || now?.state !== "unheard") return;
+      await new Promise((done) => setTimeout(done, AGAIN));
+    }
+  }
+
+  #sendStop(run: string, id: string): Promise<unknown> {
+    if (this.#socket?.readyState === WebSocket.OPEN) {
+      this.#socket.send(JSON.stringify({ type: "stop", run, stop_id: id }));
+    }
+    return postStop(this.#runner, run, id);
+  }
+
+  /** Takes in a run that this page has just started, before the socket tells of it. */
+  learn(run: Run): void {
+    if (!this.state.runs.has(run.id)) this.#putRun(run);
+  }
+
+  #connect(): void {
+    clearTimeout(this.#again);
+    if (this.#closed) return;
+    const barred = blockedByBrowser(this.#runner);
+    if (barred !== null) {
+      this.#unreached = barred;
+      this.#down();
+      return;
+    }
+    const socket = new WebSocket(`${this.#runner.replace(/^http/, "ws")}/api/live`);
+    let opened = false;
+    this.#socket = socket;
+    this.#expect(socket);
+    socket.onopen = () => {
+      opened = true;
+    };
+    socket.onmessage = (event) => {
+      opened = true;
+      this.#expect(socket);
+      this.#hear(JSON.parse(String(event.data)) as RunnerMessage);
+    };
+    socket.onclose = ({ code }) => {
+      if (code === SESSION_ENDED) sessionEnd.notice();
+      this.#lost(socket, opened);
+    };
+  }
+
+  /** A socket that stays silent is as good as closed, whatever TCP believes. */
+  #expect(socket: WebSocket): void {
+    clearTimeout(this.#watch);
+    this.#watch = setTimeout(() => {
+      this.#lost(socket, false);
+      socket.close();
+    }, SILENCE);
+  }
+
+  #lost(socket: WebSocket, opened: boolean): void {
+    if (this.#socket !== socket) return;
+    this.#socket = null;
+    clearTimeout(this.#watch);
+    this.#down();
+    if (!opened && !this.#closed) void this.#findOut();
+  }
+
+  /** There is no link; another try comes after a while, unless nobody is signed in. */
+  #down(): void {
+    if (this.state.link !== "down") this.#set({ link: "down", since: Date.now() });
+    this.#set({ unreached: this.#unreached });
+    clearTimeout(this.#again);
+    if (this.#closed || this.#unreached?.kind === "ended") return;
+    const longest = this.#unreached?.kind === "strange" ? SELDOM : SOON;
+    const wait = Math.min(longest, 250 * 2 ** this.#tries) * (0.7 + 0.6 * Math.random());
+    this.#tries += 1;
+    this.#again = setTimeout(() => this.#connect(), wait);
+  }
+
+  /** A browser does not tell why a socket did not open. */
+  async #findOut(): Promise<void> {
+    const turn = this.#again;
+    const found = await findUnreachableReason(this.#runner);
+    if (this.#closed || this.state.link === "live" || turn !== this.#again) return;
+    this.#unreached = found;
+    this.#set({ unreached: found });
+    if (found.kind === "ended") clearTimeout(this.#again);
+  }
+
+  #hear(message: RunnerMessage): void {
+    switch (message.type) {
+      case "hello": {
+        this.#tries = 0;
+        this.#unreached = null;
+        const runs = new Map(this.state.runs);
+        const open = new Set(message.runs.map((run) => run.id));
+        // What this page believed to be open and the runner no longer names has ended unseen.
+        for (const [id, run] of runs) {
+          if (open.has(id) || run.ended_at !== null) continue;
+          runs.delete(id);
+          getRun(this.#runner, id).then(
+            (ended) => this.#putRun(ended),
+            (error: Error) => console.warn("A run's end is not known", id, error.message),
+          );
+        }
+        for (const run of message.runs) runs.set(run.id, run);
+        this.#set({
+          link: "live",
+          unreached: null,
+          since: Date.now(),
+          engines: message.engines,
+          runs,
+        });
+        break;
+      }
+      case "run":
+        this.#putRun(message.run);
+        break;
+      case "stopping":
+        this.#answerStop(message.stop_id, "heard", "");
+        break;
+      case "refused":
+        this.#answerStop(message.stop_id, "refused", message.detail);
+        break;
+      case "engines":
+        this.#set({ engines: message.engines });
+        break;
+      case "beat": {
+        const seen = times(message.seen);
+        const heard = times(message.heard);
+        if (seen.size + heard.size + this.runSeenAt.size + this.robotAnsweredAt.size === 0) break;
+        this.runSeenAt = seen;
+        this.robotAnsweredAt = heard;
+        for (const seer of this.#seers) seer();
+        break;
+      }
+    }
+  }
+
+  #putRun(run: Run): void {
+    this.#set({ runs: new Map(this.state.runs).set(run.id, run) });
+  }
+
+  #putStop(stop: StopRequest): void {
+    this.#set({ stops: [...this.state.stops.slice(1 - STOPS_KEPT), stop] });
+  }
+
+  #answerStop(id: string, state: StopRequest["state"], detail: string): void {
+    const stops = this.state.stops.map((stop) =>
+      stop.id === id && stop.state !== "heard" ? { ...stop, state, detail } : stop,
+    );
+    this.#set({ stops });
+  }
+
+  #set(part: Partial<LiveState>): void {
+    this.state = { ...this.state, ...part };
+    for (const listener of this.#listeners) listener();
+  }
+}
+
+function times(told: Record<string, string> | undefined): Map<string, number> {
+  return new Map(Object.entries(told ?? {}).map(([name, at]) => [name, Date.parse(at)]));
+}

@@ -1,0 +1,70 @@
+/** Why no socket to the runner opens, found out by asking it, and the editor, over HTTP. */
+
+import { isSignedIn } from "../http";
+import { pageUrl } from "../page-url";
+
+/**
+ * `ended`: nobody is signed in any more. `strange`: asking again soon is of no use. `mute`: it answers,
+ * so a Stop arrives, but what becomes of it is not seen.
+ */
+export interface UnreachableReason {
+  readonly kind: "ended" | "strange" | "mute" | "silent";
+  readonly why: string;
+}
+
+const PATIENCE = 3_000; // ms
+
+/** What can be said without asking: browsers keep an encrypted page from what is not. */
+export function blockedByBrowser(runner: string): UnreachableReason | null {
+  const encrypted = globalThis.location?.protocol === "https:";
+  if (!encrypted || !runner.startsWith("http:")) return null;
+  return {
+    kind: "strange",
+    why: `This page came encrypted, and browsers keep it from the runner at ${runner}, which is not. A proxy has to show both: start the server with --public-url ${pageUrl()}/ and lead what is below runner/ to the runner’s port.`,
+  };
+}
+
+/** Asked after a socket did not open. */
+export async function findUnreachableReason(runner: string): Promise<UnreachableReason> {
+  const answer = await asked(`${runner}/api/reach`);
+  if (answer === null)
+    return { kind: "silent", why: `The runner does not answer.${stray(runner)}` };
+  if (answer.status === 401) return unknownTo(runner);
+  if (!answer.ok || !/json/.test(answer.headers.get("content-type") ?? "")) {
+    return { kind: "strange", why: await astray(runner, answer) };
+  }
+  return {
+    kind: "mute",
+    why: "The runner answers, but no live connection to it opens: a proxy in between has to pass WebSockets on (nginx: proxy_http_version 1.1, and the headers Upgrade and Connection).",
+  };
+}
+
+async function asked(url: string): Promise<Response | null> {
+  const init: RequestInit = { credentials: "include", signal: AbortSignal.timeout(PATIENCE) };
+  return fetch(url, init).catch(() => null);
+}
+
+async function unknownTo(runner: string): Promise<UnreachableReason> {
+  const known = await isSignedIn();
+  if (known === "no") return { kind: "ended", why: "Your session has ended." };
+  const here = known === "yes" ? ", though the editor does" : "";
+  return {
+    kind: "strange",
+    why: `The runner at ${runner} does not know your session${here}. It needs the editor’s token, and the address of this page: --public-url where a proxy stands before them.`,
+  };
+}
+
+async function astray(runner: string, answer: Response): Promise<string> {
+  const problem: unknown = await answer.json().catch(() => null);
+  const detail = (problem as { detail?: unknown } | null)?.detail;
+  if (typeof detail === "string") return detail;
+  return `What answers at ${runner} is not the runner (${answer.status}): the proxy has to lead it to the runner’s port.`;
+}
+
+/** A server that was told another host takes this page for one of that host. */
+function stray(runner: string): string {
+  const { hostname } = new URL(runner);
+  const own = globalThis.location?.hostname ?? hostname;
+  if (own === hostname) return "";
+  return ` The server says that it is at ${hostname}, and this page is at ${own}: a proxy before it has to pass on the Host header, and the server needs --public-url ${pageUrl()}/.`;
+}

@@ -1,0 +1,123 @@
+/** The live socket and the runner's address for React. */
+import {
+  createContext,
+  type ReactNode,
+  use,
+  useEffect,
+  useMemo,
+  useRef,
+  useState,
+  useSyncExternalStore,
+} from "react";
+import { useConfig } from "../graphs";
+import { errorText } from "../http";
+import type { HeldGraph, Robot } from "../robots";
+import type { Run } from "../runs";
+import { LiveSocket, type LiveState } from "./live-socket";
+
+interface LiveContext {
+  live: LiveSocket | null;
+  runner: string | undefined;
+  /** Why the page does not know where the runner is; "" when it does. */
+  lost: string;
+}
+
+const Context = createContext<LiveContext>({ live: null, runner: undefined, lost: "" });
+
+/** Holds the page's one socket to the runner. `who` is who speaks: another name dials anew. */
+export function LiveProvider({ who, children }: { who: string; children: ReactNode }) {
+  const config = useConfig();
+  const runner = config.data?.runner_url;
+  const lost = config.isError ? errorText(config.error) : "";
+  const [live, setLive] = useState<LiveSocket | null>(null);
+  useEffect(() => {
+    if (runner === undefined) return;
+    const fresh = new LiveSocket(runner);
+    fresh.open();
+    setLive(fresh);
+    return () => fresh.close();
+  }, [runner]);
+  const known = useRef(who);
+  useEffect(() => {
+    if (known.current === who) return;
+    known.current = who;
+    live?.redial();
+  }, [who, live]);
+  const hold = useMemo(() => ({ live, runner, lost }), [live, runner, lost]);
+  return <Context value={hold}>{children}</Context>;
+}
+
+const NOTHING: LiveState = {
+  link: "connecting",
+  since: Date.now(),
+  engines: [],
+  runs: new Map(),
+  stops: [],
+};
+const never = () => () => {};
+
+/** Before the runner's address is known; with the reason, once there is one. */
+const unknown = (lost: string): LiveState =>
+  lost === ""
+    ? NOTHING
+    : {
+        ...NOTHING,
+        link: "down",
+        unreached: { kind: "silent", why: `The runner’s address is not known. ${lost}` },
+      };
+
+export function useLive(): LiveContext & { now: LiveState } {
+  const hold = use(Context);
+  const { live, lost } = hold;
+  const nothing = useMemo(() => unknown(lost), [lost]);
+  const now = useSyncExternalStore(live?.subscribe ?? never, () => live?.state ?? nothing);
+  return { ...hold, now };
+}
+
+/** When the engine itself last showed a run, ms; only who asks is rendered again each second. */
+export function useRunSeenAt(run: string): number | undefined {
+  const { live } = use(Context);
+  return useSyncExternalStore(live?.subscribeSeen ?? never, () => live?.runSeenAt.get(run));
+}
+
+/** When a robot last answered, ms; an answer that changes nothing is told by a beat alone. */
+export function useRobotAnsweredAt(robot: string): number | undefined {
+  const { live } = use(Context);
+  return useSyncExternalStore(live?.subscribeSeen ?? never, () => live?.robotAnsweredAt.get(robot));
+}
+
+/** The runs that go on, newest first, as far as this page knows. */
+export function openRuns(now: LiveState): Run[] {
+  return [...now.runs.values()]
+    .filter((run) => run.ended_at === null)
+    .sort((a, b) => b.number - a.number);
+}
+
+/** The newest run of a graph that this page has heard of live. */
+export function newestRun(now: LiveState, graph: string): Run | null {
+  let newest: Run | null = null;
+  for (const run of now.runs.values()) {
+    if (run.graph === graph && (newest === null || run.number > newest.number)) newest = run;
+  }
+  return newest;
+}
+
+/** What robots run that nobody started from here, as `robot: graph`. Sub-graphs belong to theirs. */
+export function foreignGraphs(now: LiveState): { robot: Robot; held: HeldGraph }[] {
+  return now.engines.flatMap((robot) => {
+    const moving = robot.holds.filter((held) => held.active);
+    const tops = moving.filter((held) => !moving.some((top) => isPart(held.graph, top.graph)));
+    return tops.filter((held) => !isOurs(now, robot, held)).map((held) => ({ robot, held }));
+  });
+}
+
+function isPart(graph: string, top: string): boolean {
+  return graph !== top && graph.startsWith(`${top}__`);
+}
+
+function isOurs(now: LiveState, robot: Robot, held: HeldGraph): boolean {
+  return openRuns(now).some(
+    (run) =>
+      run.engine === robot.name && (run.id === held.run || isPart(held.graph, run.graph_name)),
+  );
+}

@@ -1,0 +1,90 @@
+/** What was translated in a file of an old dialect, before it is kept. */
+import { Button, Group, Modal, Text } from "@mantine/core";
+import { useSyncExternalStore } from "react";
+import type { ProblemPlace } from "../api/graphs";
+import { bySeverity, countWords } from "../canvas/problem-marks";
+import { dialectWords, type ImportUnderReview, importReviews } from "./import-review";
+import style from "./import-review-dialog.module.css";
+
+const MOST_PROBLEMS = 8;
+
+/** Where in the file something stands; for one of many the first. */
+function Line({ where }: { where: ProblemPlace }) {
+  return where.line === undefined ? null : <Text span c="dimmed">{` line ${where.line}`}</Text>;
+}
+
+function Problems({ waiting }: { waiting: ImportUnderReview }) {
+  // That it is an old form is solved by keeping it.
+  const left = waiting.preview.problems.filter(({ code }) => code !== "dialect-old");
+  const problems = bySeverity(left);
+  if (problems.length === 0) return null;
+  const error = problems.filter(({ severity }) => severity === "error").length;
+  const more = problems.length - MOST_PROBLEMS;
+  return (
+    <section className={style.part} aria-label="Problems">
+      <h3>{countWords({ error, warning: problems.length - error })} to look at afterwards</h3>
+      <ul className={style.problems}>
+        {problems.slice(0, MOST_PROBLEMS).map((problem, i) => (
+          // biome-ignore lint/suspicious/noArrayIndexKey: the list never changes
+          <li key={i} data-severity={problem.severity}>
+            <b>{problem.code}</b> {problem.message}
+            <Line where={problem.where} />
+          </li>
+        ))}
+      </ul>
+      {more > 0 && <Text c="dimmed">and {more} more</Text>}
+    </section>
+  );
+}
+
+function Body({ waiting }: { waiting: ImportUnderReview }) {
+  const { preview, file } = waiting;
+  const count = preview.actions === 1 ? "1 action" : `${preview.actions} actions`;
+  return (
+    <>
+      <Text>
+        <b>{file}</b> is written in {dialectWords(preview.dialect)} ({preview.dialect}). It becomes{" "}
+        <b>{preview.name || "Untitled"}</b> with {count}.
+      </Text>
+      <section className={style.part} aria-label="Translated">
+        <h3>Translated</h3>
+        {preview.remarks.length === 0 ? (
+          <Text c="dimmed">Only the form; every value stays as it was.</Text>
+        ) : (
+          <ul>
+            {preview.remarks.map(({ message, where, times = 1 }) => (
+              <li key={message}>
+                {message}
+                {times > 1 && ` (${times} times)`}
+                <Line where={where} />
+              </li>
+            ))}
+          </ul>
+        )}
+      </section>
+      <Problems waiting={waiting} />
+      <Group justify="flex-end" mt="md" className={style.answers ?? ""}>
+        <Button onClick={() => waiting.answer(false)}>Cancel</Button>
+        <Button variant="filled" data-autofocus onClick={() => waiting.answer(true)}>
+          Keep
+        </Button>
+      </Group>
+    </>
+  );
+}
+
+export function ImportReviewDialog() {
+  const waiting = useSyncExternalStore(importReviews.subscribe, importReviews.now);
+  return (
+    <Modal
+      opened={waiting !== null}
+      onClose={() => waiting?.answer(false)}
+      title="Look at what was translated"
+      closeButtonProps={{ "aria-label": "Cancel the import" }}
+      size="lg"
+      centered
+    >
+      {waiting && <Body waiting={waiting} />}
+    </Modal>
+  );
+}

@@ -1,0 +1,97 @@
+/** What every screen has: the bar with STOP on top, the screen below. */
+import { Button } from "@mantine/core";
+import { IconHistory, IconRobot, IconShare } from "@tabler/icons-react";
+import { memo, type ReactNode, useState } from "react";
+import { Link } from "wouter";
+import { AccountMenu } from "../account/account-menu";
+import { ShareDialog } from "../account/share-dialog";
+import { useMay } from "../api/use-person";
+import { StopButton } from "../runs/stop/stop-button";
+import { type Crumb, TopBar } from "../ui/top-bar";
+import { useStableCallback } from "../ui/use-stable-callback";
+import style from "./page-frame.module.css";
+
+interface Props {
+  crumbs: readonly Crumb[];
+  status?: ReactNode;
+  actions?: ReactNode;
+  start?: ReactNode;
+  /** The graph on screen. */
+  graph?: string;
+  /** The screen is one of those that the bar leads to. */
+  at?: "runs" | "robots";
+}
+
+interface WayProps {
+  to: string;
+  icon: typeof IconHistory;
+  name: string;
+  /** Something else needs the room on a narrow screen. */
+  tight: boolean;
+}
+
+// The bar is drawn with the graph; what of it is always the same is not.
+const Account = memo(AccountMenu);
+const Sharing = memo(ShareDialog);
+
+const Way = memo(function Way({ to, icon: Icon, name, tight }: WayProps) {
+  return (
+    <Button
+      component={Link}
+      to={to}
+      variant="subtle"
+      color="gray"
+      px="sm"
+      aria-label={name}
+      leftSection={<Icon size={16} aria-hidden />}
+      className={style.way ?? ""}
+      data-tight={tight || undefined}
+    >
+      {name}
+    </Button>
+  );
+});
+
+export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
+  const mayShare = useMay("share");
+  const [sharing, setSharing] = useState(false);
+  const share = useStableCallback(() => setSharing(true));
+  const closeSharing = useStableCallback(() => setSharing(false));
+  const tight = Boolean(start);
+  return (
+    <TopBar
+      crumbs={crumbs}
+      status={status}
+      actions={
+        <>
+          {actions}
+          {at !== "robots" && <Way to="/robots" icon={IconRobot} name="Robots" tight={tight} />}
+          {at !== "runs" && <Way to="/runs" icon={IconHistory} name="Runs" tight={tight} />}
+          {mayShare && (
+            <Button
+              variant="subtle"
+              color="gray"
+              px="sm"
+              aria-label="Share"
+              leftSection={<IconShare size={16} aria-hidden />}
+              className={`${style.way ?? ""} ${style.share ?? ""}`}
+              data-tight={tight || undefined}
+              onClick={share}
+            >
+              Share
+            </Button>
+          )}
+          {mayShare && <Sharing opened={sharing} onClose={closeSharing} />}
+        </>
+      }
+      account={<Account onShare={mayShare ? share : null} />}
+      start={start}
+      stop={<StopButton {...(graph === undefined ? {} : { graph })} />}
+    />
+  );
+}
+
+/** Bar above, screen below, each scrolling by itself. */
+export function PageFrame({ children }: { children: ReactNode }) {
+  return <div className={style.frame}>{children}</div>;
+}

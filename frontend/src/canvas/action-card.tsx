@@ -1,0 +1,113 @@
+/** An action on the canvas: robot, name, state, two parameters; input above, four outcomes below. */
+import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
+import { Handle, type NodeProps, Position } from "@xyflow/react";
+import { memo } from "react";
+import { cardLines, lineText } from "../graph/value-text";
+import { durationText } from "../status/durations";
+import type { Progress } from "../status/progress";
+import { StateLabel } from "../status/state-label";
+import { colorOfName } from "../ui/name-colors";
+import { stopwatch, useNow } from "../ui/times";
+import style from "./action-card.module.css";
+import { useIsDimmed, useOpenThreadCount } from "./card-highlights";
+import type { CardNode } from "./elements";
+import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
+import { ProblemBadge } from "./problem-badge";
+
+function ProgressLine({ progress }: { progress: Progress | null }) {
+  const going = progress?.since != null;
+  const now = useNow(1000, going);
+  if (progress === null) return <StateLabel tone="idle" word="idle" />;
+  const parts: string[] = [];
+  const took = durationText(progress);
+  if (progress.since !== null) parts.push(stopwatch(now - progress.since));
+  else if (took !== null) parts.push(took);
+  if (progress.visits > 1) parts.push(`${progress.visits}×`);
+  const more = parts.join(" · ");
+  return (
+    <StateLabel tone={progress.tone} word={progress.word} {...(more === "" ? {} : { more })} />
+  );
+}
+
+export const ActionCard = memo(function ActionCard({
+  data,
+  selected,
+  isConnectable,
+}: NodeProps<CardNode>) {
+  const { action, progress, mark, other } = data;
+  const lines = cardLines(action.inputs, 2);
+  const color = colorOfName(action.actor);
+  const dim = useIsDimmed(action.actor);
+  const talk = useOpenThreadCount(action.key);
+  return (
+    <div
+      className={style.card}
+      style={{ "--c": color, "--other": other ?? undefined } as React.CSSProperties}
+      data-other={other === null ? undefined : true}
+      data-selected={selected || undefined}
+      data-tone={progress?.tone}
+      data-ghost={action.missing || undefined}
+      data-dim={dim || undefined}
+    >
+      <Handle
+        type="target"
+        id="in"
+        position={Position.Top}
+        className={style.input ?? ""}
+        isConnectable={isConnectable}
+        role="img"
+        aria-label={`Input of ${action.name} ${action.instanceId}`}
+      />
+      {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
+      {mark && <ProblemBadge mark={mark} on="card" />}
+      {talk > 0 && (
+        <span className={style.talk} data-beside={mark ? true : undefined} title="Open comments">
+          <IconMessageCircle size={11} aria-hidden /> {talk}
+          <span className="visually-hidden"> open comments</span>
+        </span>
+      )}
+      <div className={style.head}>
+        <b className={style.name} title={action.name}>
+          {action.missing && <IconGhost2 size={13} aria-hidden />}
+          {action.name}
+        </b>
+        <span className={style.instance}>{action.instanceId}</span>
+      </div>
+      {action.missing ? (
+        <div className={style.hint}>named by an arrow, but not there</div>
+      ) : (
+        <ProgressLine progress={progress} />
+      )}
+      {lines.length > 0 && (
+        <div className={style.lines}>
+          {lines.map((line) => (
+            <div
+              key={line.name}
+              title={lineText(line)}
+              data-open={line.value === null || undefined}
+            >
+              {lineText(line)}
+            </div>
+          ))}
+        </div>
+      )}
+      {OUTCOMES.map((outcome, i) => (
+        <Handle
+          key={outcome}
+          type="source"
+          id={outcome}
+          position={Position.Bottom}
+          className={style.outcome ?? ""}
+          isConnectable={isConnectable}
+          data-outcome={outcome}
+          role="img"
+          aria-label={`When ${outcomeWord[outcome]}`}
+          title={`When ${action.name} ${action.instanceId} is ${outcomeWord[outcome]}`}
+          style={{ left: `${14 + i * 24}%`, color: outcomeColor[outcome] }}
+        >
+          <OutcomeSign outcome={outcome} size={11} />
+        </Handle>
+      ))}
+    </div>
+  );
+});

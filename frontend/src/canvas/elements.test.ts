@@ -1,0 +1,139 @@
+import { expect, test } from "vitest";
+import * as Y from "yjs";
+import { mapsOf } from "../graph/document-keys";
+import { addAction, connect, moveActions, setEntry, setExit, setResponse } from "../graph/edit";
+import { meaning } from "../graph/meaning";
+import { ENTRY, EXIT, type Graph } from "../graph/model";
+import { readGraph } from "../graph/read";
+import {
+  edgesOf,
+  keepEqual,
+  type NodeOptions,
+  nodesOf,
+  responsesOf,
+  surroundingsOf,
+} from "./elements";
+import { fromUmrf } from "./from-umrf";
+import { arrange, positionsOf, unplaced } from "./geometry/arrange";
+
+function drawn(): { graph: Graph; doc: Y.Doc; a: string; b: string } {
+  const doc = new Y.Doc();
+  const a = addAction(doc, {
+    name: "Check",
+    inputs: [{ path: "min", text: '{"pvf_type": "number", "pvf_value": 5.0}' }],
+  });
+  const b = addAction(doc, { name: "Drive" });
+  setEntry(doc, a);
+  const arrow = connect(doc, a, b, "on_true") ?? "";
+  setResponse(doc, arrow, "on_false", "run");
+  setResponse(doc, arrow, "on_error", "bypass");
+  setExit(doc, b);
+  return { graph: readGraph(mapsOf(doc)), doc, a, b };
+}
+
+const options = (graph: Graph): NodeOptions => ({
+  places: positionsOf(graph),
+  selected: new Set(),
+  progress: new Map(),
+  marks: new Map(),
+  measured: new Map(),
+});
+
+test("each outcome that is answered gets its own arrow from its own handle", () => {
+  const { graph, a, b } = drawn();
+  const around = surroundingsOf(graph, options(graph), null);
+  const arrows = edgesOf(graph, options(graph), around).filter((edge) => edge.source === a);
+  expect(arrows.map((edge) => [edge.sourceHandle, edge.target])).toEqual([
+    ["on_true", b],
+    ["on_false", b],
+    ["on_error", b],
+  ]);
+  expect(arrows.map((edge) => edge.data?.answers !== null)).toEqual([true, false, false]);
+});
+
+test("outcomes with the same response are said together", () => {
+  const { graph, a } = drawn();
+  const relation = graph.relations.find(({ parent }) => parent === a);
+  expect(relation && responsesOf(relation)).toEqual([
+    { outcomes: ["on_true", "on_false"], response: "run" },
+    { outcomes: ["on_error"], response: "bypass" },
+  ]);
+});
+
+test("what did not change is not drawn again", () => {
+  const { graph, doc, a } = drawn();
+  const before = nodesOf(graph, options(graph));
+  expect(keepEqual(before, nodesOf(graph, options(graph)))).toBe(before);
+  moveActions(doc, unplaced(graph, positionsOf(graph)));
+  addAction(doc, { name: "Third", position: [900, 900] });
+  const next = readGraph(mapsOf(doc));
+  const after = keepEqual(before, nodesOf(next, options(next)));
+  expect(after).not.toBe(before);
+  const card = (nodes: typeof before) => nodes.find(({ id }) => id === a);
+  expect(card(after)?.position).toEqual(card(before)?.position);
+});
+
+test("a graph without places stands from entry down to exit", () => {
+  const { graph, a, b } = drawn();
+  const places = arrange(graph);
+  const y = (key: string) => places.get(key)?.[1] ?? Number.NaN;
+  expect([y(ENTRY) < y(a), y(a) < y(b), y(b) < y(EXIT)]).toEqual([true, true, true]);
+});
+
+test("what has a place keeps it when something without one appears", () => {
+  const { graph, a } = drawn();
+  const placed: Graph = {
+    ...graph,
+    actions: graph.actions.map((action) =>
+      action.key === a ? { ...action, position: [1000, 500] as const } : action,
+    ),
+  };
+  const places = positionsOf(placed);
+  expect(places.get(a)).toEqual([1000, 500]);
+  expect(places.get(ENTRY)?.[1]).toBeLessThan(500);
+});
+
+const umrf = {
+  graph_name: "",
+  graph_entry: [{ name: "Check", instance_id: 0 }],
+  graph_exit: [
+    {
+      name: "Drive",
+      instance_id: 0,
+      conditions: [
+        "on_true -> run",
+        "on_false->ignore",
+        "on_error -> ignore",
+        "on_stopped -> ignore",
+      ],
+    },
+  ],
+  actions: [
+    { name: "Drive", instance_id: 0, type: "sync", parents: [parent()] },
+    {
+      name: "Check",
+      instance_id: 0,
+      type: "sync",
+      input_parameters: { min: { pvf_type: "number", pvf_value: 5 } },
+      children: [{ name: "Drive", instance_id: 0 }],
+    },
+  ],
+};
+
+function parent() {
+  const conditions = ["on_true -> run", "on_false -> run", "on_error -> bypass"];
+  return { name: "Check", instance_id: 0, required: true, conditions };
+}
+
+test("a version means the same as the draft that it was made of, wherever things stand", () => {
+  const { graph, doc, b } = drawn();
+  expect(meaning(fromUmrf(umrf))).toBe(meaning(graph));
+  connect(doc, b, EXIT, "on_error");
+  expect(meaning(fromUmrf(umrf))).not.toBe(meaning(readGraph(mapsOf(doc))));
+});
+
+test("a version that is no graph is drawn as nothing", () => {
+  for (const odd of [null, 5, [], { actions: [null, 7] }, { graph_entry: "x", actions: {} }]) {
+    expect(() => fromUmrf(odd)).not.toThrow();
+  }
+});

@@ -1,0 +1,53 @@
+import fc from "fast-check";
+import { expect, test } from "vitest";
+import * as Y from "yjs";
+import { mapsOf } from "../../graph/document-keys";
+import { addAction, connect } from "../../graph/edit";
+import { readGraph } from "../../graph/read";
+import { align, type Block, distribute, tidied } from "./align";
+
+const blocks: readonly Block[] = [
+  { key: "a", x: 0, y: 0, width: 100, height: 40 },
+  { key: "b", x: 310, y: 90, width: 60, height: 40 },
+  { key: "c", x: 180, y: 300, width: 100, height: 80 },
+];
+
+test("aligned things share an edge or a middle, and the outermost decides which", () => {
+  expect([...align(blocks, "left").values()].map(([x]) => x)).toEqual([0, 0, 0]);
+  expect([...align(blocks, "right").values()].map(([x]) => x)).toEqual([270, 310, 270]);
+  expect([...align(blocks, "center").values()].map(([x]) => x)).toEqual([135, 155, 135]);
+  expect([...align(blocks, "bottom").values()].map(([, y]) => y)).toEqual([340, 340, 300]);
+});
+
+test("distributed things have equal gaps, keep their order, and the ends stay", () => {
+  const block = fc.record({
+    x: fc.integer({ min: -900, max: 900 }),
+    y: fc.integer({ min: -900, max: 900 }),
+    width: fc.constant(100),
+    height: fc.integer({ min: 20, max: 200 }),
+  });
+  fc.assert(
+    fc.property(fc.array(block, { minLength: 3, maxLength: 9 }), (list) => {
+      const some = list.map((each, i) => ({ ...each, key: String(i) }));
+      const places = distribute(some, "x");
+      const xs = [...places.values()].map(([x]) => x);
+      expect(Math.min(...xs)).toBe(Math.min(...some.map(({ x }) => x)));
+      const gaps = xs.slice(1).map((x, i) => x - (xs[i] ?? 0) - 100);
+      expect(Math.max(...gaps) - Math.min(...gaps)).toBeLessThanOrEqual(some.length);
+    }),
+  );
+});
+
+test("tidying a part moves nothing else, and the part stays where it was", () => {
+  const doc = new Y.Doc();
+  const keys = ["A", "B", "C", "D"].map((name) => addAction(doc, { name, position: [500, 700] }));
+  connect(doc, keys[0] ?? "", keys[1] ?? "");
+  const graph = readGraph(mapsOf(doc));
+  const places = new Map(graph.actions.map(({ key }) => [key, [500, 700] as const]));
+  const part = new Set(keys.slice(0, 2));
+  const moved = tidied(graph, part, places, new Map());
+  expect(new Set(moved.keys())).toEqual(part);
+  const at = [...moved.values()];
+  expect([Math.min(...at.map(([x]) => x)), Math.min(...at.map(([, y]) => y))]).toEqual([500, 700]);
+  expect(at[0]).not.toEqual(at[1]);
+});

@@ -1,0 +1,79 @@
+/** A graph to look at: the canvas of the run page and of previews. */
+import {
+  Background,
+  BackgroundVariant,
+  type EdgeTypes,
+  type NodeTypes,
+  ReactFlow,
+} from "@xyflow/react";
+import { useMemo, useState } from "react";
+import type { Graph, Key } from "../graph/model";
+import type { Progress } from "../status/progress";
+import { ActionCard } from "./action-card";
+import { type CanvasNode, edgesOf, nodesOf, surroundingsOf } from "./elements";
+import { EndPill } from "./end-pill";
+import { positionsOf } from "./geometry/arrange";
+import { NoteCard } from "./note-card";
+import { notePlaces } from "./note-nodes";
+import { ArrowTips, OutcomeArrow } from "./outcome-arrow";
+import { NO_PROBLEM_MARKS } from "./problem-marks";
+import "./canvas.css";
+
+export const nodeTypes: NodeTypes = { action: ActionCard, end: EndPill, note: NoteCard };
+export const edgeTypes: EdgeTypes = { outcome: OutcomeArrow };
+
+const NONE: ReadonlySet<string> = new Set();
+
+interface Props {
+  graph: Graph;
+  progress: ReadonlyMap<Key, Progress>;
+  selected?: ReadonlySet<string>;
+  label: string;
+  onSelect?: (key: Key | null) => void;
+}
+
+export function GraphView({ graph, progress, selected = NONE, label, onSelect }: Props) {
+  const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
+  const places = useMemo(() => new Map([...positionsOf(graph), ...notePlaces(graph)]), [graph]);
+  const options = useMemo(
+    () => ({ places, selected, progress, marks: NO_PROBLEM_MARKS, measured }),
+    [places, selected, progress, measured],
+  );
+  const nodes = useMemo(() => nodesOf(graph, options), [graph, options]);
+  const edges = useMemo(
+    () => edgesOf(graph, options, surroundingsOf(graph, options, null)),
+    [graph, options],
+  );
+  return (
+    <ReactFlow<CanvasNode>
+      nodes={nodes}
+      edges={edges}
+      nodeTypes={nodeTypes}
+      edgeTypes={edgeTypes}
+      onNodesChange={(changes) => {
+        const sized = changes.filter((change) => change.type === "dimensions");
+        if (sized.length === 0) return;
+        setMeasured((before) => {
+          const next = new Map(before);
+          for (const change of sized) if (change.dimensions) next.set(change.id, change.dimensions);
+          return next;
+        });
+      }}
+      onNodeClick={(_, node) => onSelect?.(node.type === "action" ? node.id : null)}
+      onPaneClick={() => onSelect?.(null)}
+      nodesDraggable={false}
+      nodesConnectable={false}
+      panActivationKeyCode={null} // Space plays the replay
+      edgesFocusable={false}
+      fitView
+      fitViewOptions={{ maxZoom: 1, padding: 0.12 }}
+      minZoom={0.1}
+      maxZoom={2}
+      proOptions={{ hideAttribution: true }}
+      aria-label={label}
+    >
+      <ArrowTips />
+      <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
+    </ReactFlow>
+  );
+}

@@ -1,0 +1,131 @@
+/** A note or a frame on the canvas: plain text, a colour with a name, edges to drag. */
+import { ActionIcon, Tooltip } from "@mantine/core";
+import { IconTrash } from "@tabler/icons-react";
+import { type NodeProps, NodeResizer, NodeToolbar, Position } from "@xyflow/react";
+import { createContext, memo, use, useEffect, useRef } from "react";
+import { type NewNote, NOTE_COLORS, type Note } from "../graph/edit/notes";
+import style from "./note-card.module.css";
+import { noteColor } from "./note-colors";
+import type { NoteNode } from "./note-nodes";
+
+/** How notes are changed; without one they are only shown. */
+export interface NoteEditing {
+  /** The note whose text is being written. */
+  readonly editing: string | null;
+  /** The only thing that is chosen. */
+  readonly alone: string | null;
+  edit(key: string | null): void;
+  change(key: string, change: Partial<NewNote>): void;
+  /** While its edges are dragged, and `null` when that ends. */
+  resizing(note: Note | null): void;
+  remove(key: string): void;
+}
+
+export const NoteEditingContext = createContext<NoteEditing | null>(null);
+
+function Writing({ note, desk }: { note: Note; desk: NoteEditing }) {
+  const field = useRef<HTMLTextAreaElement>(null);
+  useEffect(() => {
+    field.current?.focus({ preventScroll: true });
+    field.current?.select();
+  }, []);
+  const done = () => {
+    const text = field.current?.value ?? note.text;
+    if (text !== note.text) desk.change(note.key, { text });
+    desk.edit(null);
+  };
+  return (
+    <textarea
+      ref={field}
+      className={`${style.field} nodrag nopan nowheel`}
+      aria-label={note.kind === "frame" ? "Title of the frame" : "Text of the note"}
+      defaultValue={note.text}
+      maxLength={5_000}
+      rows={note.kind === "frame" ? 1 : undefined}
+      onBlur={done}
+      onKeyDown={(event) => {
+        event.stopPropagation();
+        const ends =
+          event.key === "Enter" && (note.kind === "frame" || event.ctrlKey || event.metaKey);
+        if (event.key !== "Escape" && !ends) return;
+        event.preventDefault();
+        const card = event.currentTarget.closest<HTMLElement>(".react-flow__node");
+        done();
+        card?.focus({ preventScroll: true });
+      }}
+    />
+  );
+}
+
+function Tools({ note, desk }: { note: Note; desk: NoteEditing }) {
+  return (
+    <NodeToolbar
+      isVisible={desk.alone === note.key}
+      position={Position.Top}
+      offset={note.kind === "frame" ? 36 : 10}
+      style={{ zIndex: 1200 }}
+    >
+      <div className={style.tools} role="toolbar" aria-label="Colour">
+        {NOTE_COLORS.map((color) => (
+          <Tooltip key={color} label={color}>
+            <button
+              type="button"
+              className={style.color}
+              style={{ "--c": noteColor[color] } as React.CSSProperties}
+              aria-label={color}
+              aria-pressed={note.color === color}
+              onClick={() => desk.change(note.key, { color })}
+            />
+          </Tooltip>
+        ))}
+        <Tooltip label="Delete">
+          <ActionIcon aria-label="Delete the note" onClick={() => desk.remove(note.key)}>
+            <IconTrash size={16} aria-hidden />
+          </ActionIcon>
+        </Tooltip>
+      </div>
+    </NodeToolbar>
+  );
+}
+
+export const NoteCard = memo(function NoteCard({ data, selected }: NodeProps<NoteNode>) {
+  const desk = use(NoteEditingContext);
+  const { note } = data;
+  const editing = desk?.editing === note.key;
+  const empty = note.kind === "frame" ? "Frame" : "Note";
+  return (
+    <div
+      className={style.note}
+      data-kind={note.kind}
+      data-selected={selected || undefined}
+      style={{ "--c": noteColor[note.color] } as React.CSSProperties}
+    >
+      {desk && <Tools note={note} desk={desk} />}
+      {desk && (
+        <NodeResizer
+          isVisible={selected && desk.alone === note.key}
+          minWidth={60}
+          minHeight={note.kind === "frame" ? 80 : 32}
+          handleClassName={style.handle ?? ""}
+          lineClassName={style.line ?? ""}
+          onResize={(_, { x, y, width, height }) =>
+            desk.resizing({ ...note, at: [x, y], size: [width, height] })
+          }
+          onResizeEnd={(_, { x, y, width, height }) => {
+            const box = [x, y, width, height].map(Math.round) as [number, number, number, number];
+            desk.resizing(null);
+            desk.change(note.key, { at: [box[0], box[1]], size: [box[2], box[3]] });
+          }}
+        />
+      )}
+      {/* biome-ignore lint/a11y/noStaticElementInteractions: double click repeats what Enter does */}
+      <div data-title className={style.text} onDoubleClick={() => desk?.edit(note.key)}>
+        {editing && desk ? (
+          <Writing note={note} desk={desk} />
+        ) : (
+          <span data-empty={note.text === "" || undefined}>{note.text || empty}</span>
+        )}
+      </div>
+    </div>
+  );
+});

@@ -1,0 +1,311 @@
+/** A graph as one SVG picture, drawn from the same elements as the canvas. Pure. */
+
+import { type Note, notesOf } from "../graph/edit/notes";
+import type { Graph, Key, Position, Precondition } from "../graph/model";
+import { cardLines, lineText } from "../graph/value-text";
+import { colorOfName } from "../ui/name-colors";
+import {
+  type Arrow,
+  type CanvasNode,
+  edgesOf,
+  nodesOf,
+  outcomeOffset,
+  surroundingsOf,
+} from "./elements";
+import { CARD, PILL, type Sizes } from "./geometry/arrange";
+import { arrowPathOf } from "./geometry/arrow-path";
+import { noteColor } from "./note-colors";
+import { OUTCOMES, outcomeColor, outcomeWord } from "./outcome";
+import { NO_PROBLEM_MARKS } from "./problem-marks";
+
+export interface SvgPicture {
+  readonly svg: string;
+  readonly width: number;
+  readonly height: number;
+}
+
+const MARGIN = 36; // px
+const FONT = "Inter, system-ui, sans-serif";
+const MONO = "ui-monospace, monospace";
+
+/** Text that means nothing to a reader of XML. What XML cannot hold at all is left out. */
+export function escaped(text: string): string {
+  return text
+    .replace(/[^\t\n\r\u0020-\uD7FF\uE000-\uFFFD\u{10000}-\u{10FFFF}]/gu, "")
+    .replaceAll("&", "&amp;")
+    .replaceAll("<", "&lt;")
+    .replaceAll(">", "&gt;")
+    .replaceAll('"', "&quot;")
+    .replaceAll("'", "&#39;");
+}
+
+/** As much of a text as fits, by the mean width of its letters. */
+function fitted(text: string, width: number, letter: number): string {
+  const most = Math.max(1, Math.floor(width / letter));
+  const letters = [...text.replace(/\s+/g, " ")];
+  return letters.length <= most ? letters.join("") : `${letters.slice(0, most - 1).join("")}…`;
+}
+
+/** `color` answers the value of a token, `--ink` say. */
+export function svgPictureOf(
+  graph: Graph,
+  places: ReadonlyMap<Key, Position>,
+  sizes: Sizes,
+  color: (token: string) => string,
+): SvgPicture {
+  return new Painter(graph, places, sizes, color).picture();
+}
+
+class Painter {
+  private readonly nodes: CanvasNode[];
+  private readonly edges: Arrow[];
+  private readonly notes: readonly Note[];
+  private readonly sizes: Sizes;
+  private readonly color: (token: string) => string;
+
+  constructor(
+    graph: Graph,
+    places: ReadonlyMap<Key, Position>,
+    sizes: Sizes,
+    color: (token: string) => string,
+  ) {
+    this.sizes = sizes;
+    this.color = color;
+    const options = {
+      places: new Map(places),
+      selected: new Set<string>(),
+      progress: new Map(),
+      marks: NO_PROBLEM_MARKS,
+      measured: sizes,
+    };
+    this.nodes = nodesOf(graph, options);
+    this.edges = edgesOf(graph, options, surroundingsOf(graph, options, null));
+    this.notes = notesOf(graph);
+  }
+
+  picture(): SvgPicture {
+    const parts = [
+      ...this.notes.filter(({ kind }) => kind === "frame").map((note) => this.frame(note)),
+      ...this.edges.map((edge) => this.arrow(edge)),
+      ...this.nodes.map((node) => this.node(node)),
+      ...this.edges.map((edge) => this.label(edge)),
+      ...this.notes.filter(({ kind }) => kind === "note").map((note) => this.note(note)),
+    ];
+    const [left, top, right, bottom] = this.bounds();
+    const [width, height] = [right - left + 2 * MARGIN, bottom - top + 2 * MARGIN];
+    const view = `${left - MARGIN} ${top - MARGIN} ${width} ${height}`;
+    const svg =
+      `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="${view}" ` +
+      `font-family="${FONT}" font-size="13">\n` +
+      `<rect x="${left - MARGIN}" y="${top - MARGIN}" width="${width}" height="${height}" fill="${this.paint("--canvas")}"/>\n` +
+      `${parts.filter(Boolean).join("\n")}\n</svg>\n`;
+    return { svg, width, height };
+  }
+
+  /** A token's value, also of `var(--token)`. */
+  private paint(token: string): string {
+    const name = /^var\((--[\w-]+)\)$/.exec(token)?.[1] ?? token;
+    return escaped(this.color(name) || "#888888");
+  }
+
+  private size(key: Key, kind: string) {
+    return this.sizes.get(key) ?? (kind === "end" ? PILL : CARD);
+  }
+
+  private bounds(): [number, number, number, number] {
+    const boxes = [
+      ...this.nodes.map(({ id, type, position: { x, y } }) => {
+        const { width, height } = this.size(id, type ?? "");
+        return [x, y - 12, x + width, y + height + 12];
+      }),
+      ...this.notes.map(({ at, size }) => [at[0], at[1] - 22, at[0] + size[0], at[1] + size[1]]),
+      ...this.edges.flatMap(({ data }) => {
+        const xs = [data?.lane, data?.label?.x].filter((x) => typeof x === "number");
+        return xs.map((x) => [x - 60, 0, x + 60, 0]);
+      }),
+    ];
+    const ys = boxes.filter((box) => box[1] !== 0 || box[3] !== 0);
+    const pick = (list: number[][], i: number) => list.map((box) => box[i] ?? 0);
+    return [
+      Math.min(...pick(boxes, 0)),
+      Math.min(...pick(ys, 1)),
+      Math.max(...pick(boxes, 2)),
+      Math.max(...pick(ys, 3)),
+    ].map(Math.round) as [number, number, number, number];
+  }
+
+  private text(words: string, x: number, y: number, more: string): string {
+    return `<text x="${x}" y="${y}" ${more}>${escaped(words)}</text>`;
+  }
+
+  private node(node: CanvasNode): string {
+    if (node.type === "action") return this.card(node);
+    return node.type === "end" ? this.end(node) : "";
+  }
+
+  private card({ id, position: { x, y }, data }: Extract<CanvasNode, { type?: "action" }>): string {
+    const { action } = data;
+    const { width, height } = this.size(id, "action");
+    const robot = this.paint(colorOfName(action.actor));
+    const ink = `fill="${this.paint("--ink")}"`;
+    const dash = action.missing ? ` stroke-dasharray="5 4"` : "";
+    const lines = cardLines(action.inputs, 2).map((line, i) =>
+      this.text(
+        fitted(lineText(line), width - 30, 6.7),
+        x + 16,
+        y + 46 + i * 16,
+        `fill="${this.paint("--ink2")}" font-family="${MONO}" font-size="11"`,
+      ),
+    );
+    const tag = fitted(action.actor, 75, 6.4);
+    return [
+      `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="12" fill="${this.paint("--raised")}" stroke="${this.paint("--line2")}"${dash}/>`,
+      `<rect x="${x + 5}" y="${y + 12}" width="3" height="${height - 24}" rx="1.5" fill="${robot}"/>`,
+      this.text(fitted(action.name, width - 60, 7.4), x + 16, y + 25, `${ink} font-weight="600"`),
+      this.text(
+        String(action.instanceId),
+        x + width - 13,
+        y + 25,
+        `fill="${this.paint("--ink3")}" font-size="11.5" text-anchor="end"`,
+      ),
+      ...lines,
+      ...(tag === ""
+        ? []
+        : [
+            `<rect x="${x + 12}" y="${y - 10}" width="${tag.length * 6.4 + 14}" height="18" rx="6" fill="${robot}"/>`,
+            this.text(
+              tag,
+              x + 19,
+              y + 3,
+              `fill="${this.paint("--raised")}" font-size="10.5" font-weight="600"`,
+            ),
+          ]),
+      ...OUTCOMES.map((outcome, i) =>
+        this.outcome(outcome, x + width * (0.14 + 0.24 * i), y + height),
+      ),
+    ].join("");
+  }
+
+  private outcome(outcome: Precondition, x: number, y: number): string {
+    const stroke = this.paint(outcomeColor[outcome]);
+    return (
+      `<circle cx="${x}" cy="${y}" r="9" fill="${this.paint("--raised")}" stroke="${stroke}" stroke-width="1.6"/>` +
+      this.text(
+        SIGNS[outcome],
+        x,
+        y + 4,
+        `fill="${stroke}" font-size="11" font-weight="700" text-anchor="middle"`,
+      )
+    );
+  }
+
+  private end({ position: { x, y }, data }: Extract<CanvasNode, { type?: "end" }>): string {
+    const color = this.paint(data.end === "entry" ? "--true" : "--ink2");
+    const [left, middle] = [x + PILL.width / 2 - 42, x + PILL.width / 2];
+    return (
+      `<rect x="${left}" y="${y}" width="84" height="32" rx="16" fill="${this.paint("--raised")}" stroke="${color}" stroke-width="1.5"/>` +
+      this.text(
+        data.end === "entry" ? "Entry" : "Exit",
+        middle,
+        y + 21,
+        `fill="${color}" font-size="12.5" font-weight="650" text-anchor="middle"`,
+      )
+    );
+  }
+
+  private arrow(edge: Arrow): string {
+    const { data } = edge;
+    const [from, to] = [edge.source, edge.target].map((id) => this.nodes.find((n) => n.id === id));
+    if (!data || !from || !to) return "";
+    const source = this.size(from.id, from.type ?? "");
+    const target = this.size(to.id, to.type ?? "");
+    const below = data.entry ? 7 : 11;
+    const ends = {
+      sourceX: from.position.x + source.width * outcomeOffset(data.entry, data.outcome),
+      sourceY: from.position.y + source.height + below,
+      targetX: to.position.x + target.width / 2,
+      targetY: to.position.y - 7,
+    };
+    const color = this.paint(
+      data.entry ? "--ink3" : data.response === "ignore" ? "--ink4" : outcomeColor[data.outcome],
+    );
+    const dash = data.entry || data.response === "run" ? "" : ` stroke-dasharray="6 4"`;
+    const { targetX: x, targetY: y } = ends;
+    return (
+      `<path d="${arrowPathOf(ends, data.lane).path}" fill="none" stroke="${color}" stroke-width="1.8"${dash}/>` +
+      `<path d="M${x - 4.5} ${y - 7}L${x} ${y + 1}L${x + 4.5} ${y - 7}Z" fill="${color}"/>`
+    );
+  }
+
+  private label({ data }: Arrow): string {
+    if (!data?.answers || !data.label) return "";
+    const { x, y, anchor } = data.label;
+    const side = { left: "start", middle: "middle", right: "end" }[anchor];
+    const top = y + 4 - (data.answers.length - 1) * 8.5;
+    return data.answers
+      .map(({ outcomes, response }, i) => {
+        const words = outcomes.map(
+          (o) =>
+            `<tspan fill="${this.paint(outcomeColor[o])}">${SIGNS[o]} ${outcomeWord[o]} </tspan>`,
+        );
+        const last = data.optional && i === (data.answers?.length ?? 0) - 1 ? " · optional" : "";
+        return (
+          `<text x="${x}" y="${top + i * 17}" font-size="11" font-weight="600" text-anchor="${side}" ` +
+          `stroke="${this.paint("--canvas")}" stroke-width="4" paint-order="stroke">${words.join("")}` +
+          `<tspan fill="${this.paint("--ink2")}" font-weight="500">→ ${response}${last}</tspan></text>`
+        );
+      })
+      .join("");
+  }
+
+  private frame({ at: [x, y], size: [width, height], text, color }: Note): string {
+    const ink = this.paint(noteColor[color]);
+    return (
+      `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="14" fill="${ink}" fill-opacity="0.07" stroke="${ink}" stroke-opacity="0.6"/>` +
+      this.text(
+        fitted(text, width - 24, 7),
+        x + 12,
+        y - 8,
+        `fill="${ink}" font-size="12" font-weight="650"`,
+      )
+    );
+  }
+
+  private note({ at: [x, y], size: [width, height], text, color }: Note): string {
+    const ink = this.paint(noteColor[color]);
+    const most = Math.max(1, Math.floor((height - 16) / 17));
+    const lines = wrapped(text, width - 24, 6.6).slice(0, most);
+    const spans = lines.map(
+      (line, i) => `<tspan x="${x + 12}" y="${y + 22 + i * 17}">${escaped(line)}</tspan>`,
+    );
+    return (
+      `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="8" fill="${this.paint("--raised")}" stroke="${ink}"/>` +
+      `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="8" fill="${ink}" fill-opacity="0.1"/>` +
+      `<text fill="${this.paint("--ink")}" font-size="12.5">${spans.join("")}</text>`
+    );
+  }
+}
+
+const SIGNS: Readonly<Record<Precondition, string>> = {
+  on_true: "✓",
+  on_false: "✕",
+  on_error: "!",
+  on_stopped: "■",
+};
+
+/** Lines of words that are no longer than a width. */
+function wrapped(text: string, width: number, letter: number): string[] {
+  const most = Math.max(4, Math.floor(width / letter));
+  return text.split("\n").flatMap((paragraph) => {
+    const lines: string[] = [];
+    let line = "";
+    for (const word of paragraph.split(/\s+/)) {
+      if (line !== "" && line.length + 1 + word.length > most) {
+        lines.push(line);
+        line = "";
+      }
+      line = line === "" ? word.slice(0, most) : `${line} ${word}`;
+    }
+    return [...lines, line];
+  });
+}

@@ -1,0 +1,195 @@
+/** The state of a dry-run: what is played, where in it one is, and what was decided. */
+import { useCallback, useEffect, useMemo, useState } from "react";
+import { useDryRunResult } from "../api/dry-runs";
+import type { Graph, Key } from "../graph/model";
+import { endName } from "../graph/relation-words";
+import type { Progress } from "../status/progress";
+import {
+  keysByName,
+  momentsOf,
+  momentWords,
+  type PlaybackState,
+  playbackStateAt,
+} from "./playback";
+import {
+  commandsOf,
+  type DecidedFault,
+  type DecidedOutcome,
+  type Decisions,
+  decide,
+  NOTHING_DECIDED,
+  scriptOf,
+} from "./script";
+
+export const DRY_RUN_SPEEDS = [0.5, 1, 4, 16] as const;
+
+export interface DryRun {
+  readonly moments: readonly { readonly at: number }[];
+  /** The moment that is shown. */
+  readonly index: number;
+  readonly sighting: PlaybackState;
+  /** What happens at this moment. */
+  readonly words: readonly string[];
+  readonly playing: boolean;
+  readonly speed: number;
+  readonly decided: Decisions;
+  /** Still being worked out. */
+  readonly busy: boolean;
+  readonly failed: Error | null;
+  readonly cut: boolean;
+  go(index: number): void;
+  play(on: boolean): void;
+  setSpeed(speed: number): void;
+  /** How the running action ends: the one given, else the first. */
+  choose(outcome: DecidedOutcome, key?: Key): void;
+  inject(fault: DecidedFault | null): void;
+  /** From the start, as if nothing had been decided. */
+  restart(): void;
+  close(): void;
+}
+
+const EMPTY: PlaybackState = { progress: new Map<Key, Progress>(), running: [], state: "" };
+
+/** Null while no dry-run is open. `seq` is the moment of the graph that the page shows. */
+export function useDryRun(id: string, graph: Graph, seq: number) {
+  const [open, setOpen] = useState(false);
+  const [decided, setDecided] = useState(NOTHING_DECIDED);
+  const [at, setAt] = useState(0);
+  const [goal, setGoal] = useState<number | null>(null);
+  const [playing, play] = useState(false);
+  const [speed, setSpeed] = useState<number>(1);
+  const wanted = useMemo(
+    () => (open ? { seq, script: scriptOf(decided), commands: commandsOf(decided) } : null),
+    [open, seq, decided],
+  );
+  const { data, isPlaceholderData, error } = useDryRunResult(id, wanted);
+  const busy = data === undefined || isPlaceholderData;
+  const trace = useMemo(() => data?.trace ?? [], [data]);
+  const moments = useMemo(() => momentsOf(trace), [trace]);
+
+  // After a decision the next thing that happens is shown, as soon as it is known.
+  useEffect(() => {
+    if (goal === null || busy) return;
+    setAt((moments.find((moment) => moment.at > goal) ?? moments.at(-1))?.at ?? 0);
+    setGoal(null);
+  }, [goal, busy, moments]);
+
+  const found = moments.findLastIndex((moment) => moment.at <= at);
+  const index = Math.max(0, found);
+  const sighting = useMemo(() => {
+    const moment = moments[index];
+    return moment ? playbackStateAt(trace, moment.to, graph, keysByName(graph)) : EMPTY;
+  }, [trace, moments, index, graph]);
+  const words = useMemo(() => {
+    const moment = moments[index];
+    const keys = keysByName(graph);
+    const nameOf = (node: string) => {
+      const key = keys.get(node);
+      return key === undefined ? node : endName(graph, key);
+    };
+    return moment ? momentWords(trace, moment, moments[index - 1]?.to ?? 0, nameOf) : [];
+  }, [trace, moments, index, graph]);
+
+  const go = useCallback(
+    (to: number) => setAt(moments[Math.max(0, Math.min(moments.length - 1, to))]?.at ?? 0),
+    [moments],
+  );
+  usePlaying({ on: open && playing && !busy, moments, index, speed, go, play });
+
+  const choose = useCallback(
+    (outcome: DecidedOutcome, key?: Key) => {
+      const going = sighting.running.find((each) => each.key === key) ?? sighting.running[0];
+      const now = moments[index]?.at;
+      if (!going || now === undefined) return;
+      setDecided((before) => decide(before, going, outcome, now));
+      setGoal(now);
+    },
+    [sighting, moments, index],
+  );
+  const inject = useCallback(
+    (fault: DecidedFault | null) => {
+      setDecided((before) => ({ ...before, fault }));
+      const now = moments[index]?.at;
+      if (fault?.kind === "stop" && now !== undefined) setGoal(now);
+    },
+    [moments, index],
+  );
+  const restart = useCallback(() => {
+    setDecided(NOTHING_DECIDED);
+    setAt(0);
+    play(false);
+  }, []);
+  const close = useCallback(() => {
+    restart();
+    setOpen(false);
+  }, [restart]);
+  const begin = useCallback(() => setOpen(true), []);
+
+  const dryRun = useMemo<DryRun | null>(
+    () =>
+      open
+        ? {
+            moments,
+            index,
+            sighting,
+            words,
+            playing,
+            speed,
+            decided,
+            busy,
+            failed: error,
+            cut: data?.cut === true,
+            go,
+            play,
+            setSpeed,
+            choose,
+            inject,
+            restart,
+            close,
+          }
+        : null,
+    [
+      open,
+      moments,
+      index,
+      sighting,
+      words,
+      playing,
+      speed,
+      decided,
+      busy,
+      error,
+      data,
+      go,
+      choose,
+      inject,
+      restart,
+      close,
+    ],
+  );
+  return { dryRun, begin };
+}
+
+interface Playing {
+  readonly on: boolean;
+  readonly moments: readonly { readonly at: number }[];
+  readonly index: number;
+  readonly speed: number;
+  go(index: number): void;
+  play(on: boolean): void;
+}
+
+/** Goes on by itself: as long as things take, but neither too fast to see nor endlessly. */
+function usePlaying({ on, moments, index, speed, go, play }: Playing): void {
+  useEffect(() => {
+    if (!on) return;
+    const [now, next] = [moments[index], moments[index + 1]];
+    if (!now || !next) {
+      play(false);
+      return;
+    }
+    const wait = Math.min(2_500, Math.max(120, (next.at - now.at) / speed));
+    const timer = setTimeout(() => go(index + 1), wait);
+    return () => clearTimeout(timer);
+  }, [on, moments, index, speed, go, play]);
+}

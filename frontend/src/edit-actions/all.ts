@@ -1,0 +1,63 @@
+/** Every edit action, in the order in which menus and help list them. */
+import { ALIGN, DISTRIBUTE, NUDGE, snap, tidy, tidySelection } from "./arrange";
+import * as draw from "./draw";
+import { DRY_RUN } from "./dry-run-actions";
+import type { EditAction } from "./edit-action";
+import * as notes from "./notes";
+import { PANELS } from "./panels";
+import * as graph from "./share";
+import * as look from "./view";
+
+export * from "./arrange";
+export * from "./draw";
+export { dryRun } from "./dry-run-actions";
+export * from "./notes";
+export * from "./share";
+export * from "./view";
+
+export const EDIT_ACTIONS: readonly EditAction[] = [
+  draw.add,
+  draw.connectTo,
+  draw.retargetArrow,
+  notes.insert,
+  draw.entry,
+  draw.exit,
+  notes.note,
+  notes.frame,
+  notes.write,
+  draw.copy,
+  draw.cut,
+  draw.pasteHere,
+  draw.duplicate,
+  draw.removeSelection,
+  draw.removeAndReconnect,
+  draw.undo,
+  draw.redo,
+  draw.selectAll,
+  draw.selectNone,
+  tidy,
+  tidySelection,
+  ...ALIGN,
+  ...DISTRIBUTE,
+  snap,
+  ...NUDGE,
+  look.palette,
+  look.fit,
+  look.zoomSelection,
+  look.zoomIn,
+  look.zoomOut,
+  look.marquee,
+  look.pan,
+  ...look.WALK,
+  notes.details,
+  look.toCanvas,
+  look.menu,
+  look.showJson,
+  ...PANELS,
+  look.showShortcuts,
+  ...DRY_RUN,
+  graph.exportUmrf,
+  graph.exportSvg,
+  graph.exportPng,
+  graph.copyLink,
+];

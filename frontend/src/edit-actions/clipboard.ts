@@ -1,0 +1,138 @@
+/**
+ * The clipboard: UMRF text for everybody, and beside it the exact pieces for our own pages.
+ *
+ * A key press gives a page the system's clipboard on any address. A menu may have it only in a
+ * secure context; elsewhere what was copied last in this browser serves.
+ */
+import { notifications } from "@mantine/notifications";
+import { errorPlace, errorText } from "../api/http";
+import { readUmrfKeys } from "../api/umrf-keys";
+import { arrange } from "../canvas/geometry/arrange";
+import { mapsFrom } from "../graph/document-keys";
+import { type Clip, clipOf, isEmpty, paste } from "../graph/edit/clip";
+import { readGraph } from "../graph/read";
+import { umrfText } from "../graph/umrf-text";
+import { copyText } from "../ui/copy-text";
+import { type EditorContext, selectedActions } from "./editor-context";
+
+export interface CopiedContent {
+  /** What the system's clipboard got. */
+  readonly text: string;
+  readonly clip: Clip;
+}
+
+const SHELF = "aa.clipboard";
+const MOST = 2_000_000; // characters that are kept for other tabs
+let latest: CopiedContent | null = null;
+
+/** What is chosen, as it goes to the clipboard. Notes alone are their own text. */
+export function copiedSelection(context: EditorContext): CopiedContent {
+  const places = context.positions();
+  const clip = clipOf(context.doc, context.selection, places);
+  const actions = selectedActions(context).filter(({ missing }) => !missing);
+  if (actions.length === 0) return { text: JSON.stringify(clip.positions), clip };
+  const keys = new Set(actions.map(({ key }) => key));
+  return { text: umrfText(context.graph, keys, places), clip };
+}
+
+/** Remembers it for this browser's pages. */
+export function rememberCopied(held: CopiedContent): void {
+  latest = held;
+  try {
+    const text = JSON.stringify(held);
+    if (text.length <= MOST) localStorage.setItem(SHELF, text);
+    else localStorage.removeItem(SHELF);
+  } catch {
+    // A browser that keeps nothing still has it on this page.
+  }
+}
+
+/** Another version of this page may have left something else. */
+function isHeld(value: unknown): value is CopiedContent {
+  if (typeof value !== "object" || value === null) return false;
+  const { text, clip } = value as { text?: unknown; clip?: Partial<Record<keyof Clip, unknown>> };
+  const maps = [clip?.actions, clip?.relations, clip?.positions];
+  return typeof text === "string" && maps.every((map) => typeof map === "object" && map !== null);
+}
+
+/** What was copied last in this browser. */
+export function lastCopied(): CopiedContent | null {
+  try {
+    const kept: unknown = JSON.parse(localStorage.getItem(SHELF) ?? "null");
+    if (isHeld(kept)) return kept;
+  } catch {
+    // as above
+  }
+  return latest;
+}
+
+/** Copies an address, or shows it where the browser does not let us. */
+export async function copyLinkTo(link: string): Promise<void> {
+  notifications.show(
+    (await copyText(link))
+      ? { message: "Link copied" }
+      : { title: "The browser did not copy the link", message: link, autoClose: 20_000 },
+  );
+}
+
+/** The system's clipboard where it may be read, else what was copied last in this browser. */
+export async function readText(): Promise<string> {
+  try {
+    if (window.isSecureContext) return await navigator.clipboard.readText();
+  } catch {
+    // no permission
+  }
+  return lastCopied()?.text ?? "";
+}
+
+function failed(message: string): void {
+  notifications.show({ color: "red", title: "Nothing pasted", message, autoClose: 12_000 });
+}
+
+/** The same with places for what has none: files often come without. */
+function placed(clip: Clip): Clip {
+  const graph = readGraph(mapsFrom(clip));
+  if (graph.actions.every(({ position }) => position !== null)) return clip;
+  return { ...clip, positions: { ...Object.fromEntries(arrange(graph)), ...clip.positions } };
+}
+
+function land(context: EditorContext, clip: Clip, own: boolean): void {
+  const pointer = context.view.pointer();
+  const keys = paste(
+    context.doc,
+    placed(clip),
+    pointer ? { at: pointer.at } : own ? { by: [40, 40] } : { at: context.view.middle() },
+  );
+  context.select(keys);
+  requestAnimationFrame(() => {
+    const [first] = keys;
+    const at = first === undefined ? undefined : context.positions().get(first);
+    if (at) context.view.reveal(at);
+    if (first !== undefined) context.view.focus(first);
+  });
+}
+
+/** Adds what a text holds: our own pieces exactly, any UMRF as the server reads it. */
+export async function pasteText(context: EditorContext, text: string): Promise<void> {
+  const ours = lastCopied();
+  if (ours !== null && ours.text === text && !isEmpty(ours.clip)) {
+    // Where it came from it would lie on itself.
+    const same = Object.keys(ours.clip.actions).some((key) =>
+      context.graph.actions.some((action) => action.key === key),
+    );
+    land(context, ours.clip, same);
+    return;
+  }
+  if (text.trim() === "") {
+    failed("The clipboard has no text. Copy actions here, or UMRF text anywhere.");
+    return;
+  }
+  try {
+    const pieces = await readUmrfKeys(text);
+    if (isEmpty(pieces)) failed("This UMRF text has no actions.");
+    else land(context, pieces, false);
+  } catch (error) {
+    const where = errorPlace(error);
+    failed(where === "" ? errorText(error) : `${errorText(error)} (${where})`);
+  }
+}

@@ -1,0 +1,68 @@
+import { expect, test } from "vitest";
+import { EMPTY_GRAPH } from "../graph/model";
+import { EDIT_ACTIONS } from "./all";
+import { editActionFor, isEnabled, isPressed, labelOf, printedKeys } from "./edit-action";
+import type { EditorContext } from "./editor-context";
+
+const press = (
+  key: string,
+  mods: Partial<Record<"ctrlKey" | "metaKey" | "shiftKey" | "altKey", boolean>> = {},
+) => ({
+  key,
+  ctrlKey: false,
+  metaKey: false,
+  shiftKey: false,
+  altKey: false,
+  ...mods,
+});
+
+test("no two deeds share a shortcut", () => {
+  const all = EDIT_ACTIONS.flatMap((editAction) => editAction.shortcuts);
+  expect(new Set(all).size).toBe(all.length);
+});
+
+test("undo and redo are told apart by Shift", () => {
+  expect(editActionFor(EDIT_ACTIONS, press("z", { ctrlKey: true }))?.name).toBe("undo");
+  expect(editActionFor(EDIT_ACTIONS, press("Z", { ctrlKey: true, shiftKey: true }))?.name).toBe(
+    "redo",
+  );
+  expect(editActionFor(EDIT_ACTIONS, press("z"))?.name).toBe("zoom-selection");
+});
+
+test("letters that stand alone can be switched off, and nothing else with them", () => {
+  expect(editActionFor(EDIT_ACTIONS, press("c"))?.name).toBe("connect");
+  expect(editActionFor(EDIT_ACTIONS, press("c"), false)).toBeNull();
+  expect(editActionFor(EDIT_ACTIONS, press("Delete"), false)?.name).toBe("remove");
+  expect(editActionFor(EDIT_ACTIONS, press("z", { ctrlKey: true }), false)?.name).toBe("undo");
+});
+
+test("a plain letter with Ctrl belongs to the browser", () => {
+  expect(editActionFor(EDIT_ACTIONS, press("p", { ctrlKey: true }))).toBeNull();
+});
+
+test("Mod is the command key on a Mac", () => {
+  expect(isPressed("Mod+z", press("z", { metaKey: true }), true)).toBe(true);
+  expect(isPressed("Mod+z", press("z", { ctrlKey: true }), true)).toBe(false);
+  expect(printedKeys("Mod+Shift+z", true)).toEqual(["⌘", "⇧", "Z"]);
+});
+
+test("who may only look is offered nothing that changes the graph, and told why", () => {
+  const context = {
+    mayEdit: false,
+    canUndo: true,
+    canRedo: true,
+    graph: { ...EMPTY_GRAPH, actions: [{ key: "a" }] },
+    selection: new Set(["a"]),
+    positions: () => new Map([["a", [0, 0]]]),
+    sizes: () => new Map(),
+  } as unknown as EditorContext;
+  const changing = EDIT_ACTIONS.filter((editAction) => editAction.changes);
+  for (const editAction of changing) {
+    expect(isEnabled(editAction, context)).toBe(false);
+    expect(labelOf(editAction, context)).toBe(`${editAction.label} (view only)`);
+  }
+  const editor = { ...context, mayEdit: true };
+  expect(changing.filter((editAction) => isEnabled(editAction, editor)).length).toBeGreaterThan(10);
+  const [copy] = EDIT_ACTIONS.filter(({ name }) => name === "copy");
+  expect(copy && isEnabled(copy, context)).toBe(true);
+});

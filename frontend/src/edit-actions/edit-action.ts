@@ -1,0 +1,106 @@
+/** An edit action: something a person can do in the editor, as a value. Toolbar, menus, palette, keys and help are made of these. */
+import type { Icon } from "@tabler/icons-react";
+import type { EditorContext } from "./editor-context";
+
+/** Under which heading help and menus list it. */
+export type EditActionGroup = "Draw" | "Arrange" | "Look" | "Graph" | "Dry-run";
+
+export interface EditAction {
+  readonly name: string;
+  readonly label: string;
+  readonly group: EditActionGroup;
+  /** `Mod` is Ctrl, and ⌘ on a Mac. The first is shown; all work. */
+  readonly shortcuts: readonly string[];
+  readonly icon: Icon;
+  /** Whether it changes the graph, which not everybody may. */
+  readonly changes: boolean;
+  /** The browser raises an event of its own for its shortcut, and gives the clipboard with it. */
+  readonly event?: "copy" | "cut" | "paste";
+  /** Other words that people look for it by. */
+  readonly also?: string;
+  enabled(context: EditorContext): boolean;
+  run(context: EditorContext): void;
+}
+
+/** Whether it can be done now, by this person. */
+export function isEnabled(editAction: EditAction, context: EditorContext): boolean {
+  return (!editAction.changes || context.mayEdit) && editAction.enabled(context);
+}
+
+/** What it is called, and why it is off when that is not to be seen on the canvas. */
+export function labelOf(editAction: EditAction, context: EditorContext): string {
+  return editAction.changes && !context.mayEdit
+    ? `${editAction.label} (view only)`
+    : editAction.label;
+}
+
+const onMac = typeof navigator !== "undefined" && /Mac|iP(hone|ad)/.test(navigator.platform);
+
+interface Pressed {
+  readonly key: string;
+  readonly ctrlKey: boolean;
+  readonly metaKey: boolean;
+  readonly shiftKey: boolean;
+  readonly altKey: boolean;
+}
+
+/** Whether a key press is this shortcut. */
+export function isPressed(shortcut: string, event: Pressed, mac = onMac): boolean {
+  const parts = shortcut.split("+");
+  const last = parts.pop() ?? "";
+  const key = last === "Plus" ? "+" : last;
+  const mod = mac ? event.metaKey : event.ctrlKey;
+  const other = mac ? event.ctrlKey : event.metaKey;
+  const letter =
+    key.length === 1 ? event.key.toLowerCase() === key.toLowerCase() : event.key === key;
+  // Signs such as "+" or "?" carry their own Shift on some keyboards.
+  const sign = key.length === 1 && !/[a-z0-9]/i.test(key);
+  const shift = sign || event.shiftKey === parts.includes("Shift");
+  const alt = event.altKey === parts.includes("Alt");
+  return letter && mod === parts.includes("Mod") && !other && alt && shift;
+}
+
+/** Whether a shortcut is one printed character without Mod or Alt: such keys can be switched off. */
+export function isSingleKey(shortcut: string): boolean {
+  const parts = shortcut.split("+");
+  const last = parts.at(-1) ?? "";
+  return (last.length === 1 || last === "Plus") && !parts.includes("Mod") && !parts.includes("Alt");
+}
+
+const signs: Record<string, string> = {
+  Delete: "Del",
+  Backspace: "⌫",
+  Plus: "+",
+  ArrowUp: "↑",
+  ArrowDown: "↓",
+  ArrowLeft: "←",
+  ArrowRight: "→",
+  ContextMenu: "Menu",
+  Escape: "Esc",
+};
+
+/** The shortcut as it is printed on keys. */
+export function printedKeys(shortcut: string, mac = onMac): string[] {
+  const parts = shortcut.split("+");
+  const last = parts.at(-1) ?? "";
+  const sign = last.length === 1 && !/[a-z0-9]/i.test(last);
+  return parts.flatMap((part) => {
+    if (part === "Mod") return mac ? "⌘" : "Ctrl";
+    if (part === "Shift") return sign ? [] : mac ? "⇧" : "Shift";
+    if (part === "Alt") return mac ? "⌥" : "Alt";
+    return signs[part] ?? (part.length === 1 ? part.toUpperCase() : part);
+  });
+}
+
+/** The edit action that a key press asks for. */
+export function editActionFor(
+  editActions: readonly EditAction[],
+  event: Pressed,
+  singles = true,
+): EditAction | null {
+  return (
+    editActions.find((editAction) =>
+      editAction.shortcuts.some((key) => (singles || !isSingleKey(key)) && isPressed(key, event)),
+    ) ?? null
+  );
+}

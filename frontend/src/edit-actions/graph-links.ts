@@ -1,0 +1,56 @@
+/** Addresses of a graph and of what is in it: an action, an arrow, a problem. */
+
+import { pageUrl } from "../api/page-url";
+import { relationId } from "../graph/document-keys";
+import type { Graph } from "../graph/model";
+
+/** The address of a graph, with what is to be shown of it. */
+export function linkTo(
+  graph: string,
+  selection: readonly string[],
+  page: string = pageUrl(),
+): string {
+  const url = new URL(`${page}/graphs/${encodeURIComponent(graph)}`);
+  for (const id of selection.slice(0, 20)) {
+    url.searchParams.append(id.includes(">") ? "arrow" : "action", id);
+  }
+  return url.href;
+}
+
+/** The address of a problem: what it is about, and its code. */
+export function linkToProblem(
+  graph: string,
+  problem: { readonly code: string; readonly where: { aid?: string; relation?: string } },
+  page: string = pageUrl(),
+): string {
+  const place = problem.where.relation ?? problem.where.aid;
+  const url = new URL(linkTo(graph, place === undefined ? [] : [place], page));
+  url.searchParams.set("problem", problem.code);
+  return url.href;
+}
+
+export interface LinkTarget {
+  readonly selection: readonly string[];
+  /** The panel of problems shall be open. */
+  readonly problem: string | null;
+}
+
+/** What an address points at; null when it names a graph only. */
+export function targetOf(search: string): LinkTarget | null {
+  const query = new URLSearchParams(search);
+  const selection = [...query.getAll("action"), ...query.getAll("arrow")].slice(0, 20);
+  const problem = query.get("problem");
+  return selection.length === 0 && problem === null ? null : { selection, problem };
+}
+
+/** Those that are there; an address may be older than a delete. */
+export function present(graph: Graph, selection: readonly string[]): string[] {
+  const known = new Set([
+    ...graph.actions.map(({ key }) => key),
+    ...graph.relations.map(relationId),
+    ...graph.notes.map(([id]) => `g/${id}`),
+    "entry",
+    "exit",
+  ]);
+  return selection.filter((id) => known.has(id));
+}

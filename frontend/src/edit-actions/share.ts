@@ -1,0 +1,50 @@
+/** Edit actions for the whole graph: export it, copy a link to it. */
+
+import { IconDownload, IconLink, IconPhoto, IconVectorTriangle } from "@tabler/icons-react";
+import { copyLinkTo } from "./clipboard";
+import type { EditAction } from "./edit-action";
+import { linkTo } from "./graph-links";
+
+const graph = { group: "Graph", changes: false, enabled: () => true } as const;
+
+export const exportUmrf: EditAction = {
+  ...graph,
+  name: "export",
+  label: "Export as UMRF",
+  shortcuts: ["Mod+s"],
+  icon: IconDownload,
+  also: "download save file JSON",
+  run: (context) => context.download("umrf"),
+};
+
+export const exportSvg: EditAction = {
+  ...graph,
+  name: "export-svg",
+  label: "Export as SVG",
+  shortcuts: [],
+  icon: IconVectorTriangle,
+  also: "picture image download vector",
+  run: (context) => context.download("svg"),
+};
+
+export const exportPng: EditAction = {
+  ...graph,
+  name: "export-png",
+  label: "Export as PNG",
+  shortcuts: [],
+  icon: IconPhoto,
+  also: "picture image download",
+  run: (context) => context.download("png"),
+};
+
+export const copyLink: EditAction = {
+  ...graph,
+  name: "copy-link",
+  label: "Copy link",
+  shortcuts: ["Mod+Shift+l"],
+  icon: IconLink,
+  also: "share url address deep link",
+  run: (context) => {
+    void copyLinkTo(linkTo(context.id, [...context.selection]));
+  },
+};

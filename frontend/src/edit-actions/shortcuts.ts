@@ -1,0 +1,137 @@
+/** Keyboard shortcuts of edit actions, where nobody is typing; and the clipboard's own events. */
+import { useLocalStorage } from "@mantine/hooks";
+import { useEffect, useRef } from "react";
+import { EDIT_ACTIONS } from "./all";
+import { copiedSelection, pasteText, rememberCopied } from "./clipboard";
+import { editActionFor, isEnabled } from "./edit-action";
+import type { EditorContext } from "./editor-context";
+
+/** Whether single letters are shortcuts: speech input types letters by itself. */
+export function useSingleKeys() {
+  return useLocalStorage({
+    key: "aa.single-keys",
+    defaultValue: true,
+    getInitialValueInEffect: false,
+  });
+}
+
+const FIELDS = "input, textarea, select, [role=dialog], [role=menu], [role=listbox]";
+
+/** Whether keys belong to what has the focus. */
+function isTaken(target: EventTarget | null): boolean {
+  if (!(target instanceof HTMLElement)) return false;
+  return target.isContentEditable || target.closest(FIELDS) !== null;
+}
+
+/** The way out of a form works in the form, and so does what no field has a use for. */
+function worksInForms(event: KeyboardEvent): boolean {
+  const editAction = editActionFor(EDIT_ACTIONS, event, false);
+  const free = ["to-canvas", "palette", "find", "export"].includes(editAction?.name ?? "");
+  return free && document.querySelector("[role=dialog]") === null;
+}
+
+/** Lists and trees have their own use for arrow keys, Enter and Delete; the canvas shares ours. */
+function isOnCanvas(target: EventTarget | null): boolean {
+  if (!(target instanceof Element) || target === document.body) return true;
+  return target.closest(".react-flow") !== null;
+}
+
+const MOVING = new Set([
+  "ArrowUp",
+  "ArrowDown",
+  "ArrowLeft",
+  "ArrowRight",
+  "Enter",
+  "Delete",
+  "Backspace",
+]);
+
+/** The pointer rests on the canvas and nothing has the focus: Tab is free for the search. */
+function isOverCanvas(): boolean {
+  const idle = document.activeElement === document.body || document.activeElement === null;
+  return idle && document.querySelector(".react-flow__pane:hover") !== null;
+}
+
+export function useShortcuts(context: EditorContext): void {
+  const now = useRef(context);
+  now.current = context;
+  const [singles] = useSingleKeys();
+  useEffect(() => {
+    const onKey = (event: KeyboardEvent) => {
+      if (event.defaultPrevented || (isTaken(event.target) && !worksInForms(event))) return;
+      if (MOVING.has(event.key) && !isOnCanvas(event.target)) return;
+      if (event.key === "/" && singles) {
+        event.preventDefault();
+        document.querySelector<HTMLInputElement>("[data-search]")?.focus();
+        return;
+      }
+      if (event.key === "Tab" && isOverCanvas()) {
+        event.preventDefault();
+        addAtPointer(now.current);
+        return;
+      }
+      const editAction = editActionFor(EDIT_ACTIONS, event, singles);
+      if (editAction === null || editAction.event !== undefined) return;
+      // A button does what Enter does to it.
+      if (event.key === "Enter" && event.target instanceof HTMLButtonElement) return;
+      // What a deed takes is also kept from the browser while the deed has nothing to do.
+      event.preventDefault();
+      if (isEnabled(editAction, now.current)) editAction.run(now.current);
+    };
+    // Cards move by arrow keys of their own, which know neither undo nor frames, and take Shift with
+    // Enter for one more to choose: ours come first.
+    const onCanvasKey = (event: KeyboardEvent) => {
+      const ours = event.key.startsWith("Arrow") || (event.key === "Enter" && event.shiftKey);
+      if (!ours || isTaken(event.target)) return;
+      if (!(event.target instanceof Element) || !event.target.closest(".react-flow")) return;
+      onKey(event);
+      event.stopPropagation();
+    };
+    window.addEventListener("keydown", onCanvasKey, { capture: true });
+    window.addEventListener("keydown", onKey);
+    return () => {
+      window.removeEventListener("keydown", onCanvasKey, { capture: true });
+      window.removeEventListener("keydown", onKey);
+    };
+  }, [singles]);
+  useClipboard(now);
+}
+
+function addAtPointer(context: EditorContext): void {
+  const pointer = context.view.pointer();
+  context.openAdd(pointer ? { ...pointer, from: null } : undefined);
+}
+
+/** Copy, cut and paste come as events that carry the clipboard, also on plain http. */
+function useClipboard(now: { readonly current: EditorContext }): void {
+  useEffect(() => {
+    const deedOf = (event: ClipboardEvent) => {
+      const editAction = EDIT_ACTIONS.find((each) => each.event === event.type);
+      const free = !event.defaultPrevented && !isTaken(event.target);
+      return editAction && free && isEnabled(editAction, now.current) ? editAction : null;
+    };
+    const onTake = (event: ClipboardEvent) => {
+      // Text that a person has marked is what they want to copy.
+      if (window.getSelection()?.isCollapsed === false || deedOf(event) === null) return;
+      const piece = copiedSelection(now.current);
+      rememberCopied(piece);
+      event.clipboardData?.setData("text/plain", piece.text);
+      event.preventDefault();
+      if (event.type === "cut")
+        EDIT_ACTIONS.find(({ name }) => name === "remove")?.run(now.current);
+    };
+    const onPaste = (event: ClipboardEvent) => {
+      if (deedOf(event) === null) return;
+      event.preventDefault();
+      void pasteText(now.current, event.clipboardData?.getData("text/plain") ?? "");
+    };
+    window.addEventListener("copy", onTake);
+    window.addEventListener("cut", onTake);
+    window.addEventListener("paste", onPaste);
+    return () => {
+      window.removeEventListener("copy", onTake);
+      window.removeEventListener("cut", onTake);
+      window.removeEventListener("paste", onPaste);
+    };
+  }, [now]);
+}

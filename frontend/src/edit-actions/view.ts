@@ -1,0 +1,200 @@
+/** Edit actions that change the view, not the graph. */
+import {
+  IconArrowGuide,
+  IconBraces,
+  IconCommand,
+  IconFocus2,
+  IconFocusCentered,
+  IconHandStop,
+  IconKeyboard,
+  IconMarquee2,
+  IconMenu2,
+  IconZoomIn,
+  IconZoomOut,
+} from "@tabler/icons-react";
+import { ENTRY, type Key } from "../graph/model";
+import type { EditAction } from "./edit-action";
+import { type EditorContext, selectedRelations } from "./editor-context";
+
+const always = () => true;
+const look = { group: "Look", changes: false, enabled: always } as const;
+
+export const palette: EditAction = {
+  ...look,
+  name: "palette",
+  label: "Find a command",
+  shortcuts: ["Mod+k"],
+  icon: IconCommand,
+  also: "command palette go to graph action",
+  run: (context) => context.openOverlay({ kind: "palette" }),
+};
+
+export const showShortcuts: EditAction = {
+  ...look,
+  name: "keys",
+  label: "Keyboard shortcuts",
+  shortcuts: ["?"],
+  icon: IconKeyboard,
+  also: "help",
+  run: (context) => context.openOverlay({ kind: "keys" }),
+};
+
+export const menu: EditAction = {
+  ...look,
+  name: "menu",
+  label: "Menu for the selection",
+  shortcuts: ["ContextMenu", "Shift+F10"],
+  icon: IconMenu2,
+  run: (context) => context.openOverlay({ kind: "menu", screen: spotOf(context) }),
+};
+
+/** Where on screen the selection is, else the middle of the canvas. */
+function spotOf(context: EditorContext): readonly [number, number] {
+  const [key] = [...context.selection].filter((each) => context.positions().has(each));
+  const at = key === undefined ? undefined : context.positions().get(key);
+  const [x, y] = context.view.screenOf(at ?? context.view.middle());
+  return [x + 24, y + 24];
+}
+
+export const toCanvas: EditAction = {
+  ...look,
+  name: "to-canvas",
+  label: "Back to the canvas",
+  shortcuts: ["F6"],
+  icon: IconFocusCentered,
+  also: "leave the form focus",
+  run: (context) => {
+    if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
+    const [key] = [...context.selection].filter((each) => context.positions().has(each));
+    if (key !== undefined) context.view.focus(key);
+  },
+};
+
+export const fit: EditAction = {
+  ...look,
+  name: "fit",
+  label: "Fit",
+  shortcuts: ["f", "Shift+!"],
+  icon: IconFocusCentered,
+  also: "zoom to fit all",
+  run: (context) => context.view.fit(),
+};
+
+export const zoomSelection: EditAction = {
+  ...look,
+  name: "zoom-selection",
+  label: "Show the selection",
+  shortcuts: ["z", "Shift+@"],
+  icon: IconFocus2,
+  also: "zoom to selection",
+  enabled: (context) => context.selection.size > 0,
+  run: (context) => context.view.show(shownKeys(context), "whole"),
+};
+
+/** What is chosen, and for arrows what they tie together. */
+export function shownKeys(context: EditorContext): Key[] {
+  const ends = selectedRelations(context).flatMap(({ parent, child }) => [parent, child]);
+  return [...context.selection, ...ends].filter((key) => context.positions().has(key));
+}
+
+export const zoomIn: EditAction = {
+  ...look,
+  name: "zoom-in",
+  label: "Zoom in",
+  shortcuts: ["=", "Plus"],
+  icon: IconZoomIn,
+  run: (context) => context.view.zoomIn(),
+};
+
+export const zoomOut: EditAction = {
+  ...look,
+  name: "zoom-out",
+  label: "Zoom out",
+  shortcuts: ["-"],
+  icon: IconZoomOut,
+  run: (context) => context.view.zoomOut(),
+};
+
+export const pan: EditAction = {
+  ...look,
+  name: "pan",
+  label: "Pan",
+  shortcuts: ["h"],
+  icon: IconHandStop,
+  run: (context) => context.setTool("pan"),
+};
+
+export const marquee: EditAction = {
+  ...look,
+  name: "marquee",
+  label: "Select",
+  shortcuts: ["v"],
+  icon: IconMarquee2,
+  also: "marquee frame several",
+  // Pressed once more it is over: small screens show no other way back.
+  run: (context) => context.setTool(context.tool === "select" ? "pan" : "select"),
+};
+
+export const showJson: EditAction = {
+  ...look,
+  name: "json",
+  label: "Show the JSON",
+  shortcuts: ["j"],
+  icon: IconBraces,
+  run: (context) => context.setPanel("json"),
+};
+
+/** The nearest neighbour along arrows: down to what follows, up to what comes before, or beside. */
+export function neighbour(
+  context: EditorContext,
+  way: "up" | "down" | "left" | "right",
+): Key | null {
+  const { relations, actions } = context.graph;
+  const places = context.positions();
+  const [arrow] = selectedRelations(context);
+  if (arrow && (way === "up" || way === "down")) return way === "up" ? arrow.parent : arrow.child;
+  const [from] = [...context.selection].filter((key) => places.has(key));
+  if (from === undefined)
+    return relations.find((r) => r.parent === ENTRY)?.child ?? actions[0]?.key ?? null;
+  const at = places.get(from) ?? [0, 0];
+  const after = (key: Key) => relations.filter((r) => r.parent === key).map((r) => r.child);
+  const before = (key: Key) => relations.filter((r) => r.child === key).map((r) => r.parent);
+  const beside = () =>
+    [...new Set([...before(from).flatMap(after), ...after(from).flatMap(before)])].filter(
+      (key) => (places.get(key)?.[0] ?? 0) !== at[0],
+    );
+  const found = way === "down" ? after(from) : way === "up" ? before(from) : beside();
+  const fits = (key: Key) => {
+    const [x] = places.get(key) ?? [0, 0];
+    return key !== from && (way === "left" ? x < at[0] : way === "right" ? x > at[0] : true);
+  };
+  const far = (key: Key) => {
+    const [x, y] = places.get(key) ?? [0, 0];
+    return Math.hypot(x - at[0], y - at[1]);
+  };
+  return found.filter(fits).sort((a, b) => far(a) - far(b))[0] ?? null;
+}
+
+export const WALK: readonly EditAction[] = (["up", "down", "left", "right"] as const).map(
+  (way) => ({
+    ...look,
+    name: `walk-${way}`,
+    label: {
+      up: "Go to what comes before",
+      down: "Go to what follows",
+      left: "Go to the left",
+      right: "Go to the right",
+    }[way],
+    shortcuts: [`Alt+Arrow${way.charAt(0).toUpperCase()}${way.slice(1)}`],
+    icon: IconArrowGuide,
+    also: "walk neighbour",
+    enabled: (context: EditorContext) => context.graph.actions.length > 0,
+    run: (context: EditorContext) => {
+      const key = neighbour(context, way);
+      if (key === null) return;
+      context.select([key]);
+      context.view.reveal(context.positions().get(key) ?? [0, 0]);
+      context.view.focus(key);
+    },
+  }),
+);

@@ -1,0 +1,176 @@
+/** The canvas with its tools, and what it says while it is empty. */
+import { Button, Skeleton } from "@mantine/core";
+import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
+import { ReactFlowProvider } from "@xyflow/react";
+import { type ReactNode, useEffect, useMemo, useRef } from "react";
+import type { ProblemMarks } from "../canvas/problem-marks";
+import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
+import type { Key, Position } from "../graph/model";
+import { RobotFilter } from "../outline/robot-filter";
+import { FollowFrame } from "../people/people";
+import { useFollowedView } from "../people/use-followed-view";
+import type { Progress } from "../status/progress";
+import { useGraph, useLinkPart } from "../sync/use-room";
+import { Empty } from "../ui/empty";
+import { EditableCanvas } from "./canvas/editable-canvas";
+import { useCanvasElements } from "./canvas/use-canvas-elements";
+import { useViewport } from "./canvas/use-viewport";
+import style from "./canvas-pane.module.css";
+import { DryRunBar } from "./dry-run-bar";
+import { Toolbar } from "./menus/toolbar";
+import type { EditorState } from "./use-editor";
+import { useGraphLink } from "./use-graph-link";
+
+interface Props {
+  me: string;
+  canvasHandle: EditorState["canvasHandle"];
+  progress: ReadonlyMap<Key, Progress>;
+  marks: ProblemMarks;
+  compact: boolean;
+  phone: boolean;
+  /** The run that goes, if one does: the view follows it. */
+  run: string | null;
+  /** Beside the dry-run, if one is open: how it becomes a run. */
+  record: ReactNode;
+  /** The note whose text is being written. */
+  writing: string | null;
+  /** In the lower right corner. */
+  corner: ReactNode;
+}
+
+function Inside({
+  me,
+  canvasHandle,
+  progress,
+  marks,
+  compact,
+  phone,
+  run,
+  writing,
+  record,
+  corner,
+}: Props) {
+  const calm = useEditorContext();
+  const graph = useGraph();
+  // The canvas keeps up with the hands of others; what stands beside it comes after.
+  const context = useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
+  const arrived = useLinkPart(({ seq }) => seq > 0);
+  const canvas = useCanvasElements({
+    me,
+    graph: context.graph,
+    selection: context.selection,
+    select: context.select,
+    progress: context.dryRun?.sighting.progress ?? progress,
+    marks,
+  });
+  const { flow, places, sizes } = canvas;
+  const frame = useRef<HTMLDivElement>(null);
+  const pointer = useRef<Position | null>(null);
+  const begun = arrived && context.graph.actions.length > 0;
+  const { view, lost, onPanned, onFollow } = useViewport({
+    flow,
+    frame,
+    places,
+    sizes,
+    phone,
+    begun,
+    progress: context.dryRun ? NOTHING : progress,
+    run: context.dryRun ? null : run,
+    pointer,
+  });
+  const followed = useFollowedView({ flow, frame, view, onPanned });
+  useEffect(() => {
+    canvasHandle.current = { positions: () => places, sizes: () => sizes, view: followed.view };
+  }, [canvasHandle, followed, places, sizes]);
+
+  useDryRunInView(context);
+  useGraphLink(context, begun);
+
+  return (
+    <div className={style.whole}>
+      <div className={style.stage} ref={frame} data-dry={context.dryRun ? true : undefined}>
+        <EditableCanvas
+          context={context}
+          canvas={canvas}
+          me={me}
+          map={!compact && context.graph.actions.length > 3}
+          onPanned={() => {
+            onPanned();
+            followed.end();
+          }}
+          pointer={pointer}
+          writing={writing}
+        />
+        {!arrived && (
+          <div className={style.waiting} aria-busy="true">
+            <Skeleton height={92} width={208} radius="lg" />
+            <Skeleton height={92} width={208} radius="lg" />
+          </div>
+        )}
+        {arrived && context.graph.actions.length === 0 && !context.mayEdit && (
+          <div className={style.empty}>
+            <Empty icon={<IconRouteAltLeft size={22} />} title="Nothing is drawn yet">
+              What the others draw appears here. You are here to look.
+            </Empty>
+          </div>
+        )}
+        {arrived && context.graph.actions.length === 0 && context.mayEdit && (
+          <div className={style.empty}>
+            <Empty
+              icon={<IconRouteAltLeft size={22} />}
+              title="What shall be done first?"
+              action={
+                <Button variant="filled" onClick={() => context.openAdd()}>
+                  Add an action
+                </Button>
+              }
+            >
+              Double-click the canvas, press <b>A</b>, or drag an action from the list. Then drag
+              from Entry to it, and from its outcomes to what follows.
+            </Empty>
+          </div>
+        )}
+        {!compact && (
+          <div className={style.robots}>
+            <RobotFilter />
+          </div>
+        )}
+        <FollowFrame me={me} />
+        <div className={style.tools} data-hidden={(phone && context.dryRun !== null) || undefined}>
+          <Toolbar compact={compact} />
+        </div>
+        <div className={style.corner}>
+          {lost && (
+            <Button size="compact-sm" leftSection={<IconFocus2 size={15} />} onClick={onFollow}>
+              Follow the run
+            </Button>
+          )}
+          {!context.dryRun && corner}
+        </div>
+      </div>
+      {context.dryRun && <DryRunBar context={context} run={context.dryRun} record={record} />}
+    </div>
+  );
+}
+
+const NOTHING: ReadonlyMap<Key, Progress> = new Map();
+
+/** What begins to run in a dry-run comes into view. */
+function useDryRunInView(context: EditorContext): void {
+  const { dryRun, positions: places, view } = context;
+  const keys = dryRun?.sighting.running.map(({ key }) => key).join(" ") ?? "";
+  // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
+  useEffect(() => {
+    const [first] = keys.split(" ");
+    const at = first ? places().get(first) : undefined;
+    if (at) view.reveal(at);
+  }, [keys]);
+}
+
+export function CanvasPane(props: Props) {
+  return (
+    <ReactFlowProvider>
+      <Inside {...props} />
+    </ReactFlowProvider>
+  );
+}

@@ -1,0 +1,311 @@
+/** The canvas on which a graph is drawn. */
+import { Button } from "@mantine/core";
+import { useMediaQuery } from "@mantine/hooks";
+import {
+  Background,
+  BackgroundVariant,
+  type Connection,
+  ConnectionLineType,
+  MiniMap,
+  PanOnScrollMode,
+  ReactFlow,
+  SelectionMode,
+  useStoreApi,
+} from "@xyflow/react";
+import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
+import { actionDrag } from "../../canvas/action-drag";
+import type { Arrow, CanvasNode } from "../../canvas/elements";
+import { CARD } from "../../canvas/geometry/arrange";
+import { edgeTypes, nodeTypes } from "../../canvas/graph-view";
+import { type NoteEditing, NoteEditingContext } from "../../canvas/note-card";
+import { noteColor } from "../../canvas/note-colors";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
+import { ArrowTips } from "../../canvas/outcome-arrow";
+import { addActionAt, type EditorContext, GRID } from "../../edit-actions/editor-context";
+import { asOneEdit, insertInto, removeNotes } from "../../graph/edit";
+import { changeNote } from "../../graph/edit/notes";
+import type { Position } from "../../graph/model";
+import { endName } from "../../graph/relation-words";
+import { Cursors, PeopleAtCards } from "../../people/people";
+import { useRoom } from "../../sync/use-room";
+import { colorOfName } from "../../ui/name-colors";
+import { useStableCallback } from "../../ui/use-stable-callback";
+import style from "./editable-canvas.module.css";
+import { arrowAt } from "./hit-test";
+import type { useCanvasElements } from "./use-canvas-elements";
+import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
+import { useContextMenu } from "./use-context-menu";
+import { usePinch, ZOOM } from "./use-pinch";
+
+// What React Flow gets anew, it hands on to all that is drawn.
+const SNAP_GRID: [number, number] = [GRID, GRID];
+const OTHER_BUTTONS = [1, 2];
+const MORE_KEYS = ["Shift", "Meta", "Control"];
+const PLAIN = { hideAttribution: true };
+const MAP_SIZE = { width: 132, height: 92 };
+
+interface Props {
+  context: EditorContext;
+  canvas: ReturnType<typeof useCanvasElements>;
+  me: string;
+  /** There is room for a map. */
+  map: boolean;
+  /** The person has moved the view. */
+  onPanned: () => void;
+  /** Where the pointer rests, for those who want to know. */
+  pointer: RefObject<Position | null>;
+  /** The note whose text is being written. */
+  writing: string | null;
+}
+
+/** What to do next after an outcome was tapped. */
+function PendingHint({
+  context,
+  pending,
+  onCancel,
+}: {
+  context: EditorContext;
+  pending: Pending;
+  onCancel: () => void;
+}) {
+  return (
+    <div className={style.hint} role="status">
+      <span>
+        When {endName(context.graph, pending.key)} is{" "}
+        <b style={{ color: outcomeColor[pending.outcome] }}>
+          <OutcomeSign outcome={pending.outcome} /> {outcomeWord[pending.outcome]}
+        </b>
+        : tap what follows
+      </span>
+      <Button size="compact-xs" variant="subtle" onClick={onCancel}>
+        Cancel
+      </Button>
+    </div>
+  );
+}
+
+function mapColor(node: CanvasNode): string {
+  if (node.type === "note") {
+    const part = node.data.note.kind === "frame" ? 18 : 60;
+    return `color-mix(in srgb, ${noteColor[node.data.note.color]} ${part}%, transparent)`;
+  }
+  const robot = node.type === "action" ? node.data.action.actor : "";
+  return robot === "" ? "var(--line2)" : colorOfName(robot);
+}
+
+/** How notes are changed from the canvas itself. */
+function useNoteDesk(
+  context: EditorContext,
+  writing: string | null,
+  setResized: NoteEditing["resizing"],
+) {
+  const [only, ...others] = context.selection;
+  const alone = only !== undefined && others.length === 0 ? only : null;
+  const { doc, openOverlay: open, select, mayEdit } = context;
+  const change = useStableCallback<Parameters<NoteEditing["change"]>, void>((key, change) => {
+    changeNote(doc, key, change);
+  });
+  return useMemo<NoteEditing | null>(() => {
+    if (!mayEdit) return null;
+    return {
+      editing: writing,
+      alone,
+      edit: (key) => (key === null ? open(null) : open({ kind: "note", key })),
+      change,
+      resizing: setResized,
+      remove: (key) => {
+        removeNotes(doc, [key.slice(2)]);
+        select([]);
+      },
+    };
+  }, [doc, change, open, select, mayEdit, writing, alone, setResized]);
+}
+
+/** What hands do on the canvas: functions that stay the same, since each card and arrow has them. */
+function useHands(
+  { context, canvas, onPanned }: Pick<Props, "context" | "canvas" | "onPanned">,
+  connecting: ReturnType<typeof useConnecting>,
+) {
+  return {
+    onNodeDrag: useStableCallback(canvas.onDrag),
+    onNodeDragStop: useStableCallback(canvas.onDragStop),
+    onSelectionDrag: useStableCallback((event: MouseEvent, nodes: CanvasNode[]) => {
+      if (nodes[0]) canvas.onDrag(event, nodes[0], nodes);
+    }),
+    onSelectionDragStop: useStableCallback((event: MouseEvent, nodes: CanvasNode[]) => {
+      if (nodes[0]) canvas.onDragStop(event, nodes[0], nodes);
+    }),
+    onConnect: useStableCallback(({ source, target, sourceHandle }: Connection) =>
+      connecting.draw(source, target, outcomeOf(sourceHandle)),
+    ),
+    onConnectEnd: useStableCallback(connecting.onConnectEnd),
+    onReconnect: useStableCallback(connecting.onReconnect),
+    onReconnectStart: useStableCallback(connecting.onReconnectStart),
+    onReconnectEnd: useStableCallback(connecting.onReconnectEnd),
+    onEdgeClick: useStableCallback((event: MouseEvent, edge: Arrow) => {
+      const id = edge.data?.relation;
+      if (id) context.select(event.shiftKey ? [...context.selection, id] : [id]);
+    }),
+    onNodeClick: useStableCallback((event: MouseEvent) => {
+      if (connecting.onClick(event)) return;
+      const onNote = (event.target as Element).closest(".react-flow__node-note") !== null;
+      if (!onNote && context.tool === "pan") context.setPanel("details");
+    }),
+    onPaneClick: useStableCallback((event: MouseEvent) => {
+      if (!connecting.onClick(event)) context.select([]);
+    }),
+    // A move without an event is the page's own.
+    onMoveStart: useStableCallback((event: Event | null) => {
+      if (event !== null) onPanned();
+    }),
+  };
+}
+
+export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, writing }: Props) {
+  const { presence } = useRoom();
+  const { flow, setOver } = canvas;
+  const frame = useRef<HTMLDivElement>(null);
+  const store = useStoreApi();
+  // A finger has one button: it moves the view or draws a marquee.
+  const coarse = useMediaQuery("(pointer: coarse)") ?? false;
+
+  useEffect(
+    () =>
+      actionDrag.onDrop(({ payload: load, x, y }) => {
+        const box = frame.current?.getBoundingClientRect();
+        if (!box || x < box.left || x > box.right || y < box.top || y > box.bottom) return;
+        if (!context.mayEdit) return;
+        const at = flow.screenToFlowPosition({ x, y });
+        const position: Position = [Math.round(at.x - CARD.width / 2), Math.round(at.y - 24)];
+        const arrow = arrowAt([x, y]);
+        const key = asOneEdit(context.doc, () => {
+          const added = addActionAt(context, load, position);
+          if (arrow !== null) insertInto(context.doc, arrow, added);
+          return added;
+        });
+        context.select([key]);
+      }),
+    [flow, context],
+  );
+  // What is carried over an arrow goes into it.
+  useEffect(
+    () =>
+      actionDrag.subscribe(() => {
+        const draggedItem = actionDrag.now();
+        setOver(draggedItem ? arrowAt([draggedItem.x, draggedItem.y]) : null);
+      }),
+    [setOver],
+  );
+
+  const openAddAt = (screen: Position, from: Pending | null) => {
+    const at = flow.screenToFlowPosition({ x: screen[0], y: screen[1] });
+    context.openAdd({ screen, at: [Math.round(at.x), Math.round(at.y)], from });
+  };
+  const connecting = useConnecting(context, openAddAt);
+  const hands = useHands({ context, canvas, onPanned }, connecting);
+  const press = useContextMenu(context);
+  const pinch = usePinch(context, onPanned);
+  const desk = useNoteDesk(context, writing, canvas.setResized);
+  const onDoubleClick = (event: MouseEvent) => {
+    if (!(event.target as Element).classList.contains("react-flow__pane")) return;
+    openAddAt([event.clientX, event.clientY], null);
+  };
+
+  return (
+    // biome-ignore lint/a11y/noStaticElementInteractions: double click repeats what the key A does
+    <div
+      ref={frame}
+      className={style.frame}
+      onDoubleClick={onDoubleClick}
+      {...press}
+      onPointerDownCapture={(event) => {
+        press.onPointerDownCapture(event);
+        pinch.down(event);
+        // Under fingers there is no Shift: in the select mode each tap adds or takes away.
+        if (event.pointerType !== "mouse" && context.tool === "select")
+          store.setState({ multiSelectionActive: true });
+      }}
+      onPointerMoveCapture={(event) => {
+        press.onPointerMoveCapture(event);
+        pinch.move(event);
+      }}
+      onPointerUpCapture={(event) => {
+        press.onPointerUpCapture(event);
+        pinch.end(event);
+      }}
+      onPointerCancelCapture={(event) => {
+        press.onPointerCancelCapture(event);
+        pinch.end(event);
+      }}
+      onPointerMove={(event) => {
+        if (event.pointerType === "touch") return;
+        pointer.current = [event.clientX, event.clientY];
+        const at = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY });
+        presence.tell({ cursor: [Math.round(at.x), Math.round(at.y)] });
+      }}
+      onPointerLeave={() => {
+        pointer.current = null;
+        presence.tell({ cursor: undefined });
+      }}
+    >
+      <NoteEditingContext value={desk}>
+        <ReactFlow<CanvasNode, Arrow>
+          nodes={canvas.nodes}
+          edges={canvas.edges}
+          nodeTypes={nodeTypes}
+          edgeTypes={edgeTypes}
+          onNodesChange={canvas.onNodesChange}
+          onEdgesChange={canvas.onEdgesChange}
+          {...hands}
+          connectOnClick={false}
+          edgesReconnectable={context.mayEdit}
+          reconnectRadius={12}
+          nodesDraggable={context.mayEdit}
+          nodesConnectable={context.mayEdit}
+          snapToGrid={context.snap}
+          snapGrid={SNAP_GRID}
+          elevateNodesOnSelect={false}
+          selectionOnDrag={context.tool === "select"}
+          panOnDrag={context.tool === "pan" ? true : coarse ? false : OTHER_BUTTONS}
+          panOnScroll={false}
+          panOnScrollMode={PanOnScrollMode.Free}
+          selectionMode={SelectionMode.Partial}
+          connectionLineType={ConnectionLineType.Bezier}
+          connectionRadius={34}
+          zoomOnDoubleClick={false}
+          deleteKeyCode={null}
+          multiSelectionKeyCode={MORE_KEYS}
+          minZoom={ZOOM.least}
+          maxZoom={ZOOM.most}
+          onlyRenderVisibleElements={canvas.nodes.length > 150}
+          nodeDragThreshold={3}
+          proOptions={PLAIN}
+          aria-label="Canvas"
+        >
+          <ArrowTips />
+          <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
+          <Cursors me={me} />
+          <PeopleAtCards me={me} places={canvas.places} sizes={canvas.sizes} />
+          {map && (
+            <MiniMap<CanvasNode>
+              position="top-right"
+              pannable
+              zoomable
+              style={MAP_SIZE}
+              nodeBorderRadius={10}
+              nodeColor={mapColor}
+              ariaLabel="Map of the canvas"
+            />
+          )}
+        </ReactFlow>
+      </NoteEditingContext>
+      {connecting.pending && (
+        <PendingHint
+          context={context}
+          pending={connecting.pending}
+          onCancel={() => connecting.setPending(null)}
+        />
+      )}
+    </div>
+  );
+}

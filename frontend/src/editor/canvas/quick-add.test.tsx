@@ -1,0 +1,72 @@
+// @vitest-environment jsdom
+import { MantineProvider } from "@mantine/core";
+import { act } from "react";
+import { createRoot, type Root } from "react-dom/client";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import * as Y from "yjs";
+import type { EditorContext } from "../../edit-actions/editor-context";
+import { graphNow } from "../../graph/edit/document-writes";
+import { EMPTY_GRAPH } from "../../graph/model";
+import { QuickAdd } from "./quick-add";
+
+vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
+vi.stubGlobal("matchMedia", () => ({
+  matches: false,
+  addEventListener: () => {},
+  removeEventListener: () => {},
+}));
+
+let root: Root;
+let doc: Y.Doc;
+
+beforeEach(() => {
+  doc = new Y.Doc();
+  const context = {
+    doc,
+    graph: EMPTY_GRAPH,
+    positions: () => new Map(),
+    select: () => {},
+    view: { reveal: () => {}, focus: () => {} },
+  } as unknown as EditorContext;
+  root = createRoot(document.body.appendChild(document.createElement("div")));
+  act(() =>
+    root.render(
+      <MantineProvider>
+        <QuickAdd
+          context={context}
+          request={{ screen: [0, 0], at: [0, 0], from: null }}
+          known={[{ name: "Drive" }, { name: "Look" }, { name: "Say" }]}
+          onClose={() => {}}
+        />
+      </MantineProvider>,
+    ),
+  );
+});
+
+afterEach(() => {
+  act(() => root.unmount());
+  document.body.replaceChildren();
+});
+
+function found<T extends Element>(selector: string): T {
+  const element = document.querySelector<T>(selector);
+  if (!element) throw new Error(`no ${selector}`);
+  return element;
+}
+
+const fire = (on: Element, event: Event) => act(() => void on.dispatchEvent(event));
+const enter = () =>
+  fire(found("input"), new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+const names = () => graphNow(doc).actions.map(({ name }) => name);
+
+test("Enter takes what the keys chose, also when the list opens under a pointer at rest", () => {
+  fire(found("[role=option]:last-child"), new Event("pointerover", { bubbles: true }));
+  enter();
+  expect(names()).toEqual(["Drive"]);
+});
+
+test("a pointer that moves over the list chooses", () => {
+  fire(found("[role=option]:last-child"), new Event("pointermove", { bubbles: true }));
+  enter();
+  expect(names()).toEqual(["Say"]);
+});

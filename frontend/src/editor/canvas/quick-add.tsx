@@ -1,0 +1,154 @@
+/** Search at the cursor: type a name, Enter places the action, tied to the outcome it came from. */
+import { Kbd, TextInput } from "@mantine/core";
+import { IconPlus, IconSearch } from "@tabler/icons-react";
+import { useEffect, useId, useMemo, useRef, useState } from "react";
+import { CARD } from "../../canvas/geometry/arrange";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
+import {
+  type AddRequest,
+  addActionAt,
+  type EditorContext,
+} from "../../edit-actions/editor-context";
+import { asOneEdit, connect, insertInto, type NewAction } from "../../graph/edit";
+import type { Position } from "../../graph/model";
+import { endName } from "../../graph/relation-words";
+import style from "./quick-add.module.css";
+
+interface Props {
+  context: EditorContext;
+  request: AddRequest;
+  known: readonly NewAction[];
+  onClose: () => void;
+}
+
+const MOST = 8;
+
+/** Known actions that fit, best first, and a new one of that name when none has it. */
+export function candidates(known: readonly NewAction[], search: string): NewAction[] {
+  const wanted = search.trim().toLowerCase();
+  const rank = (name: string) => {
+    const lower = name.toLowerCase();
+    return lower.startsWith(wanted) ? 0 : lower.includes(wanted) ? 1 : 2;
+  };
+  const fitting = known
+    .map((action) => ({ action, rank: rank(action.name) }))
+    .filter(({ action, rank: r }) => r < 2 || action.description?.toLowerCase().includes(wanted))
+    .sort((a, b) => a.rank - b.rank || a.action.name.localeCompare(b.action.name))
+    .slice(0, MOST);
+  const exact = fitting.some(({ action }) => action.name.toLowerCase() === wanted);
+  const fresh = wanted === "" || exact ? [] : [{ name: search.trim() }];
+  // What is only described so comes after what was typed.
+  const named = fitting.filter(({ rank: r }) => r < 2).map(({ action }) => action);
+  const described = fitting.filter(({ rank: r }) => r === 2).map(({ action }) => action);
+  return [...named, ...fresh, ...described];
+}
+
+function placed(context: EditorContext, request: AddRequest, template: NewAction): string {
+  const [x, y] = request.at;
+  const position: Position = [x - Math.round(CARD.width / 2), y];
+  return asOneEdit(context.doc, () => {
+    const key = addActionAt(context, template, position);
+    if (request.from) connect(context.doc, request.from.key, key, request.from.outcome);
+    if (request.into) insertInto(context.doc, request.into, key);
+    return key;
+  });
+}
+
+export function QuickAdd({ context, request, known, onClose }: Props) {
+  const [search, setSearch] = useState("");
+  const [at, setAt] = useState(0);
+  const list = useMemo(() => candidates(known, search), [known, search]);
+  const box = useRef<HTMLDivElement>(null);
+  const id = useId();
+  useEffect(() => {
+    const onDown = (event: PointerEvent) => {
+      if (!box.current?.contains(event.target as Node)) onClose();
+    };
+    window.addEventListener("pointerdown", onDown);
+    return () => window.removeEventListener("pointerdown", onDown);
+  }, [onClose]);
+
+  const choose = (template: NewAction | undefined, byKey = false) => {
+    if (!template) return;
+    const key = placed(context, request, template);
+    context.select([key]);
+    if (byKey) context.view.focus(key);
+    context.view.reveal([request.at[0] - CARD.width / 2, request.at[1]]);
+    onClose();
+  };
+  const onKeyDown = (event: React.KeyboardEvent) => {
+    if (event.key === "Escape") onClose();
+    else if (event.key === "Enter") choose(list[at], true);
+    else if (event.key === "ArrowDown") setAt((i) => Math.min(i + 1, list.length - 1));
+    else if (event.key === "ArrowUp") setAt((i) => Math.max(i - 1, 0));
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  const left = Math.max(8, Math.min(request.screen[0] - 20, window.innerWidth - 308));
+  const top = Math.max(8, Math.min(request.screen[1] - 12, window.innerHeight - 380));
+  const { from } = request;
+  return (
+    <div
+      ref={box}
+      className={style.box}
+      style={{ left, top }}
+      role="dialog"
+      aria-label="Add an action"
+    >
+      {from && (
+        <p className={style.from}>
+          when {endName(context.graph, from.key)} is{" "}
+          <span style={{ color: outcomeColor[from.outcome] }}>
+            <OutcomeSign outcome={from.outcome} /> {outcomeWord[from.outcome]}
+          </span>
+          , run
+        </p>
+      )}
+      <TextInput
+        autoFocus
+        placeholder="Name of an action"
+        leftSection={<IconSearch size={15} aria-hidden />}
+        value={search}
+        onChange={(event) => {
+          setSearch(event.currentTarget.value);
+          setAt(0);
+        }}
+        onKeyDown={onKeyDown}
+        role="combobox"
+        aria-expanded="true"
+        aria-controls={id}
+        aria-activedescendant={`${id}-${at}`}
+        aria-label="Name of an action"
+      />
+      <div id={id} role="listbox" className={style.list} aria-label="Actions">
+        {list.map((template, i) => {
+          const isNew = !known.includes(template);
+          return (
+            // biome-ignore lint/a11y/useKeyWithClickEvents: keys are handled by the search field
+            // biome-ignore lint/a11y/useFocusableInteractive: focus stays in the search field
+            <div
+              key={template.name}
+              id={`${id}-${i}`}
+              role="option"
+              aria-selected={i === at}
+              className={style.item}
+              onPointerMove={() => setAt(i)}
+              onClick={() => choose(template)}
+            >
+              <span className={style.name}>
+                {isNew && <IconPlus size={13} aria-hidden />}
+                {isNew ? `New action “${template.name}”` : template.name}
+              </span>
+              {template.description && <span className={style.sub}>{template.description}</span>}
+            </div>
+          );
+        })}
+        {list.length === 0 && <p className={style.none}>Type the name of the action.</p>}
+      </div>
+      <p className={style.help}>
+        <Kbd>↑</Kbd> <Kbd>↓</Kbd> choose · <Kbd>Enter</Kbd> place · <Kbd>Esc</Kbd> close
+      </p>
+    </div>
+  );
+}

@@ -1,0 +1,269 @@
+/** The graph as what the canvas draws: places, drags of oneself and of others, sizes, selection. */
+import {
+  type EdgeChange,
+  type NodeChange,
+  type ReactFlowInstance,
+  useReactFlow,
+  useStoreApi,
+} from "@xyflow/react";
+import {
+  type MouseEvent as ReactMouseEvent,
+  useCallback,
+  useEffect,
+  useMemo,
+  useRef,
+  useState,
+} from "react";
+import {
+  type Arrow,
+  type CanvasNode,
+  type CardSurroundings,
+  edgesOf,
+  keepEqual,
+  nodesOf,
+  surroundingsOf,
+} from "../../canvas/elements";
+import { type Positions, positionsOf, unplaced } from "../../canvas/geometry/arrange";
+import { notePlaces } from "../../canvas/note-nodes";
+import type { ProblemMarks } from "../../canvas/problem-marks";
+import { asOneEdit, insertInto, moveActions } from "../../graph/edit";
+import { type Note, notesOf, placeNotes, withContents } from "../../graph/edit/notes";
+import type { Graph, Key, Position } from "../../graph/model";
+import type { Progress } from "../../status/progress";
+import type { Participant } from "../../sync/presence/presence";
+import { usePeople, useRoom } from "../../sync/use-room";
+import { distinctColors } from "../../ui/name-colors";
+import { arrowAt, pointOf } from "./hit-test";
+
+export interface MeasuredSize {
+  readonly width: number;
+  readonly height: number;
+}
+
+/** What was drawn last: what is the same again keeps its identity. */
+interface Drawn {
+  readonly nodes: CanvasNode[];
+  readonly edges: Arrow[];
+  readonly around: CardSurroundings | null;
+}
+
+interface CanvasElementsInput {
+  me: string;
+  graph: Graph;
+  selection: ReadonlySet<string>;
+  select: (ids: Iterable<string>) => void;
+  progress: ReadonlyMap<Key, Progress>;
+  marks: ProblemMarks;
+}
+
+/** Where everything stands while people drag it. */
+export function dragged(
+  places: Positions,
+  people: readonly Participant[],
+  own: Positions | null,
+): Positions {
+  const drags = people.flatMap((person) => person.presence.drag ?? []);
+  if (drags.length === 0 && own === null) return places;
+  const moved: Positions = new Map(places);
+  for (const { ids, dx, dy } of drags) {
+    for (const id of ids) {
+      const at = places.get(id);
+      if (at) moved.set(id, [at[0] + dx, at[1] + dy]);
+    }
+  }
+  for (const [key, at] of own ?? []) moved.set(key, at);
+  return moved;
+}
+
+const round = (n: number) => Math.round(n);
+
+/** The selection after React Flow's changes. Arrows of one relation are selected together. */
+export function selectionAfter(
+  before: ReadonlySet<string>,
+  changes: readonly (NodeChange | EdgeChange)[],
+): ReadonlySet<string> {
+  const next = new Set(before);
+  const chosen: string[] = [];
+  for (const change of changes) {
+    if (change.type !== "select") continue;
+    const id = change.id.split("|")[0] ?? change.id;
+    if (change.selected) chosen.push(id);
+    else next.delete(id);
+  }
+  for (const id of chosen) next.add(id);
+  const same = next.size === before.size && [...next].every((id) => before.has(id));
+  return same ? before : next;
+}
+
+export function useCanvasElements({
+  me,
+  graph,
+  selection,
+  select,
+  progress,
+  marks,
+}: CanvasElementsInput) {
+  const { doc, presence } = useRoom();
+  const people = usePeople();
+  const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
+  const store = useStoreApi();
+  const [sizes, setSizes] = useState<ReadonlyMap<Key, MeasuredSize>>(new Map());
+  const [drag, setDrag] = useState<Positions | null>(null);
+  const [resized, setResized] = useState<Note | null>(null);
+  const [over, setOver] = useState<string | null>(null);
+  const rest = useMemo(
+    () => new Map([...positionsOf(graph, sizes), ...notePlaces(graph)]),
+    [graph, sizes],
+  );
+  const places = useMemo(() => dragged(rest, people, drag), [rest, people, drag]);
+  const chosen = useRef(selection);
+  chosen.current = selection;
+
+  const drawn = useRef<Drawn>({ nodes: [], edges: [], around: null });
+  const others = useMemo(() => {
+    const colors = distinctColors([me, ...people.map((person) => person.id)]);
+    return new Map(
+      people.flatMap((person) =>
+        person.presence.selection.map((key) => [key, colors.get(person.id) ?? ""] as const),
+      ),
+    );
+  }, [me, people]);
+  // The arrow that would take in what is dragged looks as if it were chosen.
+  const selected = useMemo(
+    () => (over === null ? selection : new Set([...selection, over])),
+    [selection, over],
+  );
+  const options = useMemo(
+    () => ({ others, places, selected, progress, marks, measured: sizes, resized }),
+    [others, places, selected, progress, marks, sizes, resized],
+  );
+  const nodes = useMemo(() => {
+    const before = drawn.current.nodes;
+    return keepEqual(before, nodesOf(graph, options, before));
+  }, [graph, options]);
+  const around = useMemo(
+    () => surroundingsOf(graph, options, drawn.current.around),
+    [graph, options],
+  );
+  const { relations } = graph;
+  const edges = useMemo(
+    () =>
+      keepEqual(drawn.current.edges, edgesOf({ relations }, { selected, progress, marks }, around)),
+    [relations, selected, progress, marks, around],
+  );
+  useEffect(() => {
+    drawn.current = { nodes, edges, around };
+  }, [nodes, edges, around]);
+
+  const now = useRef({ graph, rest, sizes });
+  now.current = { graph, rest, sizes };
+  // Drawing a marquee within a frame is about what lies in it.
+  const isNoFrame = useCallback((change: NodeChange<CanvasNode>) => {
+    if (change.type !== "select" || !change.selected) return true;
+    const note = notesOf(now.current.graph).find(({ key }) => key === change.id);
+    return note?.kind !== "frame";
+  }, []);
+  const onNodesChange = useCallback(
+    (all: NodeChange<CanvasNode>[]) => {
+      const changes = store.getState().userSelectionActive ? all.filter(isNoFrame) : all;
+      const sized = changes.filter((change) => change.type === "dimensions");
+      if (sized.length > 0) {
+        setSizes((before) => {
+          const next = new Map(before);
+          for (const { id, dimensions } of sized) if (dimensions) next.set(id, dimensions);
+          return next;
+        });
+      }
+      const moves = changes.filter((change) => change.type === "position" && change.dragging);
+      if (moves.length > 0) {
+        const { graph, rest, sizes } = now.current;
+        setDrag((before) => {
+          const next: Positions = new Map(before);
+          for (const move of moves) {
+            if (move.type !== "position" || !move.position) continue;
+            next.set(move.id, [round(move.position.x), round(move.position.y)]);
+          }
+          const own = new Map(
+            moves.flatMap((move): [string, Position][] => {
+              const at = move.type === "position" ? next.get(move.id) : undefined;
+              return move.type === "position" && at ? [[move.id, at]] : [];
+            }),
+          );
+          for (const [key, at] of withContents(graph, own, rest, sizes)) next.set(key, at);
+          return next;
+        });
+      }
+      const after = selectionAfter(chosen.current, changes);
+      if (after !== chosen.current) {
+        chosen.current = after;
+        select(after);
+      }
+    },
+    [select, store, isNoFrame],
+  );
+
+  const onEdgesChange = useCallback(
+    (changes: EdgeChange<Arrow>[]) => {
+      const after = selectionAfter(chosen.current, changes);
+      if (after !== chosen.current) {
+        chosen.current = after;
+        select(after);
+      }
+    },
+    [select],
+  );
+
+  const begun = useRef<Position | null>(null);
+  const onDrag = (
+    event: MouseEvent | TouchEvent | ReactMouseEvent,
+    node: CanvasNode,
+    all: CanvasNode[],
+  ) => {
+    const at: Position = [node.position.x, node.position.y];
+    begun.current ??= rest.get(node.id) ?? at;
+    const [dx, dy] = [round(at[0] - begun.current[0]), round(at[1] - begun.current[1])];
+    const moved = new Map(all.map(({ id, position: { x, y } }) => [id, [x, y] as const]));
+    const ids = [...withContents(graph, moved, rest, sizes).keys()];
+    presence.tell({ drag: { ids, dx, dy } });
+    setOver(insertable(graph, all) ? arrowAt(pointOf(event)) : null);
+  };
+  const onDragStop = (_: unknown, __: CanvasNode, all: CanvasNode[]) => {
+    const moved = new Map(
+      all.map((node) => [node.id, [round(node.position.x), round(node.position.y)]] as const),
+    );
+    if (begun.current !== null) {
+      const dropped = withContents(graph, moved, rest, sizes);
+      asOneEdit(doc, () => {
+        moveActions(doc, new Map([...unplaced(graph, rest), ...dropped]));
+        placeNotes(doc, graph, dropped);
+        const [only] = all;
+        if (over !== null && only) insertInto(doc, over, only.id);
+      });
+    }
+    begun.current = null;
+    setDrag(null);
+    setOver(null);
+    presence.tell({ drag: undefined });
+  };
+
+  return {
+    flow,
+    nodes,
+    edges,
+    places,
+    sizes,
+    setResized,
+    setOver,
+    onNodesChange,
+    onEdgesChange,
+    onDrag,
+    onDragStop,
+  };
+}
+
+/** One action that nothing leads to or from can be dropped into an arrow. */
+function insertable(graph: Graph, dragged: readonly CanvasNode[]): boolean {
+  const [only, ...others] = dragged;
+  if (only?.type !== "action" || others.length > 0) return false;
+  return !graph.relations.some(({ parent, child }) => parent === only.id || child === only.id);
+}

@@ -1,0 +1,129 @@
+/** Drawing arrows by hand: drag from an outcome, tap an outcome and then what follows, lead elsewhere. */
+import type { Connection, FinalConnectionState, OnConnectEnd } from "@xyflow/react";
+import { type MouseEvent, useCallback, useEffect, useRef, useState } from "react";
+import type { Arrow } from "../../canvas/elements";
+import type { EditorContext } from "../../edit-actions/editor-context";
+import { connect, moveRelation, retarget } from "../../graph/edit";
+import type { Key, Position, Precondition } from "../../graph/model";
+import { ENTRY } from "../../graph/model";
+import { nodeAt, pointOf } from "./hit-test";
+
+export interface Pending {
+  readonly key: Key;
+  readonly outcome: Precondition;
+}
+
+export function outcomeOf(handle: string | null | undefined): Precondition {
+  return handle === "on_false" || handle === "on_error" || handle === "on_stopped"
+    ? handle
+    : "on_true";
+}
+
+/** The outcome whose mark was hit; null when it was something else. */
+function outcomeHit(target: EventTarget): Pending | null {
+  if (!(target instanceof Element)) return null;
+  const handle = target.closest<HTMLElement>(".react-flow__handle.source");
+  const key = handle?.dataset.nodeid;
+  return handle && key !== undefined ? { key, outcome: outcomeOf(handle.dataset.handleid) } : null;
+}
+
+type AddAt = (screen: Position, from: Pending | null) => void;
+
+export function useConnecting(context: EditorContext, openAddAt: AddAt) {
+  const { doc, select, mayEdit } = context;
+  const [pending, setPending] = useState<Pending | null>(null);
+  const draw = useCallback(
+    (parent: Key, child: Key, outcome: Precondition) => {
+      setPending(null); // an outcome that was tapped before has been thought better of
+      const relation = mayEdit ? connect(doc, parent, child, outcome) : null;
+      if (relation !== null) select([relation]);
+    },
+    [doc, select, mayEdit],
+  );
+  useEffect(() => {
+    if (pending === null) return;
+    const onKey = (event: KeyboardEvent) => {
+      if (event.key === "Escape") setPending(null);
+    };
+    window.addEventListener("keydown", onKey, { capture: true });
+    return () => window.removeEventListener("keydown", onKey, { capture: true });
+  }, [pending]);
+
+  // An end that is led elsewhere is told as a connection too, which must not draw a second arrow.
+  const leading = useRef(false);
+  const onConnectEnd: OnConnectEnd = (event, state) => {
+    if (leading.current) return;
+    const from = state.fromHandle;
+    if (state.isValid || !from || from.type !== "source") return;
+    const point = pointOf(event);
+    const outcome = outcomeOf(from.id);
+    const target = nodeAt(point);
+    if (target === null) {
+      setPending(null);
+      openAddAt(point, { key: from.nodeId, outcome });
+    } else if (target !== from.nodeId) draw(from.nodeId, target, outcome);
+  };
+
+  /** Whether the click was about an arrow, and nothing else shall come of it. */
+  const onClick = (event: MouseEvent): boolean => {
+    if (!mayEdit) return false;
+    const hit = outcomeHit(event.target);
+    const point: Position = [event.clientX, event.clientY];
+    const card = nodeAt(point);
+    if (pending !== null) {
+      setPending(null);
+      if (hit && hit.key === pending.key && hit.outcome === pending.outcome) return true;
+      if (card === null) openAddAt(point, pending);
+      else draw(pending.key, card, pending.outcome);
+      return true;
+    }
+    if (hit === null) return false;
+    setPending(hit);
+    return true;
+  };
+
+  // The arrows of one relation end together and are led together; they begin each for itself.
+  const lead = ({ data }: Arrow, to: Parameters<typeof retarget>[3]) => {
+    if (!data || !mayEdit) return;
+    const whole = to.child === undefined ? null : moveRelation(doc, data.relation, to);
+    const moved = whole ?? retarget(doc, data.relation, data.outcome, to);
+    if (moved !== null) select([moved]);
+  };
+  /** Dropped on the mark of an outcome, or on an input. */
+  const onReconnect = (edge: Arrow, to: Connection) =>
+    lead(
+      edge,
+      to.target === edge.target
+        ? {
+            ...(to.source === edge.source ? {} : { parent: to.source }),
+            ...(to.source === ENTRY ? {} : { outcome: outcomeOf(to.sourceHandle) }),
+          }
+        : { child: to.target },
+    );
+  const onReconnectStart = () => {
+    leading.current = true;
+  };
+  /** Dropped anywhere else: on a card it means that card, on nothing the arrow stays. */
+  const onReconnectEnd = (
+    event: globalThis.MouseEvent | TouchEvent,
+    edge: Arrow,
+    fixed: "source" | "target",
+    state: FinalConnectionState,
+  ) => {
+    leading.current = false;
+    const card = state.isValid ? null : nodeAt(pointOf(event));
+    if (card === null || card === edge.source || card === edge.target) return;
+    lead(edge, fixed === "source" ? { child: card } : { parent: card });
+  };
+
+  return {
+    pending,
+    setPending,
+    draw,
+    onConnectEnd,
+    onClick,
+    onReconnect,
+    onReconnectStart,
+    onReconnectEnd,
+  };
+}

@@ -1,0 +1,78 @@
+/** Menus where one presses: the right button of a mouse, or a finger that rests. */
+import { type PointerEvent, useEffect, useMemo, useRef } from "react";
+import type { EditorContext } from "../../edit-actions/editor-context";
+import type { Position } from "../../graph/model";
+import { arrowAt, nodeAt } from "./hit-test";
+
+const REST = 500; // ms
+const STILL = 8; // px that a resting finger may move
+
+/** Opens the menu for what lies under a point, which becomes the selection if it is not in it. */
+export function openMenuAt(context: EditorContext, screen: Position): void {
+  const target = nodeAt(screen) ?? arrowAt(screen);
+  if (target === null) context.select([]);
+  else if (!context.selection.has(target)) context.select([target]);
+  context.openOverlay({ kind: "menu", screen });
+}
+
+export function useContextMenu(context: EditorContext) {
+  const now = useRef(context);
+  now.current = context;
+  const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
+  const start = useRef<Position>([0, 0]);
+  const fingers = useRef(new Set<number>());
+  useEffect(() => () => clearTimeout(timer.current), []);
+  return useMemo(() => {
+    const end = (event: PointerEvent) => {
+      fingers.current.delete(event.pointerId);
+      clearTimeout(timer.current);
+    };
+    return {
+      onPointerDownCapture(event: PointerEvent) {
+        start.current = [event.clientX, event.clientY];
+        if (event.pointerType === "mouse") return;
+        fingers.current.add(event.pointerId);
+        clearTimeout(timer.current);
+        const onText = (event.target as Element).closest("textarea, input, button") !== null;
+        if (fingers.current.size > 1 || onText) return;
+        timer.current = setTimeout(() => {
+          swallowClick();
+          openMenuAt(now.current, start.current);
+        }, REST);
+      },
+      onPointerMoveCapture(event: PointerEvent) {
+        const [x, y] = start.current;
+        if (Math.hypot(event.clientX - x, event.clientY - y) > STILL) clearTimeout(timer.current);
+      },
+      onPointerUpCapture: end,
+      onPointerCancelCapture: end,
+      onContextMenu(event: React.MouseEvent) {
+        event.preventDefault();
+        // A finger has its own way, and dragging with the right button moves the view.
+        const touch =
+          "pointerType" in event.nativeEvent && event.nativeEvent.pointerType === "touch";
+        const [x, y] = start.current;
+        const dragged = Math.hypot(event.clientX - x, event.clientY - y) > STILL;
+        if (!touch && !dragged) openMenuAt(now.current, [event.clientX, event.clientY]);
+      },
+    };
+  }, []);
+}
+
+/** What a finger leaves behind when the menu is open already: its tap would close the menu. */
+function swallowClick(): void {
+  const kinds = ["mousedown", "mouseup", "click"] as const;
+  const swallow = (event: Event) => {
+    event.stopPropagation();
+    event.preventDefault();
+  };
+  const lift = (event: Event) => {
+    if (event.cancelable) event.preventDefault();
+    setTimeout(() => {
+      for (const kind of kinds) window.removeEventListener(kind, swallow, { capture: true });
+    }, 40);
+  };
+  for (const kind of kinds) window.addEventListener(kind, swallow, { capture: true });
+  window.addEventListener("touchend", lift, { capture: true, passive: false, once: true });
+  window.addEventListener("touchcancel", lift, { capture: true, once: true });
+}

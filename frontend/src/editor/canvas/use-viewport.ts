@@ -1,0 +1,203 @@
+/** The view of the canvas: what is seen at first, what Fit shows, and how it follows a run. */
+import type { ReactFlowInstance } from "@xyflow/react";
+import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
+import type { Arrow, CanvasNode } from "../../canvas/elements";
+import { CARD, type Positions, type Sizes } from "../../canvas/geometry/arrange";
+import {
+  boundsOf,
+  fitsAt,
+  isSameViewport,
+  READABLE,
+  readableViewport,
+  type Viewport,
+  viewportShowing,
+  wholeViewport,
+} from "../../canvas/geometry/viewport";
+import type { CanvasView } from "../../edit-actions/editor-context";
+import { ENTRY, type Key, type Position } from "../../graph/model";
+import type { Progress } from "../../status/progress";
+
+interface ViewportInput {
+  flow: ReactFlowInstance<CanvasNode, Arrow>;
+  frame: RefObject<HTMLDivElement | null>;
+  places: Positions;
+  sizes: Sizes;
+  phone: boolean;
+  /** The graph has been heard of and has something to show. */
+  begun: boolean;
+  progress: ReadonlyMap<Key, Progress>;
+  /** The run that goes, if one does. */
+  run: string | null;
+  /** Where the pointer rests over the canvas, on screen. */
+  pointer: RefObject<Position | null>;
+}
+
+/** How long the view glides, ms; not at all for people who want no motion. */
+function glide(ms: number): number {
+  return window.matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : ms;
+}
+
+/** Where people write or decide. */
+const BUSY = "input, textarea, select, [contenteditable=true], [role=dialog] *";
+
+/** Focuses a card, which may be drawn some frames later only; not once the person is busy elsewhere. */
+export function focusCard(room: HTMLElement, key: Key, tries: number): void {
+  const before = document.activeElement;
+  const look = (left: number) => {
+    // What has the focus from before may be about to close: the search that the card came from.
+    const now = document.activeElement;
+    if (now !== before && now?.matches(BUSY)) return;
+    const card = room.querySelector<HTMLElement>(`.react-flow__node[data-id="${CSS.escape(key)}"]`);
+    if (card !== null) card.focus({ preventScroll: true });
+    else if (left > 0) requestAnimationFrame(() => look(left - 1));
+  };
+  look(tries);
+}
+
+/** The actions that run, the latest first. */
+export function running(progress: ReadonlyMap<Key, Progress>): Key[] {
+  return [...progress]
+    .filter(([, { tone, since }]) => tone === "run" && since !== null)
+    .sort(([, a], [, b]) => (b.since ?? 0) - (a.since ?? 0))
+    .map(([key]) => key);
+}
+
+export function useViewport(given: ViewportInput) {
+  const { flow, frame, places, sizes, phone, begun, progress, run, pointer } = given;
+  const now = useRef({ places, sizes });
+  now.current = { places, sizes };
+  const least = phone ? READABLE.phone : READABLE.desktop;
+
+  // What was fitted stays fitted while the canvas changes its size, until somebody moves the view.
+  const fitted = useRef<Viewport | null>(null);
+  const showAll = useCallback(
+    (duration: number) => {
+      const [box, room] = [boundsOf(now.current.places, now.current.sizes), frame.current];
+      if (box === null || room === null) return;
+      const size = { width: room.clientWidth, height: room.clientHeight };
+      const [x] = now.current.places.get(ENTRY) ?? [box.x + (box.width - CARD.width) / 2];
+      const first = readableViewport(box, size, x + CARD.width / 2, least);
+      // Pressed once more, it shows the rest too.
+      const again = duration > 0 && isSameViewport(first, flow.getViewport());
+      const next = again ? wholeViewport(box, size) : first;
+      fitted.current = again ? null : next;
+      void flow.setViewport(next, { duration: glide(duration) });
+    },
+    [flow, frame, least],
+  );
+
+  // The graph arrives after the canvas, and its sizes after that.
+  const opened = useRef(false);
+  useEffect(() => {
+    if (!begun || opened.current) return;
+    const timer = setTimeout(() => {
+      opened.current = true;
+      showAll(0);
+    }, 60);
+    return () => clearTimeout(timer);
+  }, [begun, showAll]);
+
+  useEffect(() => {
+    const room = frame.current;
+    if (room === null) return;
+    const watch = new ResizeObserver(() => {
+      if (fitted.current && isSameViewport(fitted.current, flow.getViewport())) showAll(0);
+    });
+    watch.observe(room);
+    return () => watch.disconnect();
+  }, [flow, frame, showAll]);
+
+  const show = useCallback(
+    (keys: readonly Key[], goal: "near" | "middle" | "whole") => {
+      const some: Positions = new Map();
+      for (const key of keys) {
+        const at = now.current.places.get(key);
+        if (at) some.set(key, at);
+      }
+      const [box, room] = [boundsOf(some, now.current.sizes), frame.current];
+      if (box === null || room === null) return;
+      const size = { width: room.clientWidth, height: room.clientHeight };
+      const here: Viewport = flow.getViewport();
+      if (goal === "whole") {
+        void flow.setViewport(wholeViewport(box, size), { duration: glide(250) });
+        return;
+      }
+      const zoom = goal === "middle" ? Math.max(here.zoom, least) : here.zoom;
+      const next = fitsAt(box, size, zoom)
+        ? (viewportShowing(box, size, { ...here, zoom }) ??
+          (zoom === here.zoom ? null : { ...here, zoom }))
+        : goal === "middle"
+          ? wholeViewport(box, size)
+          : null;
+      if (next !== null) void flow.setViewport(next, { duration: glide(250) });
+    },
+    [flow, frame, least],
+  );
+
+  const view = useMemo<CanvasView>(
+    () => ({
+      fit: () => showAll(200),
+      zoomIn: () => void flow.zoomIn({ duration: glide(120) }),
+      zoomOut: () => void flow.zoomOut({ duration: glide(120) }),
+      show: (keys, goal = "middle") => show(keys, goal),
+      reveal: ([x, y]) => {
+        const room = frame.current;
+        if (room === null) return;
+        const size = { width: room.clientWidth, height: room.clientHeight };
+        const next = viewportShowing({ x, y, ...CARD }, size, flow.getViewport());
+        if (next !== null) void flow.setViewport(next, { duration: glide(200) });
+      },
+      middle: (): Position => {
+        const box = frame.current?.getBoundingClientRect();
+        const [x, y] = box ? [box.left + box.width / 2, box.top + box.height / 3] : [0, 0];
+        const at = flow.screenToFlowPosition({ x, y });
+        return [Math.round(at.x), Math.round(at.y)];
+      },
+      screenOf: ([x, y]): Position => {
+        const at = flow.flowToScreenPosition({ x, y });
+        return [at.x, at.y];
+      },
+      pointer: () => {
+        const screen = pointer.current;
+        if (screen === null) return null;
+        const at = flow.screenToFlowPosition({ x: screen[0], y: screen[1] });
+        return { screen, at: [Math.round(at.x), Math.round(at.y)] };
+      },
+      focus: (key) => {
+        const room = frame.current;
+        if (room !== null) focusCard(room, key, 12);
+      },
+    }),
+    [showAll, show, flow, frame, pointer],
+  );
+
+  const follow = useFollow({ run, progress, show });
+  return { view, ...follow };
+}
+
+interface Followed {
+  run: string | null;
+  progress: ReadonlyMap<Key, Progress>;
+  show: (keys: readonly Key[], goal: "near") => void;
+}
+
+/** Brings what runs into view until the person moves the view; each run begins anew. */
+function useFollow({ run, progress, show }: Followed) {
+  const [left, setLeft] = useState<string | null>(null);
+  const lost = run !== null && left === run;
+  const going = running(progress);
+  const key = going.join(" ");
+  // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
+  useEffect(() => {
+    if (run === null || lost || going.length === 0) return;
+    // All of them if they fit together at this zoom; else at least the one that began last.
+    show(going.slice(0, 1), "near");
+    show(going, "near");
+  }, [run, lost, key]);
+  return {
+    /** A run goes, and the view no longer follows it. */
+    lost,
+    onPanned: useCallback(() => setLeft(run), [run]),
+    onFollow: useCallback(() => setLeft(null), []),
+  };
+}

@@ -1,0 +1,266 @@
+/** The bar of a dry-run: where one is, what happens, how it shall go on. */
+import { ActionIcon, Button, Menu, Select, Tooltip } from "@mantine/core";
+import {
+  IconBolt,
+  IconPlayerPauseFilled,
+  IconPlayerPlayFilled,
+  IconPlayerSkipBack,
+  IconPlayerTrackNext,
+  IconPlayerTrackPrev,
+  IconX,
+} from "@tabler/icons-react";
+import type { ReactNode } from "react";
+import { errorText } from "../api/http";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
+import type { RunningAction } from "../dry-run/playback";
+import { type DecidedFaultKind, faultWords } from "../dry-run/script";
+import { DRY_RUN_SPEEDS, type DryRun } from "../dry-run/use-dry-run";
+import * as editActions from "../edit-actions/dry-run-actions";
+import type { EditAction } from "../edit-actions/edit-action";
+import { labelOf } from "../edit-actions/edit-action";
+import { type EditorContext, selectedActions } from "../edit-actions/editor-context";
+import { FirstShortcut } from "../edit-actions/shortcut-keys";
+import { fullName } from "../graph/model";
+import { endName } from "../graph/relation-words";
+import style from "./dry-run-bar.module.css";
+
+const CHOICES = ["on_true", "on_false", "on_error"] as const;
+
+function Step({
+  context,
+  editAction,
+  children,
+}: {
+  context: EditorContext;
+  editAction: EditAction;
+  children?: ReactNode;
+}) {
+  const Sign = editAction.icon;
+  return (
+    <Tooltip
+      label={
+        <>
+          {labelOf(editAction, context)} <FirstShortcut editAction={editAction} />
+        </>
+      }
+    >
+      <ActionIcon
+        size={34}
+        aria-label={editAction.label}
+        disabled={!editAction.enabled(context)}
+        onClick={() => editAction.run(context)}
+      >
+        {children ?? <Sign size={17} aria-hidden />}
+      </ActionIcon>
+    </Tooltip>
+  );
+}
+
+function time(ms: number): string {
+  const seconds = ms / 1000;
+  if (seconds < 100) return `${seconds.toFixed(1)} s`;
+  const minutes = Math.floor(seconds / 60);
+  return `${minutes}:${String(Math.floor(seconds % 60)).padStart(2, "0")} min`;
+}
+
+/** The action whose end is to be chosen: the selected one if it runs. */
+export function asked(context: EditorContext, run: DryRun): RunningAction | undefined {
+  return (
+    run.sighting.running.find(({ key }) => context.selection.has(key)) ?? run.sighting.running[0]
+  );
+}
+
+function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
+  const going = asked(context, run);
+  if (!going) return null;
+  const others = run.sighting.running.length > 1;
+  return (
+    // biome-ignore lint/a11y/useSemanticElements: a fieldset cannot be laid out as a row everywhere
+    <div
+      className={style.choices}
+      role="group"
+      aria-label={`How does ${endName(context.graph, going.key)} end?`}
+    >
+      {others ? (
+        <Select
+          size="xs"
+          w={150}
+          aria-label="Which running action"
+          data={run.sighting.running.map(({ key }) => ({
+            value: key,
+            label: endName(context.graph, key),
+          }))}
+          value={going.key}
+          onChange={(key) => key && context.select([key])}
+        />
+      ) : (
+        <b>{endName(context.graph, going.key)}</b>
+      )}
+      <span className={style.how}>ends</span>
+      {CHOICES.map((outcome, i) => (
+        <Button
+          key={outcome}
+          size="compact-sm"
+          className={style.choice ?? ""}
+          disabled={run.busy}
+          leftSection={<OutcomeSign outcome={outcome} />}
+          rightSection={<span className={style.digit}>{i + 1}</span>}
+          style={{ color: outcomeColor[outcome] }}
+          onClick={() => run.choose(outcome, going.key)}
+        >
+          {outcomeWord[outcome]}
+        </Button>
+      ))}
+    </div>
+  );
+}
+
+const OF_ACTIONS = [
+  "error",
+  "never",
+  "exception",
+  "deaf",
+] as const satisfies readonly DecidedFaultKind[];
+
+function Faults({ context, run }: { context: EditorContext; run: DryRun }) {
+  const { fault } = run.decided;
+  const [first] = selectedActions(context);
+  const node = (first && fullName(first)) ?? asked(context, run)?.node;
+  const at = run.moments[run.index]?.at ?? 0;
+  const said =
+    fault === null
+      ? "Fault"
+      : fault.kind === "stop"
+        ? "Stop pressed"
+        : `${fault.node}: ${faultWords[fault.kind]}`;
+  return (
+    <Menu position="top-end" width={260}>
+      <Menu.Target>
+        <Button
+          size="compact-sm"
+          variant={fault === null ? "subtle" : "light"}
+          color={fault === null ? "gray" : "orange"}
+          leftSection={<IconBolt size={14} aria-hidden />}
+          className={style.fault ?? ""}
+        >
+          {said}
+        </Button>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <Menu.Label>{node === undefined ? "Choose an action first" : node}</Menu.Label>
+        {OF_ACTIONS.map((kind) => (
+          <Menu.Item
+            key={kind}
+            disabled={node === undefined}
+            onClick={() => node !== undefined && run.inject({ kind, node })}
+          >
+            {faultWords[kind]}
+          </Menu.Item>
+        ))}
+        <Menu.Label>Somebody</Menu.Label>
+        <Menu.Item onClick={() => run.inject({ kind: "stop", at })}>{faultWords.stop}</Menu.Item>
+        {fault !== null && (
+          <>
+            <Menu.Divider />
+            <Menu.Item onClick={() => run.inject(null)}>No fault</Menu.Item>
+          </>
+        )}
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
+
+function Said({ run }: { run: DryRun }) {
+  if (run.failed) return <span className={style.failed}>{errorText(run.failed)}</span>;
+  if (run.moments.length === 0)
+    return <span>{run.busy ? "Working it out …" : "Nothing happens."}</span>;
+  const last = run.index === run.moments.length - 1;
+  return (
+    <>
+      {run.words.join(" · ") || "…"}
+      {last && run.cut && <i> · It goes on; the dry-run is cut here.</i>}
+      {last && !run.cut && run.sighting.running.length > 0 && <i> · This never ends by itself.</i>}
+    </>
+  );
+}
+
+export function DryRunBar({
+  context,
+  run,
+  record,
+}: {
+  context: EditorContext;
+  run: DryRun;
+  record: ReactNode;
+}) {
+  const at = run.moments[run.index]?.at ?? 0;
+  return (
+    <section className={style.bar} aria-label="Dry-run">
+      <div className={style.row}>
+        <span className={style.title}>Dry-run</span>
+        <Step context={context} editAction={editActions.restart}>
+          <IconPlayerSkipBack size={17} aria-hidden />
+        </Step>
+        <Step context={context} editAction={editActions.back}>
+          <IconPlayerTrackPrev size={17} aria-hidden />
+        </Step>
+        <Step context={context} editAction={editActions.play}>
+          {run.playing ? (
+            <IconPlayerPauseFilled size={17} aria-hidden />
+          ) : (
+            <IconPlayerPlayFilled size={17} aria-hidden />
+          )}
+        </Step>
+        <Step context={context} editAction={editActions.next}>
+          <IconPlayerTrackNext size={17} aria-hidden />
+        </Step>
+        <input
+          type="range"
+          className={style.scrub}
+          aria-label="Moment"
+          aria-valuetext={`${time(at)}: ${run.words.join(", ")}`}
+          min={0}
+          max={Math.max(1, run.moments.length - 1)}
+          value={run.index}
+          disabled={run.moments.length === 0}
+          onChange={(event) => {
+            run.play(false);
+            run.go(Number(event.currentTarget.value));
+          }}
+        />
+        <span className={style.time}>{time(at)}</span>
+        <Select
+          size="xs"
+          w={74}
+          aria-label="Speed"
+          className={style.speed ?? ""}
+          data={DRY_RUN_SPEEDS.map((speed) => ({ value: String(speed), label: `${speed}×` }))}
+          value={String(run.speed)}
+          onChange={(speed) => run.setSpeed(Number(speed ?? 1))}
+        />
+        <Faults context={context} run={run} />
+        <Tooltip
+          label={
+            <>
+              Close <FirstShortcut editAction={editActions.dryRun} />
+            </>
+          }
+        >
+          <ActionIcon size={34} aria-label="Close the dry-run" onClick={run.close}>
+            <IconX size={17} aria-hidden />
+          </ActionIcon>
+        </Tooltip>
+      </div>
+      <div className={style.row}>
+        <p className={style.said} aria-live="polite">
+          <Said run={run} />
+        </p>
+        <Choices context={context} run={run} />
+      </div>
+      <div className={style.note}>
+        <span>Nothing of this is recorded.</span>
+        {record}
+      </div>
+    </section>
+  );
+}

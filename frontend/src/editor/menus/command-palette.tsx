@@ -1,0 +1,116 @@
+/** The command palette: every edit action with its shortcut, and every place to go to. */
+import { Modal } from "@mantine/core";
+import { IconRouteSquare2, IconSquareRounded } from "@tabler/icons-react";
+import { useMemo, useRef } from "react";
+import { useLocation } from "wouter";
+import { useGraphs } from "../../api/graphs";
+import { EDIT_ACTIONS } from "../../edit-actions/all";
+import { isEnabled, labelOf } from "../../edit-actions/edit-action";
+import type { EditorContext } from "../../edit-actions/editor-context";
+import { FirstShortcut } from "../../edit-actions/shortcut-keys";
+import { colorOfName } from "../../ui/name-colors";
+import { matching, type Option, PickList } from "../../ui/pick-list";
+
+const MOST = 60;
+/** Names of edit actions that were done from here, the last first. */
+let recent: readonly string[] = [];
+
+function deedOptions(context: EditorContext): Option[] {
+  const rank = (name: string) => {
+    const at = recent.indexOf(name);
+    return at < 0 ? recent.length : at;
+  };
+  return EDIT_ACTIONS.filter(({ name }) => name !== "palette")
+    .map((editAction) => {
+      const Sign = editAction.icon;
+      return {
+        id: `deed ${editAction.name}`,
+        label: labelOf(editAction, context),
+        also: `${editAction.also ?? ""} ${editAction.group}`,
+        group: "Commands",
+        icon: <Sign size={16} aria-hidden />,
+        right: <FirstShortcut editAction={editAction} />,
+        disabled: !isEnabled(editAction, context),
+        rank: rank(editAction.name),
+      };
+    })
+    .sort((a, b) => Number(a.disabled) - Number(b.disabled) || a.rank - b.rank);
+}
+
+function actionOptions({ graph }: EditorContext): Option[] {
+  return graph.actions.map(({ key, name, instanceId, actor, description }) => ({
+    id: `action ${key}`,
+    label: `${name} ${instanceId}`,
+    sub: [actor, description].filter(Boolean).join(" · "),
+    also: "go to action",
+    group: "Actions of this graph",
+    icon: <IconSquareRounded size={16} aria-hidden style={{ color: colorOfName(actor) }} />,
+  }));
+}
+
+export function CommandPalette({
+  context,
+  onClose,
+}: {
+  context: EditorContext;
+  onClose: () => void;
+}) {
+  const [, go] = useLocation();
+  const graphs = useGraphs().data;
+  // Counted once: the order shall not change under the person's hands.
+  const first = useRef(context);
+  const options = useMemo<Option[]>(
+    () => [
+      ...deedOptions(first.current),
+      ...actionOptions(first.current),
+      ...(graphs ?? [])
+        .filter(({ id }) => id !== first.current.id)
+        .map(({ id, name, description }) => ({
+          id: `graph ${id}`,
+          label: name || "Untitled",
+          sub: description,
+          also: "go to open graph",
+          group: "Graphs",
+          icon: <IconRouteSquare2 size={16} aria-hidden />,
+        })),
+    ],
+    [graphs],
+  );
+  const onPick = (id: string) => {
+    const [kind = "", key = ""] = id.split(" ");
+    onClose();
+    if (kind === "graph") go(`/graphs/${encodeURIComponent(key)}`);
+    else if (kind === "action") {
+      context.select([key]);
+      context.view.show([key]);
+      context.view.focus(key);
+    } else {
+      recent = [key, ...recent.filter((name) => name !== key)].slice(0, 5);
+      // After the palette has given the focus back.
+      setTimeout(() => EDIT_ACTIONS.find(({ name }) => name === key)?.run(context), 0);
+    }
+  };
+  return (
+    <Modal
+      opened
+      onClose={onClose}
+      withCloseButton={false}
+      centered={false}
+      yOffset="12vh"
+      size="lg"
+      padding="sm"
+      transitionProps={{ duration: 80 }}
+      overlayProps={{ backgroundOpacity: 0.3 }}
+      aria-label="Commands"
+    >
+      <PickList
+        label="Find a command, an action or a graph"
+        placeholder="What do you want to do, or where to go?"
+        find={(search) => matching(options, search).slice(0, MOST)}
+        onPick={onPick}
+        none="Nothing is called so."
+        take="do it"
+      />
+    </Modal>
+  );
+}

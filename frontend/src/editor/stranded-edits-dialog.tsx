@@ -1,0 +1,243 @@
+/** What to do about edits that wait on a history which the server has left: take, drop, or save. */
+import { Button, Checkbox, Group, Modal, Text } from "@mantine/core";
+import { useCallback, useEffect, useMemo, useState } from "react";
+import { type ChangedField, changesOf, type GraphChange, onlyChanges } from "../graph/changes";
+import { mapsOf } from "../graph/document-keys";
+import {
+  type StrandedEditsChoice,
+  useGraph,
+  useLink,
+  useRoom,
+  useStrandedEdits,
+} from "../sync/use-room";
+import style from "./stranded-edits-dialog.module.css";
+import { changeSentence, saveChanges } from "./stranded-edits-file";
+
+const signs = { added: "+", removed: "−", changed: "~" } as const;
+
+function changes(n: number): string {
+  return n === 1 ? "1 change" : `${n} changes`;
+}
+
+function Lines({ lines }: { lines: readonly ChangedField[] }) {
+  return (
+    <ul className={style.lines}>
+      {lines.map((line) => (
+        <li key={line.field}>
+          <span className={style.field}>{line.field}</span>{" "}
+          {line.before !== null && <del>{line.before}</del>}
+          {line.before !== null && line.after !== null && (
+            <>
+              {" "}
+              <span aria-hidden>→</span>
+              <span className="visually-hidden">becomes</span>{" "}
+            </>
+          )}
+          {line.after !== null && <ins>{line.after}</ins>}
+          {line.now !== undefined && (
+            <span className={style.now}> now {line.now ?? "nothing"}</span>
+          )}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+interface ItemProps {
+  change: GraphChange;
+  taken: boolean;
+  onTake: (taken: boolean) => void;
+}
+
+function Item({ change, taken, onTake }: ItemProps) {
+  const { kind, lines } = change;
+  // The title says the name already.
+  const told = kind === "changed" ? lines : lines.filter(({ field }) => field !== "Name");
+  return (
+    <li className={style.item} data-kind={change.kind}>
+      <Checkbox
+        checked={taken}
+        onChange={(event) => onTake(event.currentTarget.checked)}
+        label={
+          <>
+            <span className={style.sign} aria-hidden>
+              {signs[change.kind]}
+            </span>
+            <span className="visually-hidden">{changeSentence(change)}</span>
+            <b aria-hidden>{change.title}</b>{" "}
+            <span className={style.thing} aria-hidden>
+              {change.thing === "graph" ? "" : `${change.thing} `}
+              {change.kind}
+            </span>
+          </>
+        }
+      />
+      <Lines lines={told} />
+    </li>
+  );
+}
+
+interface BodyProps {
+  choice: StrandedEditsChoice;
+  by: string;
+  onLater: () => void;
+}
+
+function Body({ choice, by, onLater }: BodyProps) {
+  const { stranded } = choice;
+  const { doc } = useRoom();
+  const graph = useGraph();
+  // biome-ignore lint/correctness/useExhaustiveDependencies: the document changes with the graph
+  const all = useMemo(() => changesOf(stranded, mapsOf(doc)), [stranded, doc, graph]);
+  const [left, setLeft] = useState<ReadonlySet<string>>(new Set());
+  const taken = all.filter(({ id }) => !left.has(id));
+  const take = (id: string, on: boolean) => {
+    const next = new Set(left);
+    if (on) next.delete(id);
+    else next.add(id);
+    setLeft(next);
+  };
+  const when = new Date(stranded.at).toLocaleString([], {
+    dateStyle: "medium",
+    timeStyle: "short",
+  });
+  return (
+    <>
+      <Text>
+        A backup was restored on the server. {changes(all.length)} that you made here (the last at{" "}
+        {when}) were not stored before that. Behind this dialog is the graph as it is now. Which of
+        them shall be made in it?
+      </Text>
+      <Group mt="xs" gap="xs" className={style.marks ?? ""}>
+        <Button size="compact-sm" onClick={() => setLeft(new Set())}>
+          Mark all
+        </Button>
+        <Button size="compact-sm" onClick={() => setLeft(new Set(all.map(({ id }) => id)))}>
+          Mark none
+        </Button>
+      </Group>
+      <ul className={style.list} aria-label="Your changes">
+        {all.map((change) => (
+          <Item
+            key={change.id}
+            change={change}
+            taken={!left.has(change.id)}
+            onTake={(on) => take(change.id, on)}
+          />
+        ))}
+      </ul>
+      <Answers
+        choice={choice}
+        taken={taken}
+        some={taken.length < all.length ? `${taken.length} of ${all.length}` : "all"}
+        onLater={onLater}
+        onSave={() => saveChanges(graph.name, by, [stranded])}
+      />
+    </>
+  );
+}
+
+interface AnswersProps {
+  choice: StrandedEditsChoice;
+  taken: readonly GraphChange[];
+  /** How many that is, in words. */
+  some: string;
+  onLater: () => void;
+  onSave: () => void;
+}
+
+function Answers({ choice, taken, some, onLater, onSave }: AnswersProps) {
+  const { state } = useLink();
+  const [dropping, setDropping] = useState(false);
+  const { busy, trouble, work } = useWork();
+  const { difference } = choice.stranded;
+  return (
+    <>
+      {trouble !== null && (
+        <p className={style.trouble} role="alert">
+          That did not work: {trouble}. Your changes are still here.
+        </p>
+      )}
+      <div className={style.answers}>
+        <Button onClick={onSave}>Save as a file</Button>
+        <span className={style.space} />
+        <Button onClick={onLater}>Decide later</Button>
+        {dropping ? (
+          <Button color="red" disabled={busy} onClick={() => work(() => choice.drop())}>
+            Discard for good
+          </Button>
+        ) : (
+          <Button disabled={busy} onClick={() => setDropping(true)}>
+            Discard
+          </Button>
+        )}
+        <Button
+          variant="filled"
+          data-autofocus
+          loading={busy}
+          disabled={taken.length === 0 || state !== "live"}
+          onClick={() => work(() => choice.apply(onlyChanges(difference, taken)))}
+        >
+          Apply {some}
+        </Button>
+      </div>
+    </>
+  );
+}
+
+/** Something that takes its time and may fail. When it succeeds the dialog is gone. */
+function useWork() {
+  const [busy, setBusy] = useState(false);
+  const [trouble, setTrouble] = useState<string | null>(null);
+  const work = async (editAction: () => Promise<unknown>) => {
+    setBusy(true);
+    setTrouble(null);
+    try {
+      await editAction();
+    } catch (error) {
+      setBusy(false);
+      setTrouble(error instanceof Error ? error.message : String(error));
+    }
+  };
+  return { busy, trouble, work };
+}
+
+/** The dialog; `onLater` leaves a word on the page that leads back to it. */
+export function StrandedEditsDialog({
+  by,
+  open,
+  onLater,
+}: {
+  by: string;
+  open: boolean;
+  onLater(): void;
+}) {
+  const choice = useStrandedEdits();
+  return (
+    <Modal
+      opened={choice !== null && open}
+      onClose={onLater}
+      title="Your changes and a restored backup"
+      closeButtonProps={{ "aria-label": "Decide later" }}
+      size="lg"
+      centered
+    >
+      {choice && <Body key={choice.stranded.at} choice={choice} by={by} onLater={onLater} />}
+    </Modal>
+  );
+}
+
+/** Whether the dialog is open: for each choice at first, until the person puts it off. */
+export function useStrandedEditsDialog() {
+  const choice = useStrandedEdits();
+  const [later, setLater] = useState(false);
+  // biome-ignore lint/correctness/useExhaustiveDependencies: another choice is asked about anew
+  useEffect(() => setLater(false), [choice?.stranded]);
+  return {
+    edits: choice?.stranded.edits ?? 0,
+    waits: choice !== null && later,
+    open: !later,
+    putOff: useCallback(() => setLater(true), []),
+    takeUp: useCallback(() => setLater(false), []),
+  };
+}

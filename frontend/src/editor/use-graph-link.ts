@@ -1,0 +1,34 @@
+/** Goes to what the address points at, once the graph is there, and again when the address changes. */
+import { notifications } from "@mantine/notifications";
+import { useEffect, useRef } from "react";
+import { useSearch } from "wouter";
+import type { EditorContext } from "../edit-actions/editor-context";
+import { present, targetOf } from "../edit-actions/graph-links";
+import { shownKeys } from "../edit-actions/view";
+
+const SETTLED = 160; // ms after which the canvas has measured its cards and shown the whole
+
+export function useGraphLink(context: EditorContext, begun: boolean): void {
+  const search = useSearch();
+  const now = useRef(context);
+  now.current = context;
+  useEffect(() => {
+    const target = begun ? targetOf(search) : null;
+    if (target === null) return;
+    const timer = setTimeout(() => {
+      const { graph, select, setPanel } = now.current;
+      const selection = present(graph, target.selection);
+      if (selection.length < target.selection.length) {
+        notifications.show({ message: "What the link points at is not in this graph any more." });
+      }
+      select(selection);
+      if (target.problem !== null) setPanel(selection.length > 0 ? "details" : "problems");
+      // The selection is drawn first; then it is known where it stands.
+      requestAnimationFrame(() => {
+        const keys = shownKeys(now.current);
+        if (keys.length > 0) now.current.view.show(keys);
+      });
+    }, SETTLED);
+    return () => clearTimeout(timer);
+  }, [search, begun]);
+}

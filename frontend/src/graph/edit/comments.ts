@@ -1,0 +1,146 @@
+/**
+ * What people say about actions: threads in the document, one key for each message.
+ *
+ * `comments` holds `<thread>/<message>` → JSON text. The first message of a thread names the action
+ * that it is about; a message may also say that the thread is done, or open again. Messages are
+ * never edited by others' pages, so two people who answer at once both stay. The author stands in
+ * the text as the page wrote it; who stored it is known by the log.
+ */
+import type * as Y from "yjs";
+import { rootOf } from "../document-keys";
+import { newAid } from "../ids";
+import type { Key } from "../model";
+import { asOneEdit, eraseKeys, writeKey } from "./document-writes";
+
+export interface CommentAuthor {
+  readonly id: string;
+  readonly name: string;
+}
+
+export interface CommentMessage {
+  readonly id: string;
+  readonly author: CommentAuthor;
+  /** Milliseconds since 1970, by the clock of whoever wrote it. */
+  readonly at: number;
+  readonly text: string;
+}
+
+export interface Thread {
+  readonly id: string;
+  /** The action; it may be gone. */
+  readonly about: Key;
+  readonly messages: readonly CommentMessage[];
+  readonly resolved: boolean;
+}
+
+interface ParsedMessage extends CommentMessage {
+  readonly thread: string;
+  readonly about: Key | null;
+  readonly resolved: boolean | null;
+}
+
+const text = (value: unknown, most: number): string =>
+  typeof value === "string" ? value.slice(0, most) : "";
+
+/** One message as somebody wrote it; null when it is none. */
+function said(key: string, value: unknown): ParsedMessage | null {
+  const [thread, id, ...more] = key.split("/");
+  if (!thread || !id || more.length > 0 || typeof value !== "string") return null;
+  let body: unknown;
+  try {
+    body = JSON.parse(value);
+  } catch {
+    return null;
+  }
+  if (typeof body !== "object" || body === null) return null;
+  const { about, author, at, text: words, resolved } = body as Record<string, unknown>;
+  const who = typeof author === "object" && author !== null ? author : {};
+  return {
+    thread,
+    id,
+    about: typeof about === "string" ? about : null,
+    author: {
+      id: text(Reflect.get(who, "id"), 100),
+      name: text(Reflect.get(who, "name"), 100),
+    },
+    at: typeof at === "number" && Number.isFinite(at) ? at : 0,
+    text: text(words, 10_000),
+    resolved: typeof resolved === "boolean" ? resolved : null,
+  };
+}
+
+/** The threads of a document, the newest talk first. Never fails; skips what is none. */
+export function readThreads(comments: Iterable<readonly [string, unknown]>): Thread[] {
+  const threads = new Map<string, ParsedMessage[]>();
+  for (const [key, value] of comments) {
+    const message = said(key, value);
+    if (message === null) continue;
+    const known = threads.get(message.thread);
+    if (known) known.push(message);
+    else threads.set(message.thread, [message]);
+  }
+  const found: Thread[] = [];
+  for (const [id, all] of threads) {
+    all.sort((a, b) => a.at - b.at || (a.id < b.id ? -1 : 1));
+    const about = all.find((message) => message.about !== null)?.about;
+    const messages = all.filter((message) => message.text !== "");
+    if (about == null || messages.length === 0) continue;
+    const last = all.filter((message) => message.resolved !== null).at(-1);
+    found.push({ id, about, messages, resolved: last?.resolved ?? false });
+  }
+  const newest = (thread: Thread) => thread.messages.at(-1)?.at ?? 0;
+  return found.sort((a, b) => newest(b) - newest(a) || (a.id < b.id ? -1 : 1));
+}
+
+/** How many threads are open about each action. */
+export function openThreadCounts(threads: readonly Thread[]): Map<Key, number> {
+  const counts = new Map<Key, number>();
+  for (const { about, resolved } of threads) {
+    if (!resolved) counts.set(about, (counts.get(about) ?? 0) + 1);
+  }
+  return counts;
+}
+
+interface Words {
+  readonly author: CommentAuthor;
+  readonly at: number;
+  readonly text: string;
+}
+
+/** Begins a thread about an action. Answers its id. */
+export function beginThread(doc: Y.Doc, about: Key, { author, at, text: words }: Words): string {
+  const thread = newAid();
+  write(doc, thread, { about, author, at, text: words });
+  return thread;
+}
+
+export function reply(doc: Y.Doc, thread: string, { author, at, text: words }: Words): void {
+  write(doc, thread, { author, at, text: words });
+}
+
+/** Says that a thread is done, or that it is not. */
+export function resolve(
+  doc: Y.Doc,
+  thread: string,
+  resolved: boolean,
+  { author, at }: Omit<Words, "text">,
+): void {
+  write(doc, thread, { author, at, resolved });
+}
+
+/** Takes a message back. */
+export function deleteMessage(doc: Y.Doc, thread: string, message: string): void {
+  const key = `${thread}/${message}`;
+  const first = said(key, rootOf(doc, "comments").get(key));
+  asOneEdit(doc, () => {
+    // The first message names the action; without its words the answers still have their place.
+    if (first?.about != null) {
+      const { about, author, at } = first;
+      writeKey(doc, "comments", key, JSON.stringify({ about, author, at }));
+    } else eraseKeys(doc, "comments", key);
+  });
+}
+
+function write(doc: Y.Doc, thread: string, body: Readonly<Record<string, unknown>>): void {
+  asOneEdit(doc, () => writeKey(doc, "comments", `${thread}/${newAid()}`, JSON.stringify(body)));
+}

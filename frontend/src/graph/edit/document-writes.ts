@@ -1,0 +1,115 @@
+/** How edits write: one transaction each, only what differs, under one origin that undo knows. */
+
+import * as Y from "yjs";
+import { endsOf, mapsFrom, mapsOf, type Root, rootOf, splitKey } from "../document-keys";
+import { isAid } from "../ids";
+import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS, type Relation } from "../model";
+import { readGraph, readTakenUp } from "../read";
+import { asNumber, asResponse } from "../values";
+
+/** The origin of everything that the person at this page does. */
+export const OWN_EDITS: unique symbol = Symbol("the person at this page");
+
+/** Several edits as one: one transaction, one update for the others, one step of undo. */
+export function asOneEdit<T>(doc: Y.Doc, work: () => T): T {
+  return doc.transact(work, OWN_EDITS);
+}
+
+/** Undo and redo of the person's own edits; one edit (or one `asOneEdit`) is one step. */
+export function undoOf(doc: Y.Doc): Y.UndoManager {
+  const scope = (["meta", "actions", "relations", "positions", "comments"] as const).map((root) =>
+    rootOf(doc, root),
+  );
+  return new Y.UndoManager(scope, { trackedOrigins: new Set([OWN_EDITS]), captureTimeout: 0 });
+}
+
+export function writeKey(doc: Y.Doc, root: Root, key: string, value: unknown): void {
+  const map = rootOf(doc, root);
+  if (!map.has(key) || map.get(key) !== value) map.set(key, value);
+}
+
+export function eraseKeys(doc: Y.Doc, root: Root, ...keys: readonly string[]): void {
+  const map = rootOf(doc, root);
+  for (const key of keys) if (map.has(key)) map.delete(key);
+}
+
+/** The keys of an owner, `<head>` itself included. */
+export function keysOfOwner(doc: Y.Doc, root: Root, head: string): string[] {
+  const prefix = `${head}|`;
+  return [...rootOf(doc, root).keys()].filter((key) => key === head || key.startsWith(prefix));
+}
+
+export function hasAction(doc: Y.Doc, key: Key): boolean {
+  return isAid(key) && typeof rootOf(doc, "actions").get(key) === "string";
+}
+
+export function hasRelation(doc: Y.Doc, id: string): boolean {
+  const ends = endsOf(id);
+  if (ends === null) return false;
+  const map = rootOf(doc, "relations");
+  if (ends.parent === ENTRY) return map.get(`${id}|on_true`) === "run";
+  return PRECONDITIONS.some((outcome) => asResponse(map.get(`${id}|${outcome}`)) !== undefined);
+}
+
+export const hasEnd = (doc: Y.Doc, key: Key): boolean =>
+  key === ENTRY || key === EXIT || hasAction(doc, key);
+
+export const graphNow = (doc: Y.Doc): Graph => readGraph(mapsOf(doc));
+
+const NUMBERING = new Set(["", "instance_id", "missing", "twin"]);
+
+/** The actions with their names and numbers only, which is much less to read. */
+export function numbersOf(doc: Y.Doc): Graph["actions"] {
+  const actions = new Map<string, unknown>();
+  for (const [key, value] of rootOf(doc, "actions").entries()) {
+    if (NUMBERING.has(splitKey(key).rest)) actions.set(key, value);
+  }
+  return readGraph({ ...mapsFrom({}), actions }).actions;
+}
+
+/** The number after the greatest one under the keys that fit. */
+export function nextNumber(doc: Y.Doc, root: Root, field: string, fits: (head: string) => boolean) {
+  let next = 0;
+  for (const [key, value] of rootOf(doc, root).entries()) {
+    const { head, rest } = splitKey(key);
+    const number = rest === field && fits(head) ? asNumber(value) : undefined;
+    if (number !== undefined) next = Math.max(next, Math.floor(number) + 1);
+  }
+  return next;
+}
+
+/** Moves a relation with everything it says under another id. */
+export function moveKeys(doc: Y.Doc, from: string, to: string): void {
+  const map = rootOf(doc, "relations");
+  for (const key of keysOfOwner(doc, "relations", from)) {
+    map.set(to + key.slice(from.length), map.get(key));
+    map.delete(key);
+  }
+}
+
+/**
+ * Writes down what the reader shows already: arrows of ghosts whose name a real action has taken up
+ * become that action's own, so that renaming it later does not leave them behind.
+ */
+export function numberGhosts(doc: Y.Doc): void {
+  const actions = rootOf(doc, "actions");
+  if (![...actions.keys()].some((key) => key.endsWith("|missing"))) return;
+  const { ghosts, arrows } = readTakenUp(mapsOf(doc));
+  for (const [from, to] of arrows) moveKeys(doc, from, to);
+  for (const ghost of ghosts) {
+    eraseKeys(doc, "actions", ...keysOfOwner(doc, "actions", ghost));
+    eraseKeys(doc, "positions", ghost);
+  }
+}
+
+/** A relation as the document has it now. */
+export function relationNow(doc: Y.Doc, id: string): Relation | undefined {
+  const ends = endsOf(id);
+  if (ends === null) return undefined;
+  return graphNow(doc).relations.find(
+    (relation) =>
+      relation.parent === ends.parent &&
+      relation.child === ends.child &&
+      relation.listing === ends.listing,
+  );
+}

@@ -1,0 +1,65 @@
+/**
+ * Every edit of a graph, as functions over the Yjs document.
+ *
+ * Each is one transaction of the person's own (see `OWN_EDITS`), so one update for the others and one
+ * step of undo; `asOneEdit` joins several. An edit of something that a colleague has deleted
+ * meanwhile does nothing and says so by its answer: null or false. What was imported and did not fit
+ * (`x/<field>`) gives way to the first edit of its field.
+ */
+
+import type * as Y from "yjs";
+import { noteKey, rootOf } from "../document-keys";
+import { newAid } from "../ids";
+import type { JsonText, Key, Position } from "../model";
+import { asOneEdit, eraseKeys, hasEnd, writeKey } from "./document-writes";
+
+export * from "./actions";
+export { asOneEdit, OWN_EDITS, undoOf } from "./document-writes";
+export * from "./parameters";
+export * from "./relations";
+
+export function setGraphName(doc: Y.Doc, name: string): void {
+  asOneEdit(doc, () => {
+    writeKey(doc, "meta", "name", name);
+    eraseKeys(doc, "meta", "x/graph_name");
+  });
+}
+
+export function setGraphDescription(doc: Y.Doc, description: string): void {
+  asOneEdit(doc, () => {
+    writeKey(doc, "meta", "description", description);
+    eraseKeys(doc, "meta", "x/graph_description");
+  });
+}
+
+/** Writes where things stand, once, when they are dropped: actions, `ENTRY` and `EXIT`. */
+export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Position]>): void {
+  asOneEdit(doc, () => {
+    for (const [key, [x, y]] of positions) {
+      if (!hasEnd(doc, key)) continue;
+      const old = rootOf(doc, "positions").get(key);
+      if (!Array.isArray(old) || old[0] !== x || old[1] !== y) {
+        rootOf(doc, "positions").set(key, [x, y]);
+      }
+    }
+  });
+}
+
+/** Adds a note or frame; `text` is its JSON. Answers its id. */
+export function addNote(doc: Y.Doc, text: JsonText): string {
+  const id = newAid();
+  asOneEdit(doc, () => writeKey(doc, "positions", noteKey(id), text));
+  return id;
+}
+
+export function setNote(doc: Y.Doc, id: string, text: JsonText): boolean {
+  if (!rootOf(doc, "positions").has(noteKey(id))) return false;
+  asOneEdit(doc, () => writeKey(doc, "positions", noteKey(id), text));
+  return true;
+}
+
+export function removeNotes(doc: Y.Doc, ids: Iterable<string>): void {
+  asOneEdit(doc, () => {
+    for (const id of ids) eraseKeys(doc, "positions", noteKey(id));
+  });
+}

@@ -1,0 +1,116 @@
+/** The properties of an action. */
+import { Autocomplete, Button, Group } from "@mantine/core";
+import { IconGhost2 } from "@tabler/icons-react";
+import { useEditorContext } from "../edit-actions/editor-context";
+import { adoptGhost, rename, setField } from "../graph/edit";
+import type { Action, Graph } from "../graph/model";
+import { DraftInput } from "../ui/draft-input";
+import { colorOfName } from "../ui/name-colors";
+import { ArrowList } from "./arrow-list";
+import { SharedField } from "./fields/shared-field";
+import style from "./inspector.module.css";
+import { ParameterList } from "./parameters/parameter-list";
+import { RunConditions } from "./run-conditions";
+
+function robots(graph: Graph): string[] {
+  return [...new Set(graph.actions.map((action) => action.actor))].filter(Boolean).sort();
+}
+
+function wholeNumber(draft: string): string | null {
+  return /^\d{1,5}$/.test(draft) && Number(draft) < 65536
+    ? null
+    : "A whole number from 0 to 65535.";
+}
+
+export function ActionForm({ action }: { action: Action }) {
+  const { doc, graph } = useEditorContext();
+  if (action.missing) {
+    return (
+      <div className={style.say} data-tone="error">
+        <IconGhost2 size={16} aria-hidden />
+        <div>
+          Arrows name{" "}
+          <b>
+            {action.name} {action.instanceId}
+          </b>
+          , but the graph has no such action. It cannot be started like this.
+          <Group mt="sm">
+            <Button size="compact-sm" onClick={() => adoptGhost(doc, action.key)}>
+              Make it an action
+            </Button>
+          </Group>
+        </div>
+      </div>
+    );
+  }
+  return (
+    <div className={style.form}>
+      <div className={style.nameRow}>
+        <SharedField of={action.key} field="name">
+          <DraftInput
+            label="Name"
+            value={action.name}
+            check={(draft) => (draft.trim() === "" ? "An action has a name." : null)}
+            onCommit={(name) => rename(doc, action.key, name.trim())}
+          />
+        </SharedField>
+        <SharedField of={action.key} field="number">
+          <DraftInput
+            label="Number"
+            value={String(action.instanceId)}
+            inputMode="decimal"
+            check={wholeNumber}
+            onCommit={(text) => setField(doc, action.key, "instanceId", Number(text))}
+          />
+        </SharedField>
+      </div>
+      <SharedField of={action.key} field="robot">
+        <Autocomplete
+          key={`actor-${action.actor}`}
+          label="Robot"
+          size="sm"
+          placeholder="any robot"
+          data={robots(graph)}
+          defaultValue={action.actor}
+          leftSection={
+            <i
+              className={style.robot}
+              style={{ background: colorOfName(action.actor) }}
+              aria-hidden
+            />
+          }
+          onBlur={(event) => {
+            if (event.currentTarget.value !== action.actor) {
+              setField(doc, action.key, "actor", event.currentTarget.value.trim());
+            }
+          }}
+          onOptionSubmit={(value) => setField(doc, action.key, "actor", value)}
+        />
+      </SharedField>
+      <SharedField of={action.key} field="description">
+        <DraftInput
+          label="Description"
+          lines
+          value={action.description}
+          placeholder="What it does, for people"
+          onCommit={(text) => setField(doc, action.key, "description", text)}
+        />
+      </SharedField>
+      <ParameterList action={action} side="in" />
+      <RunConditions of={action.key} title="When" />
+      <ArrowList action={action} />
+      <ParameterList action={action} side="out" />
+      <section className={style.section}>
+        <SharedField of={action.key} field="type">
+          <DraftInput
+            label="Type"
+            value={action.type}
+            description="sync and async behave alike; spontaneous may report again and again"
+            check={(draft) => (draft.trim() === "" ? "The engine wants one, usually sync." : null)}
+            onCommit={(text) => setField(doc, action.key, "type", text.trim())}
+          />
+        </SharedField>
+      </section>
+    </div>
+  );
+}

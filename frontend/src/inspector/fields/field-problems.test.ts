@@ -1,0 +1,32 @@
+import { expect, test } from "vitest";
+import type { Problem } from "../../api/graphs";
+import { fieldOfProblem, problemsAt } from "./field-problems";
+
+const problem = (path: string, where: object = {}): Problem => ({
+  code: "P1",
+  severity: "warning",
+  message: "",
+  where: { path, ...where },
+});
+
+test.each([
+  ["/graph_name", "name"],
+  ["/actions/3/instance_id", "number"],
+  ["/actions/3/input_parameters/pose/x", "in/pose/x"],
+  ["/actions/3/input_parameters/pose/x/pvf_value", "in/pose/x"],
+  ["/actions/3/output_parameters/a~1b", "out/a~1b"],
+  ["/actions/3/parents/0/conditions", "conditions"],
+  ["/actions/3/children/1/remap", "remap"],
+  ["/actions/3/vendor", null],
+  ["", null],
+])("a problem at %s is marked at %s", (path, field) => {
+  expect(fieldOfProblem(problem(path))).toBe(field);
+});
+
+test("a field has the problems of its own thing only, errors first", () => {
+  const mild = problem("/actions/0/name", { aid: "a" });
+  const bad: Problem = { ...mild, severity: "error" };
+  const other = problem("/actions/1/name", { aid: "b" });
+  expect(problemsAt([mild, other, bad], "a", "name")).toEqual([bad, mild]);
+  expect(problemsAt([problem("/graph_name")], "graph", "name")).toHaveLength(1);
+});

@@ -1,0 +1,35 @@
+/** For people who may only look: what changes the graph is off, what shows it is not. */
+import { MantineThemeProvider } from "@mantine/core";
+import type { ReactNode } from "react";
+import { useEditorContext } from "../../edit-actions/editor-context";
+import style from "../inspector.module.css";
+
+const OFF = { defaultProps: { disabled: true } };
+/** Its text can be marked and copied. */
+const READ = { defaultProps: { readOnly: true } };
+
+/** Buttons that only show or copy something say `disabled={false}` for themselves. */
+const LOOKING = {
+  components: {
+    Button: OFF,
+    ActionIcon: OFF,
+    Switch: OFF,
+    SegmentedControl: OFF,
+    TextInput: READ,
+    Textarea: READ,
+    Select: READ,
+    Autocomplete: READ,
+    TagsInput: READ,
+  },
+};
+
+export function ViewOnly({ children }: { children: ReactNode }) {
+  const { mayEdit } = useEditorContext();
+  return (
+    <MantineThemeProvider theme={mayEdit ? {} : LOOKING}>
+      <div className={style.fields} data-looking={!mayEdit || undefined}>
+        {children}
+      </div>
+    </MantineThemeProvider>
+  );
+}

@@ -1,0 +1,70 @@
+/** The properties of the graph itself, and how to begin. */
+import { Kbd, TagsInput } from "@mantine/core";
+import { printedKeys } from "../edit-actions/edit-action";
+import { useEditorContext } from "../edit-actions/editor-context";
+import { setGraphDescription, setGraphName } from "../graph/edit";
+import { DraftInput } from "../ui/draft-input";
+import { SharedField } from "./fields/shared-field";
+import style from "./inspector.module.css";
+import { graphLabels, setLabels } from "./labels";
+
+export function GraphForm() {
+  const { doc, graph } = useEditorContext();
+  const arrows = graph.relations.length;
+  return (
+    <div className={style.form}>
+      <SharedField of="graph" field="name">
+        <DraftInput
+          label="Graph"
+          value={graph.name}
+          check={(draft) => (draft.trim() === "" ? "A graph has a name." : null)}
+          onCommit={(name) => setGraphName(doc, name.trim())}
+        />
+      </SharedField>
+      <SharedField of="graph" field="description">
+        <DraftInput
+          label="Description"
+          lines
+          value={graph.description}
+          placeholder="What it is for"
+          onCommit={(text) => setGraphDescription(doc, text)}
+        />
+      </SharedField>
+      <TagsInput
+        label="Labels"
+        size="sm"
+        placeholder="night shift, demo …"
+        maxTags={20}
+        value={graphLabels(graph)}
+        onChange={(labels) => setLabels(doc, labels)}
+      />
+      <p className={style.hint}>
+        {graph.actions.length === 1 ? "1 action" : `${graph.actions.length} actions`},{" "}
+        {arrows === 1 ? "1 arrow" : `${arrows} arrows`}
+      </p>
+      <section className={style.section}>
+        <div className={style.heading}>
+          <h3>Drawing</h3>
+        </div>
+        <ul className={style.tips}>
+          <li>
+            <Kbd>A</Kbd> or double-click: type the name of an action
+          </li>
+          <li>Drag from an outcome under a card to what shall follow it</li>
+          <li>Drop on empty canvas to add the next action there</li>
+          <li>
+            <Kbd>C</Kbd> draws an arrow by keys alone
+          </li>
+          <li>
+            <Kbd>Del</Kbd> deletes, <Kbd>Ctrl</Kbd> <Kbd>Z</Kbd> takes back what you did
+          </li>
+          <li>Select a card or an arrow to see what it says</li>
+          <li>
+            <Kbd>{printedKeys("Mod+k")[0]}</Kbd> <Kbd>K</Kbd> finds every command, <Kbd>?</Kbd>{" "}
+            shows the keys
+          </li>
+        </ul>
+      </section>
+    </div>
+  );
+}

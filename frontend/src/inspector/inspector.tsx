@@ -1,0 +1,140 @@
+/** The panel on the right: properties of what is selected, JSON, problems. */
+import { Tabs } from "@mantine/core";
+import { IconMessageCircle } from "@tabler/icons-react";
+import type { Problem, Problems } from "../api/graphs";
+import { Comments } from "../comments/comments";
+import {
+  type EditorContext,
+  type Panel,
+  selectedActions,
+  selectedRelations,
+  useEditorContext,
+} from "../edit-actions/editor-context";
+import { relationId } from "../graph/document-keys";
+import type { Thread } from "../graph/edit/comments";
+import { notesOf } from "../graph/edit/notes";
+import { EXIT } from "../graph/model";
+import { ActionForm } from "./action-form";
+import { ProblemsContext } from "./fields/field-problems";
+import { SharedField } from "./fields/shared-field";
+import { ViewOnly } from "./fields/view-only";
+import { GraphForm } from "./graph-form";
+import style from "./inspector.module.css";
+import { JsonView } from "./json/json-view";
+import { NoteForm } from "./note-form";
+import { ProblemList, ProblemsHere } from "./problem-list";
+import { RelationForm } from "./relation-form";
+import { RunConditions } from "./run-conditions";
+
+const NONE: readonly Problem[] = [];
+
+interface Props {
+  id: string;
+  seq: number;
+  panel: Panel;
+  problems: Problems | undefined;
+  threads: readonly Thread[];
+}
+
+const counted = (count: number, what: string): string | null =>
+  count === 0 ? null : `${count} ${what}${count === 1 ? "" : "s"}`;
+
+const chosenNotes = ({ graph, selection }: EditorContext) =>
+  notesOf(graph).filter(({ key }) => selection.has(key));
+
+function title(context: EditorContext): string {
+  const actions = selectedActions(context);
+  const relations = selectedRelations(context);
+  const notes = chosenNotes(context);
+  const [action] = actions;
+  const [note] = notes;
+  const count = actions.length + relations.length + notes.length;
+  if (count > 1) return `${count} selected`;
+  if (note) return note.kind === "frame" ? "Frame" : "Note";
+  if (action) return `${action.name} ${action.instanceId}`;
+  if (relations.length === 1) return "Arrow";
+  return context.selection.has(EXIT) ? "Exit" : "Graph";
+}
+
+function Properties() {
+  const context = useEditorContext();
+  const actions = selectedActions(context);
+  const relations = selectedRelations(context);
+  const notes = chosenNotes(context);
+  const [action] = actions;
+  const [relation] = relations;
+  const [note] = notes;
+  if (actions.length + relations.length + notes.length > 1) {
+    const parts = [
+      counted(actions.length, "action"),
+      counted(relations.length, "arrow"),
+      counted(notes.length, "note"),
+    ].flatMap((part) => part ?? []);
+    return (
+      <p className={style.hint}>
+        Selected: {parts.join(", ")}. Drag moves them together, <b>Del</b> deletes them,{" "}
+        <b>Ctrl D</b> duplicates them.
+      </p>
+    );
+  }
+  if (note) return <NoteForm key={note.key} note={note} />;
+  if (action) return <ActionForm key={action.key} action={action} />;
+  if (relation) return <RelationForm key={relationId(relation)} relation={relation} />;
+  if (context.selection.has(EXIT)) return <RunConditions of={EXIT} title="The graph ends" />;
+  return <GraphForm />;
+}
+
+export function Inspector({ id, seq, panel, problems, threads }: Props) {
+  const context = useEditorContext();
+  const open = threads.filter((thread) => !thread.resolved).length;
+  const count = problems?.problems.length ?? 0;
+  const errors = problems?.problems.some((problem) => problem.severity === "error") ?? false;
+  return (
+    <Tabs
+      value={panel}
+      onChange={(next) => context.setPanel((next ?? "details") as Panel)}
+      className={style.tabs ?? ""}
+      keepMounted={false}
+    >
+      <Tabs.List>
+        <Tabs.Tab value="details" className={style.first ?? ""}>
+          {title(context)}
+        </Tabs.Tab>
+        <Tabs.Tab value="json">JSON</Tabs.Tab>
+        <Tabs.Tab value="comments" aria-label={open === 0 ? "Comments" : `Comments, ${open} open`}>
+          <span className={style.tabWords}>
+            <IconMessageCircle size={15} aria-hidden />
+            {open > 0 && <span className={style.count}>{open}</span>}
+          </span>
+        </Tabs.Tab>
+        <Tabs.Tab value="problems">
+          Problems{" "}
+          {count > 0 && (
+            <span className={style.count} data-worst={errors ? "error" : "warning"}>
+              {count}
+            </span>
+          )}
+        </Tabs.Tab>
+      </Tabs.List>
+      <Tabs.Panel value="details" className={style.panel ?? ""}>
+        <ViewOnly>
+          <ProblemsHere problems={problems} />
+          <ProblemsContext value={problems?.problems ?? NONE}>
+            <Properties />
+          </ProblemsContext>
+        </ViewOnly>
+      </Tabs.Panel>
+      <Tabs.Panel value="json" className={style.panel ?? ""} data-fill>
+        <SharedField of="graph" field="json">
+          <JsonView graph={id} seq={seq} />
+        </SharedField>
+      </Tabs.Panel>
+      <Tabs.Panel value="comments" className={style.panel ?? ""}>
+        <Comments threads={threads} />
+      </Tabs.Panel>
+      <Tabs.Panel value="problems" className={style.panel ?? ""}>
+        <ProblemList problems={problems} seq={seq} />
+      </Tabs.Panel>
+    </Tabs>
+  );
+}

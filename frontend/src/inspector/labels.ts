@@ -1,0 +1,34 @@
+/** What people sort a graph under: `labels` in its `gui_attributes`, which no engine reads. */
+import type * as Y from "yjs";
+import { rootOf } from "../graph/document-keys";
+import { asOneEdit } from "../graph/edit/document-writes";
+import { memberText, withMember } from "../graph/json-members";
+import type { Graph } from "../graph/model";
+import { asJsonText } from "../graph/values";
+
+const KEY = "x/gui_attributes";
+
+function attributes(text: string | undefined): string {
+  return text?.trimStart().startsWith("{") ? text : "{}";
+}
+
+export function graphLabels(graph: Graph): string[] {
+  const kept = graph.extra.find(([field]) => `x/${field}` === KEY)?.[1];
+  const text = memberText(attributes(kept), "labels");
+  const value: unknown = text === null ? [] : JSON.parse(text);
+  return Array.isArray(value) ? value.filter((label) => typeof label === "string") : [];
+}
+
+/** Everything else that stands in `gui_attributes` stays as it is spelled. */
+export function setLabels(doc: Y.Doc, labels: readonly string[]): void {
+  const kept = [...new Set(labels.map((label) => label.trim()).filter(Boolean))];
+  const text = withMember(
+    attributes(asJsonText(rootOf(doc, "meta").get(KEY))),
+    "labels",
+    kept.length === 0 ? null : JSON.stringify(kept),
+  );
+  asOneEdit(doc, () => {
+    if (text === "{}") rootOf(doc, "meta").delete(KEY);
+    else rootOf(doc, "meta").set(KEY, text);
+  });
+}

@@ -1,0 +1,99 @@
+// @vitest-environment jsdom
+import { MantineProvider } from "@mantine/core";
+import { act } from "react";
+import { createRoot, type Root } from "react-dom/client";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { type EditorContext, EditorReactContext } from "../../edit-actions/editor-context";
+import { addAction } from "../../graph/edit";
+import { graphNow } from "../../graph/edit/document-writes";
+import { RoomProvider, useGraph, useRoom } from "../../sync/use-room";
+import { FakeServer } from "../../testing/fake-server";
+import { ParameterList } from "./parameter-list";
+
+vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
+vi.stubGlobal("matchMedia", () => ({
+  matches: false,
+  addEventListener: () => {},
+  removeEventListener: () => {},
+}));
+vi.stubGlobal(
+  "ResizeObserver",
+  class {
+    observe() {}
+    unobserve() {}
+    disconnect() {}
+  },
+);
+
+Object.assign(document, { fonts: new EventTarget() });
+
+let root: Root;
+let server: FakeServer;
+
+function Page() {
+  const { doc } = useRoom();
+  const graph = useGraph();
+  const [action] = graph.actions;
+  return (
+    <EditorReactContext value={{ doc, graph } as unknown as EditorContext}>
+      {action && <ParameterList action={action} side="in" />}
+    </EditorReactContext>
+  );
+}
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  server = new FakeServer();
+  addAction(server.doc, { name: "Say", inputs: [{ path: "text", text: '{"pvf_type":"string"}' }] });
+  server.seq = 1;
+  vi.stubGlobal(
+    "WebSocket",
+    class {
+      constructor(url: string) {
+        // biome-ignore lint/correctness/noConstructorReturn: the fake stands in for the browser's
+        return server.open(url) as never;
+      }
+    },
+  );
+  root = createRoot(document.body.appendChild(document.createElement("div")));
+  act(() =>
+    root.render(
+      <MantineProvider>
+        <RoomProvider url="ws://host/room">
+          <Page />
+        </RoomProvider>
+      </MantineProvider>,
+    ),
+  );
+  act(() => {
+    server.accept();
+    vi.advanceTimersByTime(100);
+  });
+});
+
+afterEach(() => {
+  act(() => root.unmount());
+  document.body.replaceChildren();
+  vi.useRealTimers();
+});
+
+function found<T extends HTMLElement>(selector: string): T {
+  const element = document.querySelector<T>(selector);
+  if (!element) throw new Error(`no ${selector}`);
+  return element;
+}
+
+test("a field for a parameter's name keeps the caret while one thinks about the name", () => {
+  act(() => found("[aria-label='What the parameter text is']").click());
+  const field = found<HTMLInputElement>("section[aria-label='What the parameter text is'] input");
+  act(() => {
+    field.focus();
+    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value")?.set?.call(field, "wo");
+    field.dispatchEvent(new Event("input", { bubbles: true }));
+  });
+  act(() => void vi.advanceTimersByTime(2_000));
+  expect(document.activeElement).toBe(field);
+  act(() => field.blur());
+  const [action] = graphNow(server.doc).actions;
+  expect(action?.inputs.map(({ path }) => path)).toEqual(["wo"]);
+});

@@ -1,0 +1,24 @@
+/** When something runs, as sentences: what the engine would really do. */
+
+import { useEditorContext } from "../edit-actions/editor-context";
+import type { Key } from "../graph/model";
+import { startWords } from "../graph/relation-words";
+import style from "./inspector.module.css";
+
+export function RunConditions({ of, title }: { of: Key; title: string }) {
+  const { graph } = useEditorContext();
+  return (
+    <section className={style.section}>
+      <div className={style.heading}>
+        <h3>{title}</h3>
+      </div>
+      <div className={style.say}>
+        <div>
+          {startWords(graph, of).map((sentence) => (
+            <p key={sentence}>{sentence}</p>
+          ))}
+        </div>
+      </div>
+    </section>
+  );
+}

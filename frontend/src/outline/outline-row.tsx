@@ -1,0 +1,232 @@
+/** One row of the outline. */
+import { ActionIcon, Menu } from "@mantine/core";
+import {
+  IconChevronRight,
+  IconDots,
+  IconFrame,
+  IconMessageCircle,
+  IconNote,
+  IconPlayerPlay,
+} from "@tabler/icons-react";
+import { memo, useId, useState } from "react";
+import { useOpenThreadCount } from "../canvas/card-highlights";
+import { noteColor } from "../canvas/note-colors";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
+import type { Note } from "../graph/edit/notes";
+import { cardLines, lineText } from "../graph/value-text";
+import { durationLabel } from "../status/durations";
+import type { Progress } from "../status/progress";
+import { StateLabel } from "../status/state-label";
+import { colorOfName } from "../ui/name-colors";
+import style from "./outline.module.css";
+import { type RowAction, rowActionsOf } from "./row-actions";
+import { RowEdit, type RowEditKind } from "./row-edit";
+import type { OutlineItem } from "./rows";
+
+interface Props {
+  row: OutlineItem;
+  active: boolean;
+  selected: boolean;
+  progress: Progress | null;
+  change: RowEditKind | null;
+  /** What the action is called, or that to which the arrow leads. */
+  name: string;
+  mayEdit: boolean;
+  /** Always the same object, so that a row draws again only when something of it changes. */
+  handlers: RowHandlers;
+}
+
+/** What a row can ask for. */
+export interface RowHandlers {
+  flip(id: string): void;
+  focus(id: string): void;
+  choose(row: OutlineItem): void;
+  run(rowAction: RowAction, row: OutlineItem): void;
+  done(said: string | null): void;
+}
+
+function Talk({ of }: { of: string }) {
+  const count = useOpenThreadCount(of);
+  if (count === 0) return null;
+  return (
+    <span className={style.talk} title={`${count} open comments`}>
+      <IconMessageCircle size={13} aria-hidden /> {count}
+      <span className="visually-hidden"> open comments</span>
+    </span>
+  );
+}
+
+function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">) {
+  switch (row.kind) {
+    case "entry":
+      return (
+        <span className={style.end}>
+          <IconPlayerPlay size={13} aria-hidden /> Entry
+        </span>
+      );
+    case "action": {
+      const { action } = row;
+      const [line] = cardLines(action.inputs, 1);
+      return (
+        <>
+          <span className={style.head}>
+            <b>
+              {action.name} {action.instanceId}
+            </b>
+            <Talk of={action.key} />
+            {progress && (
+              <StateLabel tone={progress.tone} word={progress.word} {...durationLabel(progress)} />
+            )}
+          </span>
+          <span className={style.sub}>
+            {action.missing ? "named by an arrow, but not there" : action.actor || "any robot"}
+            {line && ` · ${lineText(line)}`}
+            {row.follows === 0 && " · nothing follows"}
+          </span>
+        </>
+      );
+    }
+    case "outcome":
+      return (
+        <span className={style.outcome} style={{ color: outcomeColor[row.outcome] }}>
+          <OutcomeSign outcome={row.outcome} /> {outcomeWord[row.outcome]}
+        </span>
+      );
+    case "target":
+      return (
+        <span className={style.target}>
+          <span className={style.response}>{row.response}</span> <b>{name}</b>
+          {!row.relation.required && <span className={style.sub}>optional</span>}
+        </span>
+      );
+    case "note": {
+      const { kind, text } = row.note;
+      const Sign = kind === "frame" ? IconFrame : IconNote;
+      return (
+        <span className={style.note}>
+          <Sign size={13} aria-label={noteWord(row.note)} />
+          <span className={style.sub}>{text || "empty"}</span>
+        </span>
+      );
+    }
+  }
+}
+
+interface RowActionsProps {
+  row: OutlineItem;
+  active: boolean;
+  label: string;
+  mayEdit: boolean;
+  handlers: RowHandlers;
+}
+
+/** The menu itself is made when it is first opened: there may be thousands of rows. */
+function RowActions({ row, active, label, mayEdit, handlers }: RowActionsProps) {
+  const [opened, setOpened] = useState<boolean | null>(null);
+  const button = (
+    <ActionIcon
+      size={32}
+      className={style.more ?? ""}
+      tabIndex={active ? 0 : -1}
+      aria-label={`What to do with ${label}`}
+      onClick={() => setOpened(!opened)}
+    >
+      <IconDots size={16} aria-hidden />
+    </ActionIcon>
+  );
+  if (opened === null) return button;
+  return (
+    <Menu opened={opened} onChange={setOpened} trapFocus returnFocus={false}>
+      <Menu.Target>{button}</Menu.Target>
+      <Menu.Dropdown>
+        {rowActionsOf(row).map((rowAction) => (
+          <Menu.Item
+            key={rowAction.name}
+            disabled={rowAction.changes && !mayEdit}
+            rightSection={<kbd className={style.key}>{keyWords(rowAction.key)}</kbd>}
+            onClick={() => handlers.run(rowAction, row)}
+          >
+            {rowAction.label}
+          </Menu.Item>
+        ))}
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
+
+const keyWords = (key: string): string =>
+  key.replace("Arrow", "").replace("Alt+Up", "Alt ↑").replace("Alt+Down", "Alt ↓").toUpperCase();
+
+const noteWord = ({ kind }: Note) => (kind === "frame" ? "Frame" : "Note");
+
+function colorOf(row: OutlineItem): string {
+  if (row.kind === "note") return noteColor[row.note.color];
+  return row.kind === "action" ? colorOfName(row.action.actor) : "transparent";
+}
+
+function labelOf(row: OutlineItem, name: string): string {
+  switch (row.kind) {
+    case "entry":
+      return "Entry";
+    case "action":
+      return name;
+    case "outcome":
+      return `${name}, ${outcomeWord[row.outcome]}`;
+    case "target":
+      return `the arrow to ${name}`;
+    case "note":
+      return `${noteWord(row.note)}: ${row.note.text.slice(0, 60) || "empty"}`;
+  }
+}
+
+export const OutlineRow = memo(function OutlineRow(props: Props) {
+  const { row, active, selected, progress, change, name, mayEdit, handlers } = props;
+  const label = labelOf(row, name);
+  const words = useId();
+  return (
+    <tr
+      className={style.row}
+      data-row={row.id}
+      data-level={row.level}
+      aria-level={row.level}
+      aria-posinset={row.at}
+      aria-setsize={row.of}
+      aria-selected={selected}
+      aria-labelledby={words}
+      {...(row.open === null ? {} : { "aria-expanded": row.open })}
+      tabIndex={active ? 0 : -1}
+      style={{ "--c": colorOf(row) } as React.CSSProperties}
+      onFocus={(event) => {
+        if (event.target === event.currentTarget) handlers.focus(row.id);
+      }}
+    >
+      <td className={style.words}>
+        {row.open === null ? (
+          <span className={style.none} />
+        ) : (
+          <span className={style.flip} data-down={row.open || undefined}>
+            <ActionIcon
+              size={32}
+              tabIndex={-1}
+              aria-label={row.open ? "Close" : "Open"}
+              onClick={() => handlers.flip(row.id)}
+            >
+              <IconChevronRight size={15} aria-hidden />
+            </ActionIcon>
+          </span>
+        )}
+        <button type="button" id={words} tabIndex={-1} onClick={() => handlers.choose(row)}>
+          <Words row={row} progress={progress} name={name} />
+        </button>
+      </td>
+      <td className={style.deeds}>
+        <RowActions row={row} active={active} label={label} mayEdit={mayEdit} handlers={handlers} />
+      </td>
+      {change !== null && (
+        <td className={style.edit}>
+          <RowEdit row={row} change={change} onDone={handlers.done} />
+        </td>
+      )}
+    </tr>
+  );
+});

@@ -1,0 +1,104 @@
+/** What can be done to a row of the outline, with its key. */
+
+import type { EditorContext } from "../edit-actions/editor-context";
+import { relationId } from "../graph/document-keys";
+import { removeActions, removeNotes, removeRelation, setResponse, swapOrder } from "../graph/edit";
+import { ENTRY, type Key, spokenOutcomes } from "../graph/model";
+import { endName } from "../graph/relation-words";
+import type { RowEditKind } from "./row-edit";
+import type { OutlineItem } from "./rows";
+
+export interface RowAction {
+  readonly name: RowEditKind | "delete" | "up" | "down" | "details" | "comments";
+  readonly label: string;
+  /** As in `KeyboardEvent.key`, with `Alt+` before it where needed. */
+  readonly key: string;
+  readonly changes: boolean;
+}
+
+const RENAME: RowAction = { name: "rename", label: "Rename", key: "F2", changes: true };
+const CONNECT: RowAction = { name: "connect", label: "Connect …", key: "c", changes: true };
+const DETAILS: RowAction = { name: "details", label: "Details", key: "Enter", changes: false };
+const TALK: RowAction = { name: "comments", label: "Comment", key: "m", changes: false };
+const UP: RowAction = { name: "up", label: "Move up", key: "Alt+ArrowUp", changes: true };
+const DOWN: RowAction = { name: "down", label: "Move down", key: "Alt+ArrowDown", changes: true };
+const DELETE: RowAction = { name: "delete", label: "Delete", key: "Delete", changes: true };
+const WRITE: RowAction = { name: "rename", label: "Write the text", key: "F2", changes: true };
+const RESPONSE: RowAction = {
+  name: "response",
+  label: "Another response …",
+  key: "r",
+  changes: true,
+};
+const TARGET: RowAction = { name: "target", label: "Lead it elsewhere …", key: "t", changes: true };
+
+export function rowActionsOf(row: OutlineItem): readonly RowAction[] {
+  switch (row.kind) {
+    case "entry":
+      return [{ ...CONNECT, label: "Start with …" }];
+    case "action":
+      return [DETAILS, RENAME, CONNECT, TALK, UP, DOWN, DELETE];
+    case "outcome":
+      return [CONNECT, DETAILS];
+    case "target":
+      return row.relation.parent === ENTRY
+        ? [DETAILS, TARGET, UP, DOWN, DELETE]
+        : [DETAILS, RESPONSE, TARGET, UP, DOWN, DELETE];
+    case "note":
+      return [DETAILS, WRITE, DELETE];
+  }
+}
+
+export function rowActionFor(
+  row: OutlineItem,
+  event: { key: string; altKey: boolean },
+): RowAction | null {
+  const pressed = event.altKey ? `Alt+${event.key}` : event.key;
+  const key = pressed === "Backspace" ? "Delete" : pressed;
+  return rowActionsOf(row).find((rowAction) => rowAction.key === key) ?? null;
+}
+
+/** Takes a row away: an action with its arrows, or what one outcome says to one target. */
+export function removeRow(context: EditorContext, row: OutlineItem): string {
+  if (row.kind === "action") {
+    const name = endName(context.graph, row.action.key);
+    removeActions(context.doc, [row.action.key]);
+    return `${name} is deleted`;
+  }
+  if (row.kind === "note") {
+    removeNotes(context.doc, [row.note.key.slice(2)]);
+    return row.note.kind === "frame" ? "The frame is deleted" : "The note is deleted";
+  }
+  if (row.kind !== "target") return "";
+  const id = relationId(row.relation);
+  const others = spokenOutcomes(row.relation.conditions).filter(
+    (outcome) => outcome !== row.outcome,
+  );
+  if (others.length > 0 && row.relation.parent !== ENTRY) {
+    setResponse(context.doc, id, row.outcome, "ignore");
+  } else removeRelation(context.doc, id);
+  return `The arrow to ${endName(context.graph, row.relation.child)} is deleted`;
+}
+
+/** The relation through which a row stands where it stands. */
+function way(context: EditorContext, row: OutlineItem): { parent: Key; child: Key } | null {
+  if (row.kind === "target") return row.relation;
+  if (row.kind !== "action") return null;
+  const into = context.graph.relations.filter(({ child }) => child === row.action.key);
+  return into.find(({ parent }) => parent === ENTRY) ?? into[0] ?? null;
+}
+
+/** Changes places with the sibling before or after it, in the order in which they are started. */
+export function moveRow(context: EditorContext, row: OutlineItem, step: -1 | 1): string {
+  const here = way(context, row);
+  const siblings = context.graph.relations
+    .filter(({ parent }) => parent === here?.parent)
+    .sort((a, b) => a.parentOrder - b.parentOrder);
+  const at = siblings.findIndex(({ child }) => child === here?.child);
+  const one = siblings[at];
+  const other = siblings[at + step];
+  if (one === undefined || other === undefined) return "There is nothing to change places with";
+  swapOrder(context.doc, siblings.map(relationId), at, at + step);
+  const before = step < 0 ? "before" : "after";
+  return `${endName(context.graph, one.child)} stands ${before} ${endName(context.graph, other.child)}`;
+}

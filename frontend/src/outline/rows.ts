@@ -1,0 +1,180 @@
+/** The graph as rows of an outline: actions, their outcomes, and what follows each. Pure. */
+import { relationId } from "../graph/document-keys";
+import { type Note, notesOf } from "../graph/edit/notes";
+import {
+  type Action,
+  ENTRY,
+  EXIT,
+  type Graph,
+  type Key,
+  PRECONDITIONS,
+  type Precondition,
+  type Relation,
+  type Response,
+} from "../graph/model";
+
+interface OutlinePosition {
+  readonly id: string;
+  readonly level: 1 | 2 | 3;
+  /** The row above it in the tree; null at the top. */
+  readonly parent: string | null;
+  /** Whether what is under it is shown; null: nothing is under it. */
+  readonly open: boolean | null;
+  /** From 1, among its siblings. */
+  readonly at: number;
+  readonly of: number;
+}
+
+export type OutlineItem = OutlinePosition &
+  (
+    | { readonly kind: "entry" }
+    | { readonly kind: "action"; readonly action: Action; readonly follows: number }
+    | { readonly kind: "outcome"; readonly action: Action; readonly outcome: Precondition }
+    | {
+        readonly kind: "target";
+        readonly relation: Relation;
+        readonly outcome: Precondition;
+        readonly response: Response;
+      }
+    | { readonly kind: "note"; readonly note: Note }
+  );
+
+type Children = ReadonlyMap<Key, readonly Relation[]>;
+
+function childrenOf(graph: Graph): Children {
+  const found = new Map<Key, Relation[]>();
+  for (const relation of graph.relations) {
+    const known = found.get(relation.parent);
+    if (known) known.push(relation);
+    else found.set(relation.parent, [relation]);
+  }
+  for (const list of found.values()) list.sort((a, b) => a.parentOrder - b.parentOrder);
+  return found;
+}
+
+/** The actions in the order in which a run would come to them; unreachable ones last. */
+export function inOrder(graph: Graph, children = childrenOf(graph)): Action[] {
+  const actions = new Map(graph.actions.map((action) => [action.key, action]));
+  const found = new Set<Key>();
+  let front: Key[] = [ENTRY];
+  while (front.length > 0) {
+    const next: Key[] = [];
+    for (const parent of front) {
+      for (const { child } of children.get(parent) ?? []) {
+        if (!actions.has(child) || found.has(child)) continue;
+        found.add(child);
+        next.push(child);
+      }
+    }
+    front = next;
+  }
+  const rest = graph.actions.filter((action) => !found.has(action.key));
+  return [...[...found].flatMap((key) => actions.get(key) ?? []), ...rest];
+}
+
+/** `isOpen` says of an action or outcome, by the id of its row, whether its children are shown. */
+export function rowsOf(graph: Graph, isOpen: (id: string) => boolean): OutlineItem[] {
+  const children = childrenOf(graph);
+  const actions = inOrder(graph, children);
+  const rows: OutlineItem[] = [];
+  const notes = notesOf(graph);
+  const of = 1 + actions.length + notes.length;
+  const starts = children.get(ENTRY) ?? [];
+  const entryOpen = starts.length === 0 ? null : isOpen(ENTRY);
+  rows.push({ kind: "entry", id: ENTRY, level: 1, parent: null, open: entryOpen, at: 1, of });
+  if (entryOpen) rows.push(...targets(starts, "on_true", ENTRY, 2));
+  for (const [i, action] of actions.entries()) {
+    const after = children.get(action.key) ?? [];
+    const open = after.length === 0 ? null : isOpen(action.key);
+    const follows = after.length;
+    const place = { id: action.key, level: 1, parent: null, open, at: i + 2, of } as const;
+    rows.push({ kind: "action", ...place, action, follows });
+    if (open) rows.push(...outcomes(action, after, isOpen));
+  }
+  for (const [i, note] of notes.entries()) {
+    const at = actions.length + i + 2;
+    rows.push({ kind: "note", id: note.key, level: 1, parent: null, open: null, at, of, note });
+  }
+  return rows;
+}
+
+function outcomes(
+  action: Action,
+  after: readonly Relation[],
+  isOpen: (id: string) => boolean,
+): OutlineItem[] {
+  const said = PRECONDITIONS.map((outcome) => ({
+    outcome,
+    answers: after.filter((relation) => relation.conditions[outcome] !== "ignore"),
+  })).filter(({ answers }) => answers.length > 0);
+  // An arrow that ignores everything is there all the same: under the outcome that comes first.
+  const mute = after.filter((relation) =>
+    PRECONDITIONS.every((outcome) => relation.conditions[outcome] === "ignore"),
+  );
+  if (mute.length > 0 && said.every(({ outcome }) => outcome !== "on_true")) {
+    said.unshift({ outcome: "on_true", answers: [] });
+  }
+  return said.flatMap(({ outcome, answers }, i) => {
+    const id = `${action.key}|${outcome}`;
+    const shown = outcome === "on_true" ? [...answers, ...mute] : answers;
+    const open = isOpen(id);
+    const row: OutlineItem = {
+      kind: "outcome",
+      id,
+      level: 2,
+      parent: action.key,
+      open,
+      at: i + 1,
+      of: said.length,
+      action,
+      outcome,
+    };
+    return open ? [row, ...targets(shown, outcome, id, 3)] : [row];
+  });
+}
+
+function targets(
+  relations: readonly Relation[],
+  outcome: Precondition,
+  parent: string,
+  level: 2 | 3,
+): OutlineItem[] {
+  return relations.map((relation, i) => ({
+    kind: "target",
+    id: `${relationId(relation)}|${outcome}`,
+    level,
+    parent,
+    open: null,
+    at: i + 1,
+    of: relations.length,
+    relation,
+    outcome,
+    response: relation.conditions[outcome],
+  }));
+}
+
+/** What people call every end of the graph: with the number only where the name is not enough. */
+export function namesOf(graph: Graph): ReadonlyMap<Key, string> {
+  const counts = new Map<string, number>();
+  for (const { name } of graph.actions) counts.set(name, (counts.get(name) ?? 0) + 1);
+  const names = graph.actions.map(({ key, name, instanceId }): [Key, string] => [
+    key,
+    (counts.get(name) ?? 0) > 1 ? `${name} ${instanceId}` : name,
+  ]);
+  return new Map([[ENTRY, "Entry"], [EXIT, "Exit"], ...names]);
+}
+
+/** What is selected in the graph when a row is. */
+export function subjectOf(row: OutlineItem): string {
+  switch (row.kind) {
+    case "entry":
+      return ENTRY;
+    case "action":
+    case "outcome":
+      return row.action.key;
+    case "target":
+      return relationId(row.relation);
+    case "note":
+      return row.note.key;
+  }
+}

@@ -1,0 +1,136 @@
+/** The cursor of a replay: where it stands, whether it plays, and the run as it was known there. */
+import { useQueryClient } from "@tanstack/react-query";
+import { useCallback, useEffect, useMemo, useRef, useState } from "react";
+import { useReplayData } from "../../api/review";
+import type { Run } from "../../api/runs";
+import { instant } from "../../ui/times";
+import { chapterAt, ReplayPlayer } from "./replay";
+
+export const REPLAY_SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
+
+export interface ReplayCursor {
+  /** Milliseconds since 1970; null at the live edge, or at the end of what is over. */
+  at: number | null;
+  start: number;
+  end: number;
+  playing: boolean;
+  speed: number;
+  /** The replay is on its way. */
+  waiting: boolean;
+  failed: unknown;
+  /** The run as it was known at the cursor. */
+  run: Run;
+  player: ReplayPlayer | null;
+  seek: (at: number | null) => void;
+  play: (playing: boolean) => void;
+  setSpeed: (speed: number) => void;
+  step: (direction: 1 | -1) => void;
+}
+
+const AGAIN = 3_000; // ms between two requests for the replay of a run that goes on
+
+/** `newest`: the run as it is known now; `end`: the right edge of its time. */
+export function useReplay(
+  runner: string | undefined,
+  newest: Run,
+  end: number,
+  from: number | null,
+): ReplayCursor {
+  const start = instant(newest.requested_at) ?? instant(newest.started_at) ?? end;
+  const [at, setAt] = useState(from);
+  const [playing, setPlaying] = useState(false);
+  const [speed, setSpeed] = useState(1);
+  const [chapter, setChapter] = useState(0);
+  const asked = at !== null || playing;
+  const replay = useReplayData(runner, newest.id, chapter, asked);
+  const client = useQueryClient();
+  const goes = newest.ended_at === null;
+  useEffect(() => {
+    if (!goes || !asked) return;
+    const key = ["runs", "film", newest.id];
+    const timer = setInterval(() => void client.invalidateQueries({ queryKey: key }), AGAIN);
+    return () => {
+      clearInterval(timer);
+      void client.invalidateQueries({ queryKey: key });
+    };
+  }, [goes, asked, client, newest.id]);
+  const still = useRef(newest);
+  if (still.current.id !== newest.id || newest.umrf !== still.current.umrf) still.current = newest;
+  const player = useMemo(
+    () => (replay.data ? new ReplayPlayer(replay.data, still.current) : null),
+    [replay.data],
+  );
+  const chapters = replay.data?.chapters;
+  useEffect(() => {
+    if (at !== null && chapters) setChapter(chapterAt(chapters, at));
+  }, [at, chapters]);
+
+  const edge = useRef(end);
+  edge.current = end;
+  const seek = useCallback(
+    (to: number | null) => {
+      setAt(to === null || to >= edge.current ? null : Math.max(start, to));
+      if (to === null) setPlaying(false);
+    },
+    [start],
+  );
+  const play = useCallback(
+    (on: boolean) => {
+      if (on) setAt((now) => now ?? start);
+      setPlaying(on);
+    },
+    [start],
+  );
+  const step = useCallback(
+    (direction: 1 | -1) => {
+      setPlaying(false);
+      if (direction === 1) {
+        if (at === null) return;
+        const next = player?.next(at) ?? null;
+        const later = chapters?.find((each) => (instant(each.at) ?? 0) > at);
+        seek(next ?? instant(later?.at) ?? null);
+      } else {
+        const here = at ?? edge.current;
+        seek(player === null ? here - 1 : (player.previous(here) ?? start));
+      }
+    },
+    [at, player, chapters, seek, start],
+  );
+  useEffect(() => {
+    if (!playing) return;
+    let last = performance.now();
+    let frame = requestAnimationFrame(function tick(now) {
+      const passed = (now - last) * speed;
+      last = now;
+      setAt((before) => {
+        if (before === null) return before;
+        const next = before + passed;
+        if (next < edge.current) return next;
+        setPlaying(false);
+        return null;
+      });
+      frame = requestAnimationFrame(tick);
+    });
+    return () => cancelAnimationFrame(frame);
+  }, [playing, speed]);
+
+  const run = useMemo(
+    () => (at === null || player === null ? newest : player.at(at)),
+    [at, player, newest],
+  );
+  return {
+    at,
+    start,
+    end,
+    playing,
+    speed,
+    waiting: asked && replay.isPending,
+    failed: asked ? replay.error : null,
+    run,
+    player,
+    seek,
+    play,
+    setSpeed,
+    step,
+  };
+}

@@ -1,0 +1,56 @@
+/** Why a run did not end well, at the top of its page: each cause with a way to where it shows. */
+import { IconAlertTriangle } from "@tabler/icons-react";
+import { type Cause, needsExplanation, useCauses } from "../../api/review";
+import type { Run } from "../../api/runs";
+import { clock, instant } from "../../ui/times";
+import style from "./causes.module.css";
+
+interface Props {
+  runner: string | undefined;
+  run: Run;
+  onShow: (at: number, aid: string | null) => void;
+}
+
+const SHOWN = 3;
+
+function Line({ cause, onShow }: { cause: Cause; onShow: Props["onShow"] }) {
+  const at = instant(cause.at) ?? 0;
+  return (
+    <li>
+      <button
+        type="button"
+        className={style.at}
+        title="Show this moment"
+        onClick={() => onShow(at, cause.aid)}
+      >
+        {clock(at)}
+      </button>
+      <span>{cause.text}</span>
+    </li>
+  );
+}
+
+/** Says so, too, when nothing is recorded that would explain it. */
+export function FailureCauses({ runner, run, onShow }: Props) {
+  const found = useCauses(runner, run).data;
+  if (!needsExplanation(run) || found === undefined) return null;
+  const plain = run.ended_at === null || run.state === "stopped" || run.result === null;
+  if (found.length === 0 && plain) return null;
+  return (
+    <section className={style.causes} aria-label="Why" data-known={found.length > 0 || undefined}>
+      <h2>
+        <IconAlertTriangle size={15} aria-hidden /> Why
+      </h2>
+      {found.length === 0 ? (
+        <p>No cause is recorded.</p>
+      ) : (
+        <ol>
+          {found.slice(0, SHOWN).map((cause) => (
+            <Line key={`${cause.kind} ${cause.at} ${cause.text}`} cause={cause} onShow={onShow} />
+          ))}
+        </ol>
+      )}
+      {found.length > SHOWN && <p>and {found.length - SHOWN} more, among the events</p>}
+    </section>
+  );
+}

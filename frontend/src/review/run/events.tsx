@@ -1,0 +1,208 @@
+/** What happened in a run, in order, in sentences. */
+
+import { TextInput } from "@mantine/core";
+import { useMemo, useState } from "react";
+import { authorName } from "../../api/graphs";
+import type { ReplayMark } from "../../api/review";
+import { type Run, runPlace } from "../../api/runs";
+import {
+  runEndText,
+  type Tone,
+  visitBegin,
+  visitDurationBound,
+  visitEnd,
+} from "../../status/progress";
+import { toneColor } from "../../status/state-label";
+import { clock, instant } from "../../ui/times";
+import { markText } from "../replay/replay-marks";
+import style from "./events.module.css";
+
+interface Happening {
+  at: number;
+  tone: Tone;
+  name: string | null;
+  aid: string | null;
+  text: string;
+}
+
+function spaced(fullName: string): string {
+  return fullName.replace(/_(\d+)$/, " $1");
+}
+
+/** Seconds after the start. The clock of an engine may stand a little behind the runner's. */
+function after(start: number, at: number): string {
+  return `+${(Math.max(0, at - start) / 1000).toFixed(1)}`;
+}
+
+/** Marks that say what neither the visits nor the run's own fields say. */
+const TOLD: ReadonlySet<string> = new Set([
+  "run.stop_requested.v1",
+  "run.pause_requested.v1",
+  "run.resume_requested.v1",
+  "run.modify_requested.v1",
+  "run.modify_refused.v1",
+  "run.proof.v1",
+  "run.silent.v1",
+  "run.answered.v1",
+]);
+
+/** Everything that the run tells, oldest first; nothing comes before its start. */
+export function eventLines(
+  run: Run,
+  version: string,
+  marks: readonly ReplayMark[] = [],
+): Happening[] {
+  const all: Happening[] = [];
+  const start = instant(run.started_at);
+  for (const [name, action] of Object.entries(run.actions ?? {})) {
+    action.visits.forEach((visit, i) => {
+      const from = visitBegin(visit);
+      const until = visitEnd(visit);
+      const again = i > 0 ? `again (${i + 1}.)` : "";
+      const who = { name: spaced(name), aid: action.aid };
+      if (from !== null) all.push({ at: from, tone: "run", ...who, text: `runs ${again}`.trim() });
+      if (until !== null) {
+        const result = visit.result?.replace(/^on_/, "") ?? null;
+        const tone = (result ?? "done") as Tone;
+        const last = visitDurationBound(visit) === null ? until : instant(visit.not_after);
+        const seen = visit.how === "inferred" ? " (inferred)" : "";
+        const since =
+          last === until || start === null ? "" : ` (not before ${after(start, until)})`;
+        const open = last === null ? "; its code may go on" : "";
+        const at = last ?? Math.max(until, from ?? until);
+        all.push({ at, tone, ...who, text: (result ?? "finished") + seen + since + open });
+      }
+    });
+    for (const message of action.messages) {
+      const at = instant(message.at);
+      if (at === null) continue;
+      all.push({
+        at,
+        tone: "idle",
+        name: spaced(name),
+        aid: action.aid,
+        text: `“${message.text}”`,
+      });
+    }
+  }
+  for (const line of run.log ?? []) {
+    const at = instant(line.at);
+    if (at !== null) all.push({ at, tone: "idle", name: "engine", aid: null, text: line.text });
+  }
+  for (const mark of marks) {
+    const at = instant(mark.at);
+    if (at === null || !TOLD.has(mark.kind)) continue;
+    all.push({ at, tone: "stopped", name: null, aid: null, text: markText(mark) });
+  }
+  for (const alarm of run.alarms) {
+    const at = instant(alarm.at);
+    if (at !== null) all.push({ at, tone: "error", name: null, aid: null, text: alarm.text });
+  }
+  const end = instant(run.ended_at);
+  if (end !== null)
+    all.push({
+      at: end,
+      tone: "idle",
+      name: null,
+      aid: null,
+      text: `Run ${runEndText(run)}${run.detail ? `: ${run.detail}` : ""}`,
+    });
+  all.sort((a, b) => a.at - b.at);
+  if (start === null) return all;
+  const where = run.engine === "simulator" ? "in the simulator" : `on ${runPlace(run)}`;
+  const text = `${authorName(run.author)} started ${version} ${where}`;
+  return [{ at: start, tone: "idle", name: null, aid: null, text }, ...all];
+}
+
+interface Props {
+  run: Run;
+  version: string;
+  selected: string | null;
+  onPick: (aid: string | null) => void;
+  marks: readonly ReplayMark[];
+  /** Where the replay stands, ms; null at the end. */
+  at: number | null;
+  onSeek: (at: number) => void;
+}
+
+const SHOWN = 400;
+
+function Line(
+  props: { event: Happening; start: number; first: boolean } & Omit<
+    Props,
+    "run" | "version" | "marks"
+  >,
+) {
+  const { event, start, first, selected, onPick, at, onSeek } = props;
+  return (
+    <li
+      className={style.event}
+      data-selected={(event.aid !== null && event.aid === selected) || undefined}
+      data-later={(at !== null && event.at > at) || undefined}
+    >
+      <button
+        type="button"
+        className={style.time}
+        onClick={() => onSeek(event.at)}
+        title="Show this moment"
+      >
+        <time dateTime={new Date(event.at).toISOString()}>
+          {first ? clock(event.at) : after(start, event.at)}
+        </time>
+      </button>
+      <span>
+        {event.name !== null && (
+          <button type="button" className={style.name} onClick={() => onPick(event.aid)}>
+            {event.name}
+          </button>
+        )}{" "}
+        <span style={event.tone === "idle" ? {} : { color: toneColor[event.tone] }}>
+          {event.text}
+        </span>
+      </span>
+    </li>
+  );
+}
+
+export function RunEvents(props: Props) {
+  const { run, version, marks, selected } = props;
+  const [search, setSearch] = useState("");
+  const start = instant(run.started_at) ?? 0;
+  const all = useMemo(() => eventLines(run, version, marks), [run, version, marks]);
+  const wanted = search.trim().toLowerCase();
+  const found = all.filter(
+    (event) => wanted === "" || `${event.name ?? ""} ${event.text}`.toLowerCase().includes(wanted),
+  );
+  const shown = found.slice(-SHOWN);
+  return (
+    <>
+      <TextInput
+        className={style.search ?? ""}
+        size="xs"
+        aria-label="Search events"
+        placeholder="Search events"
+        value={search}
+        onChange={(event) => setSearch(event.currentTarget.value)}
+      />
+      {found.length > shown.length && (
+        <p className={style.more}>{found.length - shown.length} earlier ones are not listed.</p>
+      )}
+      {found.length === 0 && <p className={style.more}>Nothing of this was said or seen.</p>}
+      <ol className={style.events}>
+        {shown.map((event, i) => (
+          <Line
+            // biome-ignore lint/suspicious/noArrayIndexKey: the list is only ever appended to
+            key={i}
+            event={event}
+            start={start}
+            first={event === all[0]}
+            selected={selected}
+            onPick={props.onPick}
+            at={props.at}
+            onSeek={props.onSeek}
+          />
+        ))}
+      </ol>
+    </>
+  );
+}

@@ -1,0 +1,274 @@
+/** One run: its version on the canvas, every visit on the timeline, what was said, how it ended. */
+import { Button, Skeleton, Tabs } from "@mantine/core";
+import { IconAlertTriangle } from "@tabler/icons-react";
+import { ReactFlowProvider } from "@xyflow/react";
+import { type ReactNode, useEffect, useMemo, useState } from "react";
+import { Link, useSearch } from "wouter";
+import { authorName } from "../../api/graphs";
+import { errorText } from "../../api/http";
+import { useLive } from "../../api/live/use-live";
+import { type ReplayMark, useReplayData, useRunsOfSameStart } from "../../api/review";
+import { type Run, useRun } from "../../api/runs";
+import { fromUmrf } from "../../canvas/from-umrf";
+import { GraphView } from "../../canvas/graph-view";
+import { type Progress, progressByAid, runEndText, runLabel } from "../../status/progress";
+import { StateLabel } from "../../status/state-label";
+import { Timeline, type Track } from "../../status/timeline";
+import { lanesOf } from "../../status/timeline-lanes";
+import { Empty } from "../../ui/empty";
+import { clock, instant, useNow } from "../../ui/times";
+import type { Crumb } from "../../ui/top-bar";
+import { PlayerControls } from "../replay/replay-controls";
+import { silentTimesOf, timelineSignsOf } from "../replay/replay-marks";
+import { type ReplayCursor, useReplay } from "../replay/use-replay";
+import { FailureCauses } from "./causes";
+import { RunEvents } from "./events";
+import { RawEvents } from "./raw-events";
+import { RunFacts } from "./run-facts";
+import { type RepeatActions, RunMenu } from "./run-menu";
+import { PinRun, RunNotes } from "./run-notes";
+import style from "./run-page.module.css";
+import { RunParameters } from "./run-parameters";
+import { useVersionLabel } from "./use-version-label";
+
+export interface RunBarParts {
+  crumbs: readonly Crumb[];
+  status?: ReactNode;
+  actions?: ReactNode;
+}
+
+const NO_MARKS: readonly ReplayMark[] = [];
+
+interface Props {
+  id: string;
+  bar: (parts: RunBarParts) => ReactNode;
+  /** The dialog by which everything is started. */
+  start: (again: RepeatActions, onClose: () => void) => ReactNode;
+}
+
+/** Progress as it was at a moment: what went on then had gone on for so long. */
+function progressAt(run: Run, unsure: boolean, at: number | null): Map<string, Progress> {
+  const found = progressByAid(run, unsure);
+  if (at === null) return found;
+  for (const [aid, progress] of found) {
+    if (progress.since === null) continue;
+    found.set(aid, { ...progress, since: null, took: Math.max(0, at - progress.since) });
+  }
+  return found;
+}
+
+/** Where a link points: a moment, in ms after the start, and an action. */
+function usePlace(run: Run) {
+  const query = new URLSearchParams(useSearch());
+  const t = query.get("t");
+  const start = instant(run.started_at);
+  const from =
+    t !== null && start !== null && Number.isFinite(Number(t)) ? start + Number(t) : null;
+  return { from, action: query.get("action") };
+}
+
+/** Keeps the address in step, so that it can be sent to somebody. */
+function useAddress(id: string, replay: ReplayCursor, selected: string | null): void {
+  const { at, start, playing } = replay;
+  useEffect(() => {
+    const query = new URLSearchParams();
+    if (at !== null) query.set("t", String(Math.round(at - start)));
+    if (selected !== null) query.set("action", selected);
+    const search = query.size > 0 ? `?${query}` : "";
+    if (playing) return; // browsers refuse an address that changes with every frame
+    window.history.replaceState(window.history.state, "", `/runs/${id}${search}`);
+  }, [id, at, start, playing, selected]);
+}
+
+/** The runs that began together with this one, as they are known now. */
+function useTracks(runner: string | undefined, run: Run): readonly Track[] {
+  const { now } = useLive();
+  const mates = useRunsOfSameStart(runner, run).data;
+  return useMemo(
+    () =>
+      (mates ?? []).map((stored) => {
+        const live = now.runs.get(stored.id);
+        const mate = live ? { ...stored, ...live, umrf: stored.umrf } : stored;
+        return { run: mate, lanes: lanesOf(mate, fromUmrf(mate.umrf), mate.engine) };
+      }),
+    [mates, now.runs],
+  );
+}
+
+function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
+  const { now: live, runner } = useLive();
+  const place = usePlace(newest);
+  const [selected, setSelected] = useState<string | null>(place.action);
+  const graph = useMemo(() => fromUmrf(newest.umrf), [newest.umrf]);
+  const goes = newest.ended_at === null;
+  const unsure = goes && live.link === "down";
+  const present = useNow(250, goes);
+  const until = unsure ? live.since : (instant(newest.ended_at) ?? present);
+  const replay = useReplay(runner, newest, until, place.from);
+  const { run } = replay;
+  const past = replay.at !== null;
+  useAddress(newest.id, replay, selected);
+  const progress = useMemo(
+    () => progressAt(run, unsure && !past, replay.at),
+    [run, unsure, past, replay.at],
+  );
+  const mates = useTracks(runner, newest);
+  const robot = mates.length > 0 ? newest.engine : "";
+  const lanes = useMemo(() => lanesOf(newest, graph, robot), [newest, graph, robot]);
+  const engines = useMemo(
+    () =>
+      newest.simulated
+        ? ["simulator"]
+        : [newest.engine, ...mates.map(({ run: mate }) => mate.engine)].sort(),
+    [newest, mates],
+  );
+  const [again, setAgain] = useState<RepeatActions | null>(null);
+  const picked = useMemo(() => new Set(selected === null ? [] : [selected]), [selected]);
+  const replayData = useReplayData(runner, newest.id, 0, true).data;
+  const signs = useMemo(() => timelineSignsOf(replayData), [replayData]);
+  const gaps = useMemo(() => silentTimesOf(replayData, newest, until), [replayData, newest, until]);
+  const label = useVersionLabel(newest);
+  const show = (at: number, aid: string | null) => {
+    replay.seek(at);
+    if (aid !== null) setSelected(aid);
+  };
+  const { tone, word } = runLabel(run);
+  const since = `unknown since ${clock(live.since)}`;
+  const seen = unsure && !past;
+  return (
+    <>
+      {bar({
+        crumbs: [
+          { label: "Runs", to: "/runs" },
+          {
+            label: newest.graph_name,
+            ...(newest.graph === null ? {} : { to: `/graphs/${newest.graph}` }),
+          },
+          { label: `Run ${newest.number}` },
+        ],
+        status: (
+          <>
+            <StateLabel
+              pill
+              tone={seen ? "unknown" : tone}
+              word={seen ? since : run.ended_at === null ? word : runEndText(run)}
+            />
+            {past && <span className={style.simulated}>as it was then</span>}
+            {newest.simulated && <span className={style.simulated}>simulated</span>}
+          </>
+        ),
+        actions: (
+          <>
+            <PinRun runner={runner} run={newest.id} />
+            <RunMenu runner={runner} run={newest} engines={engines} onStart={setAgain} />
+            {newest.graph !== null && (
+              <Button component={Link} to={`/graphs/${newest.graph}`} className={style.back ?? ""}>
+                Open graph
+              </Button>
+            )}
+          </>
+        ),
+      })}
+      <main className={style.page}>
+        <FailureCauses runner={runner} run={newest} onShow={show} />
+        <section className={style.canvas} aria-label="Graph of the run">
+          <ReactFlowProvider>
+            <GraphView
+              graph={graph}
+              progress={progress}
+              selected={picked}
+              onSelect={setSelected}
+              label={`Version ${label} of ${newest.graph_name}`}
+            />
+          </ReactFlowProvider>
+        </section>
+        <section className={style.strip} aria-label="Timeline">
+          <PlayerControls replay={replay} goes={goes} />
+          {replay.failed !== null && (
+            <p className={style.failed} role="alert">
+              The replay cannot be loaded: {errorText(replay.failed)}
+            </p>
+          )}
+          <Timeline
+            run={newest}
+            lanes={lanes}
+            until={until}
+            unsure={unsure}
+            selected={selected}
+            onPick={setSelected}
+            cursor={replay.at}
+            onSeek={replay.seek}
+            signs={signs}
+            gaps={gaps}
+            others={mates}
+          />
+        </section>
+        <aside className={style.side} aria-label="About the run">
+          <Tabs defaultValue="events" keepMounted={false} className={style.tabs ?? ""}>
+            <Tabs.List>
+              <Tabs.Tab value="events">Events</Tabs.Tab>
+              <Tabs.Tab value="parameters">Parameters</Tabs.Tab>
+              <Tabs.Tab value="facts">Facts</Tabs.Tab>
+              <Tabs.Tab value="raw">Raw</Tabs.Tab>
+            </Tabs.List>
+            <Tabs.Panel value="events" className={style.panel ?? ""}>
+              <RunEvents
+                run={newest}
+                version={label}
+                selected={selected}
+                onPick={setSelected}
+                marks={replayData?.marks ?? NO_MARKS}
+                at={replay.at}
+                onSeek={replay.seek}
+              />
+            </Tabs.Panel>
+            <Tabs.Panel value="parameters" className={style.panel ?? ""}>
+              <RunParameters run={run} selected={selected} onPick={setSelected} />
+            </Tabs.Panel>
+            <Tabs.Panel value="facts" className={style.panel ?? ""}>
+              <RunNotes runner={runner} run={newest.id} />
+              <RunFacts
+                runner={runner}
+                run={newest}
+                version={label}
+                by={authorName(newest.author)}
+              />
+            </Tabs.Panel>
+            <Tabs.Panel value="raw" className={style.panel ?? ""}>
+              <RawEvents runner={runner} run={newest} />
+            </Tabs.Panel>
+          </Tabs>
+        </aside>
+      </main>
+      {again !== null && start(again, () => setAgain(null))}
+    </>
+  );
+}
+
+export function RunPage({ id, bar, start }: Props) {
+  const { runner, now } = useLive();
+  const stored = useRun(runner, id);
+  const live = now.runs.get(id);
+  const run = useMemo(() => {
+    if (!stored.data) return null;
+    return live ? { ...stored.data, ...live, umrf: stored.data.umrf } : stored.data;
+  }, [stored.data, live]);
+  if (run !== null) return <Shown run={run} bar={bar} start={start} />;
+  const crumbs = [{ label: "Runs", to: "/runs" }, { label: "Run" }];
+  return (
+    <>
+      {bar({ crumbs })}
+      <main className={style.page}>
+        {stored.isError ? (
+          <Empty icon={<IconAlertTriangle size={22} />} title="This run cannot be shown">
+            {errorText(stored.error)}
+          </Empty>
+        ) : (
+          <section className={style.canvas} aria-busy="true">
+            <Skeleton height="100%" radius={0} />
+          </section>
+        )}
+      </main>
+    </>
+  );
+}

@@ -1,0 +1,108 @@
+/** Values as they were sent beside those that the engine reported, visit by visit. */
+import type { ActionRun, Run } from "../../api/runs";
+import { type ParameterRow, parametersOfVisits } from "./parameter-changes";
+import style from "./run-parameters.module.css";
+
+interface Props {
+  run: Run;
+  selected: string | null;
+  onPick: (aid: string | null) => void;
+}
+
+function spaced(fullName: string): string {
+  return fullName.replace(/_(\d+)$/, " $1");
+}
+
+function Value({ text, differs }: { text: string | null; differs: boolean }) {
+  if (text === null) return <td className={style.none}>—</td>;
+  return (
+    <td data-differs={differs || undefined}>
+      {differs && <abbr title="Not what was sent: it was changed on the way">≠ </abbr>}
+      <code title={text}>{text}</code>
+    </td>
+  );
+}
+
+function Rows({ rows }: { rows: readonly ParameterRow[] }) {
+  return (
+    <tbody>
+      {rows.map((row) => (
+        <tr key={row.parameter}>
+          <th scope="row">{row.parameter.replaceAll("::", " / ")}</th>
+          <Value text={row.sent} differs={false} />
+          {row.ran.map((text, i) => (
+            // biome-ignore lint/suspicious/noArrayIndexKey: visits only ever grow
+            <Value key={i} text={text} differs={text !== row.sent} />
+          ))}
+        </tr>
+      ))}
+    </tbody>
+  );
+}
+
+function Action(props: { name: string; action: ActionRun; run: Run; onPick: () => void }) {
+  const { name, action, run, onPick } = props;
+  const found = parametersOfVisits(run.sent?.[name] ?? {}, action);
+  return (
+    <section className={style.action} aria-label={`Parameters of ${spaced(name)}`}>
+      <h3>
+        <button type="button" onClick={onPick}>
+          {spaced(name)}
+        </button>
+      </h3>
+      {found.rows.length === 0 ? (
+        <p className={style.none}>No parameter has a value.</p>
+      ) : (
+        <div className={style.scroll}>
+          <table>
+            <thead>
+              <tr>
+                <th>Parameter</th>
+                <th>Sent</th>
+                {found.visits.map((words) => (
+                  <th key={words}>{words}</th>
+                ))}
+              </tr>
+            </thead>
+            <Rows rows={found.rows} />
+          </table>
+        </div>
+      )}
+      {found.unseen > 0 && (
+        <p className={style.none}>
+          Of {found.unseen === 1 ? "1 visit" : `${found.unseen} visits`} nobody saw the values.
+        </p>
+      )}
+    </section>
+  );
+}
+
+export function RunParameters({ run, selected, onPick }: Props) {
+  const all = Object.entries(run.actions ?? {});
+  const chosen = all.filter(([, action]) => selected === null || action.aid === selected);
+  const told = chosen.filter(
+    ([name, action]) =>
+      selected !== null ||
+      run.sent?.[name] !== undefined ||
+      action.visits.some((visit) => Object.keys(visit.inputs ?? {}).length > 0),
+  );
+  return (
+    <div className={style.parameters}>
+      {selected !== null && (
+        <button type="button" className={style.all} onClick={() => onPick(null)}>
+          Show all actions
+        </button>
+      )}
+      {told.length === 0 && <p className={style.none}>No action was given a value.</p>}
+      {told.map(([name, action]) => (
+        <Action
+          key={name}
+          name={name}
+          action={action}
+          run={run}
+          onPick={() => onPick(action.aid)}
+        />
+      ))}
+    </div>
+  );
+}

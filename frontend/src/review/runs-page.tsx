@@ -1,0 +1,297 @@
+/** What ran: newest first, with who, when, how long and how it ended. */
+import { Button, Checkbox, Skeleton } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import {
+  IconAlertTriangle,
+  IconArrowsDiff,
+  IconChartBar,
+  IconHistory,
+  IconPinFilled,
+  IconSearch,
+} from "@tabler/icons-react";
+import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
+import { useCallback, useMemo, useState } from "react";
+import { Link, useLocation, useSearch } from "wouter";
+import { authorName } from "../api/graphs";
+import { errorText } from "../api/http";
+import { useLive } from "../api/live/use-live";
+import {
+  filterOf,
+  importExamples,
+  type ListedRun,
+  listRuns,
+  queryOf,
+  type RunFilter,
+} from "../api/review";
+import { hasEnded, type Run, runPlace } from "../api/runs";
+import { boundsText } from "../status/durations";
+import { runEndText, runLabel } from "../status/progress";
+import { StateLabel } from "../status/state-label";
+import { Empty } from "../ui/empty";
+import { clock, day, instant, stopwatch, useNow } from "../ui/times";
+import { useVersionLabel } from "./run/use-version-label";
+import { RunFilters } from "./run-filters";
+import style from "./runs-page.module.css";
+
+const PAGE = 100;
+
+/** The stored list with what the live socket knows better, in the order in which it was asked for. */
+export function overlaid(
+  stored: readonly ListedRun[],
+  live: ReadonlyMap<string, Run>,
+): ListedRun[] {
+  return stored.map((run) => {
+    const now = live.get(run.id);
+    return now === undefined ? run : { ...run, ...now };
+  });
+}
+
+/** Runs that began after the list was asked for. They wait behind a pill: nothing moves by itself. */
+export function newcomers(
+  stored: readonly ListedRun[],
+  live: ReadonlyMap<string, Run>,
+  newest: number,
+): number {
+  const known = new Set(stored.map((run) => run.id));
+  return [...live.values()].filter((run) => run.number > newest && !known.has(run.id)).length;
+}
+
+interface RunRowProps {
+  run: ListedRun;
+  now: number;
+  chosen: boolean;
+  onChoose: (chosen: boolean) => void;
+}
+
+function Row({ run, now, chosen, onChoose }: RunRowProps) {
+  const [, go] = useLocation();
+  const label = useVersionLabel(run);
+  const { tone, word } = runLabel(run);
+  const start = instant(run.started_at);
+  const end = instant(run.ended_at);
+  const over = end === null ? null : (boundsText(run.took) ?? "—");
+  const took = over ?? (start === null ? "" : stopwatch(now - start));
+  const to = `/runs/${run.id}`;
+  return (
+    <tr className={style.row} onClick={() => go(to)}>
+      {/* biome-ignore lint/a11y/useKeyWithClickEvents: keeps a near miss of the box from leaving */}
+      <td className={style.choose} onClick={(event) => event.stopPropagation()}>
+        <Checkbox
+          size="xs"
+          aria-label={`Choose run ${run.number} to compare`}
+          checked={chosen}
+          onChange={(event) => onChoose(event.currentTarget.checked)}
+        />
+      </td>
+      <td className={style.state}>
+        <StateLabel tone={tone} word={run.ended_at === null ? word : runEndText(run)} />
+      </td>
+      <td>
+        <Link to={to} className={style.link} onClick={(event) => event.stopPropagation()}>
+          <span className={style.number}>Run {run.number}</span> {run.graph_name}
+        </Link>
+        {run.pinned && <IconPinFilled size={12} aria-label="pinned" className={style.pin} />}
+        {run.labels?.map((each) => (
+          <span key={each} className={style.label}>
+            {each}
+          </span>
+        ))}
+        {run.cause && <span className={style.cause}>{run.cause}</span>}
+      </td>
+      <td>
+        <span className={style.version}>{label}</span>
+      </td>
+      <td className={style.quiet}>{runPlace(run)}</td>
+      <td>{authorName(run.author)}</td>
+      <td className={style.quiet}>{start !== null && `${day(start, now)} ${clock(start)}`}</td>
+      <td className={style.took}>{took}</td>
+    </tr>
+  );
+}
+
+interface RowsProps {
+  runs: readonly ListedRun[];
+  chosen: readonly string[];
+  onChoose: (run: string, chosen: boolean) => void;
+}
+
+function Rows({ runs, chosen, onChoose }: RowsProps) {
+  const going = runs.some((run) => !hasEnded(run));
+  const now = useNow(going ? 1000 : 30_000);
+  return (
+    <div className={style.frame}>
+      <table className={style.table}>
+        <thead>
+          <tr>
+            <th>
+              <span className={style.hidden}>Compare</span>
+            </th>
+            <th>State</th>
+            <th>Run</th>
+            <th>Version</th>
+            <th>On</th>
+            <th>Started by</th>
+            <th>Started</th>
+            <th className={style.took}>Took</th>
+          </tr>
+        </thead>
+        <tbody>
+          {runs.map((run) => (
+            <Row
+              key={run.id}
+              run={run}
+              now={now}
+              chosen={chosen.includes(run.id)}
+              onChoose={(on) => onChoose(run.id, on)}
+            />
+          ))}
+        </tbody>
+      </table>
+    </div>
+  );
+}
+
+/** Pages of the list. They are asked for anew only when somebody wants to. */
+function useListed(runner: string | undefined, filter: RunFilter) {
+  return useInfiniteQuery({
+    queryKey: ["runs", "list", "page", queryOf(filter).toString()],
+    queryFn: ({ pageParam, signal }) => listRuns(runner ?? "", filter, pageParam, PAGE, signal),
+    initialPageParam: null as string | null,
+    getNextPageParam: (last) => (last.length < PAGE ? undefined : last.at(-1)?.id),
+    enabled: runner !== undefined,
+    refetchOnWindowFocus: false,
+  });
+}
+
+function Waiting() {
+  return (
+    <div aria-hidden>
+      {[0, 1, 2, 3, 4].map((i) => (
+        <Skeleton key={i} height={40} mb={6} />
+      ))}
+    </div>
+  );
+}
+
+/** Recorded runs that failed: how this page finds out why can be seen without a robot. */
+function BringExamples({ runner, onDone }: { runner: string | undefined; onDone: () => void }) {
+  const bring = useMutation({
+    mutationFn: () => importExamples(runner ?? ""),
+    onSuccess: onDone,
+    onError: (error) =>
+      notifications.show({ color: "red", title: "Not taken in", message: errorText(error) }),
+  });
+  return (
+    <Button
+      variant="default"
+      disabled={runner === undefined}
+      loading={bring.isPending}
+      onClick={() => bring.mutate()}
+    >
+      Show five recorded runs that failed
+    </Button>
+  );
+}
+
+export function RunsPage() {
+  const { runner, now } = useLive();
+  const [, go] = useLocation();
+  const search = useSearch();
+  const filter = useMemo(() => filterOf(new URLSearchParams(search)), [search]);
+  const setFilter = useCallback(
+    (next: RunFilter) =>
+      go(`/runs${queryOf(next).size ? `?${queryOf(next)}` : ""}`, { replace: true }),
+    [go],
+  );
+  const listed = useListed(runner, filter);
+  const [chosen, setChosen] = useState<readonly string[]>([]);
+  const stored = useMemo(() => listed.data?.pages.flat() ?? [], [listed.data]);
+  const runs = useMemo(() => overlaid(stored, now.runs), [stored, now.runs]);
+  const newest = stored[0]?.number ?? 0;
+  const waiting = listed.isSuccess ? newcomers(stored, now.runs, newest) : 0;
+  const filtered = queryOf(filter).size > 0;
+  const engines = useMemo(
+    () =>
+      [...new Set(["simulator", filter.robot, ...stored.map((run) => run.engine)])].filter(Boolean),
+    [stored, filter.robot],
+  );
+  const choose = (run: string, on: boolean) =>
+    setChosen(on ? [...chosen.slice(-1), run] : chosen.filter((each) => each !== run));
+  const [b = "", a = ""] = [...chosen].sort((x, y) => numberOf(runs, y) - numberOf(runs, x));
+  return (
+    <main className={style.page}>
+      <div className={style.inner}>
+        <div className={style.head}>
+          <h2 className={style.title}>Runs</h2>
+          <RunFilters runner={runner} filter={filter} onChange={setFilter} engines={engines} />
+        </div>
+        <div className={style.deeds} aria-live="polite">
+          {waiting > 0 && (
+            <Button size="compact-sm" variant="light" onClick={() => void listed.refetch()}>
+              {waiting === 1 ? "1 new run" : `${waiting} new runs`}
+            </Button>
+          )}
+          {chosen.length > 0 && (
+            <Button
+              size="compact-sm"
+              variant="default"
+              leftSection={<IconArrowsDiff size={14} aria-hidden />}
+              onClick={() =>
+                go(`/runs/compare?${new URLSearchParams(a === "" ? { b } : { a, b })}`)
+              }
+            >
+              {chosen.length === 2 ? "Compare the two" : "Compare with …"}
+            </Button>
+          )}
+          {filter.graph !== "" && (
+            <Button
+              component={Link}
+              size="compact-sm"
+              variant="default"
+              to={`/runs/statistics?graph=${encodeURIComponent(filter.graph)}`}
+              leftSection={<IconChartBar size={14} aria-hidden />}
+            >
+              Statistics
+            </Button>
+          )}
+        </div>
+        {listed.isPending && <Waiting />}
+        {listed.isError && runs.length === 0 && (
+          <Empty icon={<IconAlertTriangle size={22} />} title="The runs cannot be read">
+            {errorText(listed.error)} What was recorded is safe; it shows again when the runner
+            answers.
+          </Empty>
+        )}
+        {listed.isSuccess && runs.length === 0 && !filtered && waiting === 0 && (
+          <Empty
+            icon={<IconHistory size={22} />}
+            title="Nothing ran yet"
+            action={<BringExamples runner={runner} onDone={() => void listed.refetch()} />}
+          >
+            Open a graph and hold <b>Start</b>. Every run is kept here, with its exact version and
+            what each action did.
+          </Empty>
+        )}
+        {listed.isSuccess && runs.length === 0 && filtered && (
+          <Empty icon={<IconSearch size={22} />} title="No run fits">
+            Nothing that was recorded matches this search and filter.
+          </Empty>
+        )}
+        {runs.length > 0 && <Rows runs={runs} chosen={chosen} onChoose={choose} />}
+        {listed.hasNextPage && (
+          <Button
+            variant="default"
+            loading={listed.isFetchingNextPage}
+            onClick={() => void listed.fetchNextPage()}
+          >
+            Show older runs
+          </Button>
+        )}
+      </div>
+    </main>
+  );
+}
+
+function numberOf(runs: readonly ListedRun[], id: string): number {
+  return runs.find((run) => run.id === id)?.number ?? 0;
+}

@@ -1,0 +1,236 @@
+/** Many runs of one graph: how often it succeeds, where the time goes, what fails, what never ran. */
+import { Skeleton } from "@mantine/core";
+import { IconAlertTriangle, IconChartBar } from "@tabler/icons-react";
+import type { ReactNode } from "react";
+import { Link, useSearch } from "wouter";
+import { errorText } from "../api/http";
+import { useLive } from "../api/live/use-live";
+import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
+import type { DurationBounds, Run } from "../api/runs";
+import { boundsText } from "../status/durations";
+import { runLabel } from "../status/progress";
+import { toneColor } from "../status/state-label";
+import { Empty } from "../ui/empty";
+import type { RunBarParts } from "./run/run-page";
+import style from "./statistics-page.module.css";
+
+const seconds = (took: DurationBounds | null) => boundsText(took) ?? "—";
+const high = (took: DurationBounds | null) => took?.most ?? took?.least ?? 0;
+
+/** One bar per run, the oldest on the left; its height is how long it took. */
+function RunBars({ runs }: { runs: Statistics["runs"] }) {
+  const longest = Math.max(0.001, ...runs.map((run) => high(run.span)));
+  const ordered = [...runs].reverse();
+  return (
+    <ol className={style.bars} aria-label="Runs, the oldest first">
+      {ordered.map((run) => {
+        const { tone, word } = runLabel(run as unknown as Run);
+        const text = `Run ${run.number}: ${word}, ${seconds(run.span)}`;
+        return (
+          <li key={run.id}>
+            <Link to={`/runs/${run.id}`} title={text} aria-label={text}>
+              <i
+                data-unknown={run.span?.most == null || undefined}
+                style={{
+                  height: `${Math.max(8, (run.span?.most == null ? 1 : high(run.span) / longest) * 100)}%`,
+                  color: toneColor[tone],
+                }}
+              />
+            </Link>
+          </li>
+        );
+      })}
+    </ol>
+  );
+}
+
+function ResultBar({ action }: { action: ActionStatistics }) {
+  const known = Object.entries(action.results) as [
+    "true" | "false" | "error" | "stopped",
+    number,
+  ][];
+  const { unknown } = action;
+  const parts = [...known, ...(unknown > 0 ? ([["unknown", unknown]] as const) : [])];
+  const text = parts.map(([name, count]) => `${count} ${name}`).join(", ");
+  return (
+    <span className={style.results} role="img" aria-label={text} title={text}>
+      {parts.map(([name, count]) => (
+        <i key={name} data-tone={name} style={{ flexGrow: count, color: toneColor[name] }} />
+      ))}
+    </span>
+  );
+}
+
+/** Where the median may lie as a bar, from its upper bound on to that of the 90th percentile as a line,
+ * the upper bound of the longest as a tick. */
+function SpreadBar({ action, most }: { action: ActionStatistics; most: number }) {
+  const { p50, p90, longest } = action.spans;
+  const share = (s: number) => `${Math.min(100, (s / most) * 100)}%`;
+  if (p50 === null) return <span className={style.quiet}>no end was seen</span>;
+  return (
+    <span className={style.spread} aria-hidden>
+      <i
+        className={style.range}
+        style={{ left: share(p50.least), right: `calc(100% - ${share(high(p90))})` }}
+      />
+      <i className={style.longest} style={{ left: share(high(longest)) }} />
+      <i
+        className={style.median}
+        style={{ left: share(p50.least), width: `max(3px, ${share(high(p50) - p50.least)})` }}
+      />
+    </span>
+  );
+}
+
+function Actions({ actions }: { actions: readonly ActionStatistics[] }) {
+  const most = Math.max(0.001, ...actions.map((action) => high(action.spans.longest)));
+  const weight = (action: ActionStatistics) => high(action.spans.p50) * action.visits;
+  const slowest = [...actions].sort((a, b) => weight(b) - weight(a));
+  return (
+    <div className={style.scroll}>
+      <table className={style.table}>
+        <thead>
+          <tr>
+            <th>Action</th>
+            <th className={style.number}>Visits</th>
+            <th>Results</th>
+            <th>Time</th>
+            <th className={style.number}>Median</th>
+            <th className={style.number}>90 %</th>
+            <th className={style.number}>Longest</th>
+          </tr>
+        </thead>
+        <tbody>
+          {slowest.map((action) => (
+            <tr key={action.action}>
+              <th scope="row">{action.action}</th>
+              <td className={style.number}>{action.visits}</td>
+              <td>
+                <ResultBar action={action} />
+              </td>
+              <td className={style.wide}>
+                <SpreadBar action={action} most={most} />
+              </td>
+              <td className={style.number}>{seconds(action.spans.p50)}</td>
+              <td className={style.number}>{seconds(action.spans.p90)}</td>
+              <td className={style.number}>{seconds(action.spans.longest)}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </div>
+  );
+}
+
+function failures(action: ActionStatistics): number {
+  return (action.results.error ?? 0) + (action.results.false ?? 0);
+}
+
+function Found({ found }: { found: Statistics }) {
+  const rate = found.judged === 0 ? null : Math.round((found.succeeded / found.judged) * 100);
+  const hidden = found.actions.reduce((sum, action) => sum + action.unknown, 0);
+  const failing = found.actions
+    .filter((action) => failures(action) > 0)
+    .sort((a, b) => failures(b) / b.visits - failures(a) / a.visits)
+    .slice(0, 5);
+  return (
+    <div className={style.inner}>
+      <div className={style.cards}>
+        <section className={style.card}>
+          <h3>Success</h3>
+          <p className={style.big}>{rate === null ? "—" : `${rate} %`}</p>
+          <p className={style.quiet}>
+            {found.judged > 0 && `${found.succeeded} of ${found.judged} runs finished true. `}
+            {found.unknown > 0 &&
+              `Of ${found.unknown} that finished the result is not known, since robots do not tell it; they are not counted. `}
+            Stopped, refused and lost ones say nothing about the graph and are not counted.
+          </p>
+        </section>
+        <section className={style.card}>
+          <h3>Most failing</h3>
+          {failing.length === 0 ? (
+            <p className={style.quiet}>
+              {hidden > 0
+                ? `No action is known to have ended false or in error; of ${hidden} visits nobody knows.`
+                : "No action ended false or in error."}
+            </p>
+          ) : (
+            <ul className={style.list}>
+              {failing.map((action) => (
+                <li key={action.action}>
+                  <b>{action.action}</b> {failures(action)} of {action.visits} visits
+                </li>
+              ))}
+            </ul>
+          )}
+        </section>
+        <section className={style.card}>
+          <h3>Arrows never taken</h3>
+          {found.never_taken.length === 0 ? (
+            <p className={style.quiet}>
+              {found.untold > 0
+                ? "None is known."
+                : "Every arrow of the newest version whose action ran was taken."}
+            </p>
+          ) : (
+            <ul className={style.list}>
+              {found.never_taken.slice(0, 6).map((arrow) => (
+                <li key={`${arrow.parent} ${arrow.child}`}>
+                  {arrow.parent} → {arrow.child}{" "}
+                  <span className={style.quiet}>on {arrow.outcomes.join(", ")}</span>
+                </li>
+              ))}
+              {found.never_taken.length > 6 && (
+                <li className={style.quiet}>and {found.never_taken.length - 6} more</li>
+              )}
+            </ul>
+          )}
+          {found.untold > 0 && (
+            <p className={style.quiet}>
+              Of {found.untold === 1 ? "1 arrow" : `${found.untold} arrows`} it is not known whether
+              it was ever taken: robots do not tell results.
+            </p>
+          )}
+        </section>
+      </div>
+      <section className={style.card}>
+        <h3>The newest {found.runs.length} runs</h3>
+        <RunBars runs={found.runs} />
+      </section>
+      <section className={style.card}>
+        <h3>Where the time goes</h3>
+        <Actions actions={found.actions} />
+      </section>
+    </div>
+  );
+}
+
+export function StatisticsPage({ bar }: { bar: (parts: RunBarParts) => ReactNode }) {
+  const graph = new URLSearchParams(useSearch()).get("graph") ?? "";
+  const { runner } = useLive();
+  const found = useStatistics(runner, graph);
+  return (
+    <>
+      {bar({ crumbs: [{ label: "Runs", to: "/runs" }, { label: "Statistics" }] })}
+      <main className={style.page}>
+        {found.isLoading && (
+          <div className={style.inner} aria-busy="true">
+            <Skeleton height={110} mb={12} />
+            <Skeleton height={280} />
+          </div>
+        )}
+        {found.isError && (
+          <Empty icon={<IconAlertTriangle size={22} />} title="There are no figures">
+            {errorText(found.error)}
+          </Empty>
+        )}
+        {found.data?.runs.length === 0 && (
+          <Empty icon={<IconChartBar size={22} />} title="No run of this graph is over yet">
+            Figures appear here with the first run that ends.
+          </Empty>
+        )}
+        {found.data && found.data.runs.length > 0 && <Found found={found.data} />}
+      </main>
+    </>
+  );
+}

@@ -1,0 +1,102 @@
+/** The log of a robot: what others told it and how its engine was, newest first. */
+import { Button, Text } from "@mantine/core";
+import { IconFileImport } from "@tabler/icons-react";
+import { Link } from "wouter";
+import { useLive } from "../api/live/use-live";
+import { commandedGraph, type RobotLogLine, useRobotLog } from "../api/robots";
+import { clock, day, instant } from "../ui/times";
+import style from "./robot-log.module.css";
+import { notifyRobotFailure } from "./robot-runs";
+
+interface Props {
+  robot: string;
+  onImport: (text: string, name: string) => void;
+}
+
+const DONE: Readonly<Record<string, string>> = {
+  start: "started",
+  stop: "stopped",
+  pause: "paused",
+  resume: "let go on",
+  modify: "changed",
+};
+
+const BECAME: Readonly<Record<string, string>> = {
+  answering: "The engine answers",
+  busy: "The engine is there, but silent",
+  gone: "The engine is gone",
+  restarted: "The engine was restarted",
+};
+
+/** A sentence of one line; what it did to a run of ours comes after it. */
+export function robotLogText(told: RobotLogLine): string {
+  switch (told.kind) {
+    case "commanded":
+      return `Somebody else ${DONE[told.command] ?? told.command} ${told.graph || "a graph"}`;
+    case "became":
+      return `${BECAME[told.state] ?? told.state}${told.why === "" ? "" : `: ${told.why}`}`;
+    case "stop_asked":
+      return `${told.sender} asked to stop ${told.graph}, which was not started from here`;
+    case "stop_proven":
+      return `${told.graph} is proven to have stopped`;
+    case "stop_unproven":
+      return `Nothing has proven that ${told.graph} stopped: ${told.why}`;
+  }
+}
+
+/** What a command of somebody else did to a run from here. */
+function Effect({ told }: { told: RobotLogLine }) {
+  if (told.run === null) return null;
+  const stopped = told.command === "start" || told.command === "stop";
+  return (
+    <Link to={`/runs/${told.run}`} className={style.run}>
+      {stopped ? "stopped" : "while"} run {told.number}
+    </Link>
+  );
+}
+
+function Line({ robot, told, onImport }: Props & { told: RobotLogLine }) {
+  const { runner } = useLive();
+  const at = instant(told.at) ?? 0;
+  const take = () =>
+    commandedGraph(runner ?? "", robot, told.seq)
+      .then((text) => onImport(text, told.graph))
+      .catch((error: unknown) => notifyRobotFailure("Not imported", error));
+  return (
+    <li className={style.line} data-kind={told.kind}>
+      <time dateTime={told.at}>
+        {day(at, Date.now())} {clock(at)}
+      </time>
+      <span className={style.words}>
+        {robotLogText(told)} <Effect told={told} />
+      </span>
+      {told.has_graph && (
+        <Button
+          size="compact-xs"
+          variant="subtle"
+          leftSection={<IconFileImport size={14} aria-hidden />}
+          onClick={() => void take()}
+        >
+          Import
+        </Button>
+      )}
+    </li>
+  );
+}
+
+export function RobotLog({ robot, onImport }: Props) {
+  const { runner } = useLive();
+  const flight = useRobotLog(runner, robot, true);
+  if (flight.isPending) return <Text c="dimmed">Reading …</Text>;
+  if (flight.isError) return <Text c="var(--error)">The record cannot be read now.</Text>;
+  if (flight.data.length === 0) {
+    return <Text c="dimmed">Nobody else has told it anything while the runner was listening.</Text>;
+  }
+  return (
+    <ol className={style.list}>
+      {flight.data.map((told) => (
+        <Line key={told.seq} robot={robot} told={told} onImport={onImport} />
+      ))}
+    </ol>
+  );
+}

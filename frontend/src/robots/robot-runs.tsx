@@ -1,0 +1,96 @@
+/** What runs on a robot: runs from here, and graphs that somebody else started. */
+import { Button } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconFileImport, IconSquareFilled } from "@tabler/icons-react";
+import { Link } from "wouter";
+import { errorText } from "../api/http";
+import { foreignGraphs, openRuns, useLive } from "../api/live/use-live";
+import { heldGraph, type Robot, stopRobot } from "../api/robots";
+import { runLabel } from "../status/progress";
+import { StateLabel } from "../status/state-label";
+import style from "./robot-runs.module.css";
+
+interface Props {
+  robot: Robot;
+  onImport: (text: string, name: string) => void;
+}
+
+export function notifyRobotFailure(title: string, error: unknown): void {
+  notifications.show({ color: "red", title, message: errorText(error) });
+}
+
+function Foreign(props: Props & { graph: string; stopping: string | null; state: string }) {
+  const { robot, graph, stopping, state, onImport } = props;
+  const { runner } = useLive();
+  const take = () =>
+    heldGraph(runner ?? "", robot.name, graph)
+      .then((text) => onImport(text, graph))
+      .catch((error: unknown) => notifyRobotFailure(`${graph} was not imported`, error));
+  const stop = () =>
+    stopRobot(runner ?? "", robot.name).catch((error: unknown) =>
+      notifyRobotFailure(`NOT SENT: use the hardware stop of ${robot.name}`, error),
+    );
+  return (
+    <li className={style.line}>
+      <StateLabel tone="unknown" word={stopping === null ? state.toLowerCase() : "stopping"} />
+      <span className={style.name}>{graph}</span>
+      <span className={style.quiet}>
+        {stopping ? `STOP UNCONFIRMED: ${stopping}` : "not started from here"}
+      </span>
+      <span className={style.gap} />
+      <Button
+        size="compact-sm"
+        leftSection={<IconFileImport size={15} aria-hidden />}
+        onClick={() => void take()}
+      >
+        Import as graph
+      </Button>
+      <Button
+        size="compact-sm"
+        variant="filled"
+        color="red"
+        leftSection={<IconSquareFilled size={11} aria-hidden />}
+        onClick={() => void stop()}
+      >
+        Stop
+      </Button>
+    </li>
+  );
+}
+
+export function RobotRuns({ robot, onImport }: Props) {
+  const { now } = useLive();
+  const own = openRuns(now).filter((run) => run.engine === robot.name);
+  const foreign = foreignGraphs(now).filter((each) => each.robot.name === robot.name);
+  if (own.length + foreign.length === 0) {
+    const unsure = robot.state !== "answering" && robot.state !== "restarted";
+    return (
+      <p className={style.none}>
+        {unsure ? "What runs there is not known." : "Nothing runs there."}
+      </p>
+    );
+  }
+  return (
+    <ul className={style.list} aria-label={`What runs on ${robot.name}`}>
+      {own.map((run) => (
+        <li key={run.id} className={style.line}>
+          <StateLabel {...runLabel(run)} />
+          <Link to={`/runs/${run.id}`} className={style.name}>
+            Run {run.number} of {run.graph_name}
+          </Link>
+          <span className={style.quiet}>started by {run.author?.name ?? "somebody"}</span>
+        </li>
+      ))}
+      {foreign.map(({ held }) => (
+        <Foreign
+          key={held.graph}
+          robot={robot}
+          graph={held.graph}
+          state={held.state}
+          stopping={held.stopping}
+          onImport={onImport}
+        />
+      ))}
+    </ul>
+  );
+}

@@ -1,0 +1,48 @@
+/** Whether the page hears the runner, and how old what it shows of a run is, in words. */
+import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
+import { useLive, useRunSeenAt } from "../api/live/use-live";
+import type { Run } from "../api/runs";
+import { clock, duration, useNow } from "../ui/times";
+import style from "./connection-status.module.css";
+
+const OLD = 2_500; // ms; a run is looked at each second
+
+/** "proof 0.4 s ago": when the engine itself last showed this run. `whose`: its name stands before. */
+export function LastSeen({ run, whose = false }: { run: Run; whose?: boolean }) {
+  const seen = useRunSeenAt(run.id);
+  const goes = run.ended_at === null;
+  const present = useNow(500, goes);
+  if (!goes) return null;
+  if (seen === undefined) return <span className={style.word}>no proof yet</span>;
+  const old = Math.max(0, present - seen);
+  return (
+    <span
+      className={style.word}
+      data-old={old > OLD || undefined}
+      title="When the engine itself last showed this run"
+    >
+      <IconEye size={13} aria-hidden /> {whose && <b>{run.engine}</b>} proof {duration(old)} ago
+    </span>
+  );
+}
+
+export function ConnectionStatus({ run, whose = false }: { run?: Run | null; whose?: boolean }) {
+  const { now } = useLive();
+  if (now.link === "live") {
+    return (
+      <span className={style.both}>
+        {run && run.ended_at === null && !run.simulated && <LastSeen run={run} whose={whose} />}
+        <span className={style.word} data-link="live">
+          <i aria-hidden /> Live
+        </span>
+      </span>
+    );
+  }
+  if (now.link === "connecting")
+    return <span className={style.word}>Connecting to the runner …</span>;
+  return (
+    <span className={style.word} data-link="down" role="status">
+      <IconPlugConnectedX size={13} aria-hidden /> Runner unknown since {clock(now.since)}
+    </span>
+  );
+}

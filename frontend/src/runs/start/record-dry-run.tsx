@@ -1,0 +1,43 @@
+/** Makes a dry-run a run: started in the simulator, with the same decisions, and recorded. */
+import { IconPlayerPlayFilled } from "@tabler/icons-react";
+import type { Script } from "../../api/dry-runs";
+import { useVersions } from "../../api/graphs";
+import { useLive } from "../../api/live/use-live";
+import { SIMULATOR } from "../../api/robots";
+import { HoldButton } from "../../ui/hold-button";
+import { nextLabel, useStart } from "./use-start";
+
+interface Props {
+  graph: string;
+  seq: number;
+  obstacle: string | null;
+  /** What was decided in the dry-run. */
+  script: Script;
+  /** The start is on its way: the dry-run may go. */
+  onStarted: () => void;
+}
+
+export function RecordDryRun({ graph, seq, obstacle, script, onStarted }: Props) {
+  const versions = useVersions(graph).data ?? [];
+  const { now } = useLive();
+  const start = useStart(graph);
+  const label = nextLabel(versions, seq);
+  const why = now.link === "down" ? "The runner does not answer" : obstacle;
+  return (
+    <HoldButton
+      size="compact-sm"
+      icon={<IconPlayerPlayFilled size={12} aria-hidden />}
+      label="Start on the simulator"
+      name={
+        why === null
+          ? `Record this: start ${label} in the simulator, as decided here`
+          : `Record this: ${why}`
+      }
+      question={`Start ${label} in the simulator with the decisions made here? It is recorded as a run.`}
+      disabled={why !== null || start.isPending}
+      onHeld={() =>
+        start.mutate({ seq, engines: [SIMULATOR], digest: null, script }, { onSuccess: onStarted })
+      }
+    />
+  );
+}

@@ -1,0 +1,95 @@
+/** Start: held, for the simulator; robots are chosen and looked at in a dialog first. */
+import { ActionIcon, Button } from "@mantine/core";
+import { IconChevronDown, IconPlayerPlayFilled } from "@tabler/icons-react";
+import { useState } from "react";
+import { useVersions } from "../../api/graphs";
+import { errorText } from "../../api/http";
+import { openRuns, useLive } from "../../api/live/use-live";
+import { SIMULATOR } from "../../api/robots";
+import { HoldButton } from "../../ui/hold-button";
+import style from "./start-control.module.css";
+import { StartDialog } from "./start-dialog";
+import { lastEngines, nextLabel, notifyFailure, useStart } from "./use-start";
+
+interface Props {
+  graph: string;
+  name: string;
+  /** The moment that the page shows, as far as it has been named. */
+  seq: number;
+  /** The name of the moment on screen: others' edits show a little before they are named. */
+  settle: () => Promise<number>;
+  /** Why this moment cannot be started; null when it can. */
+  obstacle: string | null;
+  compact?: boolean;
+}
+
+export function StartControl({ graph, name, seq, settle, obstacle, compact = false }: Props) {
+  const versions = useVersions(graph).data ?? [];
+  const { now } = useLive();
+  const start = useStart(graph);
+  const [asking, setAsking] = useState<number | null>(null);
+  const [engines, setEngines] = useState(() => lastEngines(graph));
+  const label = nextLabel(versions, seq);
+  const goes = openRuns(now).some((run) => run.graph === graph);
+  const why = start.isPending
+    ? "Starting …"
+    : now.link === "down"
+      ? "The runner does not answer"
+      : obstacle;
+  const simulated = engines.every((engine) => engine === SIMULATOR);
+  const icon = <IconPlayerPlayFilled size={13} aria-hidden />;
+  const words = start.isPending ? "Starting …" : `Start ${label}`;
+  const where = engines.join(", ");
+  const ask = () =>
+    void settle().then(setAsking, (error) => notifyFailure("Not started", errorText(error)));
+  return (
+    <span className={style.start}>
+      {simulated ? (
+        <HoldButton
+          icon={icon}
+          label={words}
+          name={why === null ? `Start ${label} in the simulator` : `Start ${label}: ${why}`}
+          question={
+            goes
+              ? `A run of this graph goes already. Start ${label} beside it, in the simulator?`
+              : `Start exactly ${label}, as it is on screen, in the simulator?`
+          }
+          disabled={why !== null}
+          onHeld={() => start.mutate({ seq: settle(), engines: [SIMULATOR], digest: null })}
+        />
+      ) : (
+        <Button
+          leftSection={icon}
+          className={style.robots ?? ""}
+          disabled={why !== null}
+          aria-label={why === null ? `Start ${label} on ${where} …` : `Start ${label}: ${why}`}
+          title={why ?? `Look at ${where} before starting`}
+          onClick={ask}
+        >
+          {compact ? words : `${words} on ${where} …`}
+        </Button>
+      )}
+      <ActionIcon
+        variant="default"
+        className={style.choose ?? ""}
+        aria-label="Choose where to start"
+        title="Choose where to start"
+        disabled={why !== null}
+        onClick={ask}
+      >
+        <IconChevronDown size={16} aria-hidden />
+      </ActionIcon>
+      {asking !== null && (
+        <StartDialog
+          graph={graph}
+          name={name}
+          seq={asking}
+          label={nextLabel(versions, asking)}
+          chosen={engines}
+          onChosen={setEngines}
+          onClose={() => setAsking(null)}
+        />
+      )}
+    </span>
+  );
+}

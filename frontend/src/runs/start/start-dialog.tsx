@@ -1,0 +1,244 @@
+/** Before a start: where it goes, what was looked at there, and exactly what will be sent. */
+import { Button, Modal, Text, Textarea } from "@mantine/core";
+import { IconPlayerPlayFilled, IconRefresh } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
+import { useState } from "react";
+import { Link } from "wouter";
+import { errorText, fetchText } from "../../api/http";
+import { useLive } from "../../api/live/use-live";
+import { type Preflight, type Robot, runPreflight, SIMULATOR } from "../../api/robots";
+import type { Run } from "../../api/runs";
+import { useMay } from "../../api/use-person";
+import { EngineLabel } from "../../status/engine-label";
+import { HoldButton } from "../../ui/hold-button";
+import { colorOfName } from "../../ui/name-colors";
+import { PreflightList } from "./preflight-list";
+import style from "./start-dialog.module.css";
+import { rememberEngines, useStart } from "./use-start";
+
+interface Props {
+  graph: string;
+  name: string;
+  seq: number;
+  label: string;
+  chosen: readonly string[];
+  onChosen: (engines: string[]) => void;
+  onStarted?: (runs: readonly Run[]) => void;
+  onClose: () => void;
+}
+
+const LOOK_AGAIN = 5_000; // ms
+
+/** The text of the moment, and what the runner sees when it looks at the chosen engines now. */
+function useLook(graph: string, seq: number, engines: readonly string[]) {
+  const { runner } = useLive();
+  const umrf = useQuery({
+    queryKey: ["umrf", graph, seq],
+    queryFn: ({ signal }) =>
+      fetchText(`/api/graphs/${encodeURIComponent(graph)}/umrf?at=${seq}`, { signal }),
+    staleTime: Number.POSITIVE_INFINITY,
+  });
+  const look = useQuery({
+    queryKey: ["preflight", graph, seq, ...engines],
+    queryFn: ({ signal }) => runPreflight(runner ?? "", umrf.data ?? "", engines, signal),
+    enabled: umrf.data !== undefined && runner !== undefined && engines.length > 0,
+    refetchInterval: LOOK_AGAIN,
+    gcTime: 0,
+    staleTime: 0,
+    retry: false,
+  });
+  return { look, error: umrf.error ?? look.error };
+}
+
+/** The simulator goes alone; robots go together. */
+export function toggled(engines: readonly string[], name: string): string[] {
+  if (name === SIMULATOR) return [SIMULATOR];
+  const robots = engines.filter((engine) => engine !== SIMULATOR);
+  const left = robots.filter((engine) => engine !== name);
+  return left.length < robots.length ? left : [...robots, name].sort();
+}
+
+function Choice(props: { robot: Robot; on: boolean; may: boolean; onToggle: () => void }) {
+  const { robot, on, may, onToggle } = props;
+  const off = !robot.simulated && (!may || robot.state === "no_link");
+  return (
+    <label className={style.choice} data-on={on || undefined} data-off={off || undefined}>
+      <input
+        type={robot.simulated ? "radio" : "checkbox"}
+        checked={on}
+        disabled={off}
+        onChange={onToggle}
+      />
+      <i className={style.stripe} style={{ background: colorOfName(robot.name) }} aria-hidden />
+      <span className={style.name}>{robot.simulated ? "Simulator" : robot.name}</span>
+      {robot.simulated ? (
+        <span className={style.quiet}>nothing moves</span>
+      ) : (
+        <EngineLabel robot={robot} />
+      )}
+      {!robot.simulated && !may && <span className={style.quiet}>operators only</span>}
+    </label>
+  );
+}
+
+function Where(props: { engines: readonly string[]; onToggle: (name: string) => void }) {
+  const { now } = useLive();
+  const may = useMay("operate");
+  return (
+    <fieldset className={style.where}>
+      <legend>Where</legend>
+      {now.engines.map((robot) => (
+        <Choice
+          key={robot.name}
+          robot={robot}
+          on={props.engines.includes(robot.name)}
+          may={may}
+          onToggle={() => props.onToggle(robot.name)}
+        />
+      ))}
+      {now.engines.every((robot) => robot.simulated) && (
+        <Text size="sm" c="dimmed">
+          No robot is registered. <Link to="/robots">Robots</Link> says how, also how to practise
+          without one.
+        </Text>
+      )}
+    </fieldset>
+  );
+}
+
+function Exactly({
+  name,
+  label,
+  digest,
+  engines,
+}: {
+  name: string;
+  label: string;
+  digest: string;
+  engines: readonly string[];
+}) {
+  return (
+    <dl className={style.exactly}>
+      <dt>Graph</dt>
+      <dd>{name}</dd>
+      <dt>Version</dt>
+      <dd>{label}</dd>
+      <dt>Digest</dt>
+      <dd className={style.mono}>{digest === "" ? "…" : `${digest.slice(0, 16)}…`}</dd>
+      <dt>{engines.length > 1 ? "Robots" : "On"}</dt>
+      <dd>{engines.join(", ") || "nowhere yet"}</dd>
+    </dl>
+  );
+}
+
+/** Why nothing can be started now; null when it can. */
+export function obstacleOf(
+  engines: readonly string[],
+  looks: readonly Preflight[] | undefined,
+  reason: string,
+): string | null {
+  if (engines.length === 0) return "Choose where";
+  if (looks === undefined) return "Looking …";
+  if (looks.some((look) => look.never)) return "Something stands in the way";
+  const codes = looks.flatMap((look) => look.override);
+  if (codes.length > 0 && reason.trim() === "") return "Say why to start anyway";
+  return null;
+}
+
+export function StartDialog(props: Props) {
+  const { graph, name, seq, label, chosen, onChosen, onStarted, onClose } = props;
+  const [engines, setEngines] = useState<readonly string[]>(chosen);
+  const [reason, setReason] = useState("");
+  const { now } = useLive();
+  const { look, error } = useLook(graph, seq, engines);
+  const start = useStart(graph);
+  const looks = look.data;
+  const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
+  const never = (looks ?? []).some((each) => each.never);
+  const digest = looks?.find((each) => each.digest !== "")?.digest ?? "";
+  const why =
+    now.link === "down"
+      ? "The runner does not answer"
+      : start.isPending
+        ? "Starting …"
+        : obstacleOf(engines, looks, reason);
+  const choose = (engine: string) => {
+    setEngines(toggled(engines, engine));
+    setReason("");
+  };
+  const begin = () => {
+    rememberEngines(graph, engines);
+    onChosen([...engines]);
+    const override = codes.length > 0 ? { override: { codes, reason: reason.trim() } } : {};
+    const done = ({ runs }: { runs: readonly Run[] }) => {
+      onClose();
+      onStarted?.(runs);
+    };
+    start.mutate({ seq, engines, digest, ...override }, { onSuccess: done });
+  };
+  const where = engines.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
+  return (
+    <Modal
+      opened
+      onClose={onClose}
+      title={`Start ${label} of ${name}`}
+      closeButtonProps={{ "aria-label": "Close" }}
+      size="lg"
+    >
+      <Where engines={engines} onToggle={choose} />
+      {engines.length > 0 && (
+        <section
+          className={style.looks}
+          aria-label="Looked at before the start"
+          aria-busy={look.isFetching}
+        >
+          <header className={style.lookHead}>
+            <h3>Before the start</h3>
+            <Button
+              size="compact-xs"
+              variant="subtle"
+              leftSection={<IconRefresh size={13} aria-hidden />}
+              onClick={() => void look.refetch()}
+            >
+              Look again
+            </Button>
+          </header>
+          {error !== null && (
+            <Text size="sm" c="var(--error)" role="alert">
+              {errorText(error)}
+            </Text>
+          )}
+          {engines.map((engine) => (
+            <PreflightList
+              key={engine}
+              engine={engine}
+              alone={engines.length === 1}
+              look={looks?.find((each) => each.engine === engine)}
+            />
+          ))}
+        </section>
+      )}
+      {codes.length > 0 && !never && (
+        <Textarea
+          label="Why start anyway? It is recorded with the run."
+          value={reason}
+          maxLength={500}
+          autosize
+          minRows={2}
+          onChange={(event) => setReason(event.currentTarget.value)}
+        />
+      )}
+      <footer className={style.foot}>
+        <Exactly name={name} label={label} digest={digest} engines={engines} />
+        <HoldButton
+          icon={<IconPlayerPlayFilled size={13} aria-hidden />}
+          label={why ?? "Hold to start"}
+          name={why === null ? `Start ${label} on ${where.join(", ")}` : `Start ${label}: ${why}`}
+          question={`Start exactly ${label} of ${name} on ${where.join(", ")}?`}
+          disabled={why !== null}
+          onHeld={begin}
+        />
+      </footer>
+    </Modal>
+  );
+}

@@ -1,0 +1,77 @@
+import { expect, test } from "vitest";
+import type { Run, StartFound } from "../../api/runs";
+import { missing, unknownWords } from "./unanswered-start-notice";
+import { type SentStart, UnansweredStarts } from "./unanswered-starts";
+
+const sent: SentStart = {
+  request: "q",
+  graph: "g",
+  what: "v3 of patrol",
+  engines: ["David", "Eve"],
+  at: 1,
+};
+
+class Tab {
+  readonly kept = new Map<string, string>();
+  getItem = (key: string) => this.kept.get(key) ?? null;
+  setItem = (key: string, text: string) => void this.kept.set(key, text);
+}
+
+test("a start that waits for its answer is not unsure, and one that was answered is forgotten", () => {
+  const tab = new Tab();
+  const starts = new UnansweredStarts(tab);
+  starts.sends(sent);
+  expect(starts.list()).toEqual([]);
+  starts.settle("q");
+  expect(new UnansweredStarts(tab).list()).toEqual([]);
+});
+
+test("a start without an answer is unsure, and stays so when the page is loaded again", () => {
+  const tab = new Tab();
+  const starts = new UnansweredStarts(tab);
+  let heard = 0;
+  starts.subscribe(() => {
+    heard += 1;
+  });
+  starts.sends(sent);
+  expect(new UnansweredStarts(tab).list()).toEqual([sent]); // loaded again while it waits
+  starts.doubt("q");
+  expect(starts.list()).toEqual([sent]);
+  expect(heard).toBe(2);
+  expect(new UnansweredStarts(tab).list()).toEqual([sent]);
+});
+
+test("what somebody else has put into the tab's store is no start", () => {
+  const tab = new Tab();
+  for (const text of ["", "{", "7", '{"a":1}', '[null, 1, {"request":"q"}]']) {
+    tab.setItem("aa.starts", text);
+    expect(new UnansweredStarts(tab).list()).toEqual([]);
+  }
+  const throws = {
+    getItem: () => {
+      throw new Error("forbidden");
+    },
+    setItem: () => {
+      throw new Error("full");
+    },
+  };
+  const starts = new UnansweredStarts(throws);
+  starts.sends(sent);
+  starts.doubt("q");
+  expect(starts.list()).toEqual([sent]);
+});
+
+test("of a group it is told which robots have a run and which are not known", () => {
+  const found = (engines: string[], under_way = false): StartFound => ({
+    request_id: "q",
+    under_way,
+    runs: engines.map((engine) => ({ engine }) as Run),
+  });
+  expect(missing(sent, undefined)).toEqual(["David", "Eve"]);
+  expect(unknownWords(sent, found(["Eve", "David"]), false)).toBeNull();
+  const half = unknownWords(sent, found(["Eve"]), false);
+  expect(half).toContain("NOT KNOWN whether v3 of patrol started on David.");
+  expect(half).toContain("nothing of it so far");
+  expect(unknownWords(sent, found([], true), false)).toContain("still carrying it out");
+  expect(unknownWords(sent, found([]), true)).toContain("has not answered");
+});

@@ -1,0 +1,131 @@
+/** A start: publishes what is on screen and sends exactly that to the runner, once. */
+import { notifications } from "@mantine/notifications";
+import { useMutation, useQueryClient } from "@tanstack/react-query";
+import type { Script } from "../../api/dry-runs";
+import { publish, queryKeys, type Version, versionName } from "../../api/graphs";
+import { errorPlace, errorText, isOutcomeUnknown } from "../../api/http";
+import { useLive } from "../../api/live/use-live";
+import { type Started, type StartOrder, startRun } from "../../api/runs";
+import { newAid } from "../../graph/ids";
+import { memberText } from "../../graph/json-members";
+import { unansweredStarts } from "./unanswered-starts";
+
+export interface StartInput {
+  /** The moment that shall run; awaited when the page has yet to hear its name. */
+  seq: number | Promise<number>;
+  engines: readonly string[];
+  /** Of the graph that was looked at; null when nobody looked. */
+  digest: string | null;
+  /** What actions do in the simulator. */
+  script?: Script;
+  override?: { codes: readonly string[]; reason: string };
+}
+
+/** A moment as a version, and its graph exactly as the editor wrote it. */
+export async function publishedVersion(
+  graph: string,
+  seq: number,
+): Promise<{ version: Version; umrf: string }> {
+  const text = await publish(graph, seq);
+  const umrf = memberText(text, "umrf");
+  if (umrf === null) throw new Error("The editor gave no graph with the version.");
+  return { version: JSON.parse(text) as Version, umrf };
+}
+
+/** The name that a start of this moment will have. */
+export function nextLabel(versions: readonly Version[], seq: number): string {
+  const same = versions.find((version) => version.seq === seq);
+  return same ? versionName(versions, same.id) : `v${versions.length + 1}`;
+}
+
+export function notifyFailure(title: string, message: string): void {
+  notifications.show({ color: "red", title, message, autoClose: 15_000 });
+}
+
+export function useStart(graph: string) {
+  const { live, runner } = useLive();
+  const client = useQueryClient();
+  return useMutation({
+    mutationFn: async ({ seq, engines, digest, script, override }: StartInput) => {
+      if (runner === undefined) throw new Error("The runner is not known yet.");
+      const { version, umrf } = await publishedVersion(graph, await seq);
+      void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
+      if (digest !== null && digest !== version.digest) {
+        throw new Error("The graph is not the one that was looked at. Nothing was sent.");
+      }
+      const versions = client.getQueryData<Version[]>(queryKeys.versions(graph)) ?? [];
+      const what = `${nextLabel(versions, version.seq)} of ${nameIn(version)}`;
+      const started = await surely(what, {
+        runner,
+        version: version.id,
+        digest: version.digest,
+        umrf,
+        graph,
+        engines,
+        request: newAid(),
+        ...(script === undefined ? {} : { script }),
+        ...(override === undefined ? {} : { override }),
+      });
+      for (const run of started.runs) live?.learn(run);
+      return started;
+    },
+    onSuccess: ({ failed }) => {
+      for (const [robot, why] of Object.entries(failed))
+        notifyFailure(`Not started on ${robot}`, why);
+    },
+    onError: (error) => {
+      const where = errorPlace(error);
+      notifyFailure(
+        "Not started",
+        where === "" ? errorText(error) : `${errorText(error)} (${where})`,
+      );
+    },
+  });
+}
+
+const NOTHING_KNOWN: Started = { runs: [], failed: {} };
+
+/** Sends a start. Where nobody says what became of it, that is looked for, and no failure is told. */
+async function surely(what: string, order: StartOrder): Promise<Started> {
+  const { request, graph, engines } = order;
+  unansweredStarts.sends({ request, graph, what, engines, at: Date.now() });
+  try {
+    const started = await startRun(order);
+    unansweredStarts.settle(request);
+    return started;
+  } catch (error) {
+    if (isOutcomeUnknown(error)) {
+      unansweredStarts.doubt(request);
+      return NOTHING_KNOWN;
+    }
+    unansweredStarts.settle(request);
+    throw error;
+  }
+}
+
+function nameIn(version: Version): string {
+  const { graph_name: name } = version.umrf as { graph_name?: unknown };
+  return typeof name === "string" && name !== "" ? name : "untitled";
+}
+
+const CHOICE = "aa.engines";
+
+/** Where a graph was started last from this browser. */
+export function lastEngines(graph: string): string[] {
+  try {
+    const all = JSON.parse(localStorage.getItem(CHOICE) ?? "{}") as Record<string, string[]>;
+    const found = all[graph];
+    return Array.isArray(found) && found.length > 0 ? found : ["simulator"];
+  } catch {
+    return ["simulator"];
+  }
+}
+
+export function rememberEngines(graph: string, engines: readonly string[]): void {
+  try {
+    const all = JSON.parse(localStorage.getItem(CHOICE) ?? "{}") as Record<string, string[]>;
+    localStorage.setItem(CHOICE, JSON.stringify({ ...all, [graph]: engines }));
+  } catch {
+    // A browser that stores nothing asks again next time.
+  }
+}

@@ -1,0 +1,95 @@
+/** STOP: one, always at the same place, never disabled; STOP ALL by keys from anywhere. */
+import { IconSquareFilled } from "@tabler/icons-react";
+import { useEffect } from "react";
+import type { LiveLink, LiveSocket } from "../../api/live/live-socket";
+import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
+import type { Run } from "../../api/runs";
+import style from "./stop-button.module.css";
+
+interface Props {
+  /** The graph on screen: its run is the one that Stop means, if it goes. */
+  graph?: string;
+}
+
+/** Ctrl+. or ⌘. : not taken by browsers, and reachable without looking. */
+export function isStopAll(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey">): boolean {
+  return event.key === "." && (event.ctrlKey || event.metaKey);
+}
+
+/** Also while somebody types, in dialogs and menus: nothing is asked before a Stop. */
+function useStopKey(live: LiveSocket | null): void {
+  useEffect(() => {
+    const onKey = (event: KeyboardEvent) => {
+      if (!isStopAll(event) || event.repeat) return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      live?.stop("all");
+    };
+    window.addEventListener("keydown", onKey, { capture: true });
+    return () => window.removeEventListener("keydown", onKey, { capture: true });
+  }, [live]);
+}
+
+export function stopButtonText(link: LiveLink, count: number): string {
+  if (link === "down") return "state unknown";
+  if (link === "connecting") return "asking …";
+  if (count === 0) return "nothing runs";
+  return count === 1 ? "1 run" : `${count} runs`;
+}
+
+/** What Stop means beside a graph: its one run, or its runs that were started together. */
+export function runToStop(here: readonly Run[]): { id: string; words: string } | null {
+  const [first, ...others] = here;
+  if (first === undefined) return null;
+  if (others.length === 0) {
+    return { id: first.id, words: `run ${first.number} of ${first.graph_name}` };
+  }
+  const { group } = first;
+  if (group === null || others.some((run) => run.group !== group)) return null;
+  return { id: group, words: `the ${here.length} runs of ${first.graph_name}` };
+}
+
+const SOFT = "A software stop: no replacement for the emergency stop.";
+
+export function StopButton({ graph }: Props) {
+  const { live, now } = useLive();
+  useStopKey(live);
+  const open = openRuns(now);
+  const here = graph === undefined ? [] : open.filter((run) => run.graph === graph);
+  const meant = runToStop(here);
+  const all = open.length + foreignGraphs(now).length;
+  const calm = now.link === "live" && all === 0;
+  const target = meant?.words ?? "everything that runs";
+  const beside = meant !== null && all > here.length;
+  return (
+    <span className={style.both} data-beside={beside || undefined}>
+      <button
+        type="button"
+        className={style.stop}
+        data-calm={calm || undefined}
+        onClick={() => live?.stop(meant?.id ?? "all")}
+        aria-label={`Stop ${target}. Software stop, no emergency stop`}
+        title={`Stop ${target}.\n${SOFT}`}
+      >
+        <IconSquareFilled size={13} aria-hidden style={{ flex: "none" }} />
+        <span className={style.word}>
+          STOP<span aria-hidden>{meant || all === 0 ? "" : " ALL"}</span>
+        </span>
+        <span className={style.count} aria-hidden>
+          {stopButtonText(now.link, meant ? here.length : all)}
+        </span>
+      </button>
+      {beside && (
+        <button
+          type="button"
+          className={style.all}
+          onClick={() => live?.stop("all")}
+          aria-label="Stop everything that runs, everywhere. Software stop, no emergency stop"
+          title={`Stop everything that runs (Ctrl+.).\n${SOFT}`}
+        >
+          <span aria-hidden>ALL {all}</span>
+        </button>
+      )}
+    </span>
+  );
+}

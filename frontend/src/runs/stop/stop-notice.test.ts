@@ -1,0 +1,138 @@
+import { expect, test } from "vitest";
+import type { LiveState, StopRequest } from "../../api/live/live-socket";
+import { needsRestConfirmation, type Run } from "../../api/runs";
+import { runToStop, stopButtonText } from "./stop-button";
+import { movingAgain, noticeOf, othersNotice, unreachableNotice } from "./stop-notice";
+
+const stop: StopRequest = { id: "s", run: "r", at: 1000, state: "heard", detail: "" };
+
+function now(part: Partial<Run> | null, link: LiveState["link"] = "live"): LiveState {
+  const run = {
+    id: "r",
+    number: 7,
+    state: "running",
+    ended_at: null,
+    alarms: [],
+    engine: "David",
+    ...part,
+  } as Run;
+  const runs = new Map(part ? [["r", run]] : []);
+  return { link, since: 0, engines: [], stops: [stop], runs };
+}
+
+test("a Stop that nothing proves becomes loud", () => {
+  expect(noticeOf(stop, now({ state: "stopping" }), 1500)?.tone).toBe("quiet");
+  const later = noticeOf(stop, now({ state: "stopping" }), 9000);
+  expect(later?.tone).toBe("loud");
+  expect(later?.text).toContain("STOP UNCONFIRMED");
+});
+
+test("what is announced stays the same while only time goes by", () => {
+  const early = noticeOf(stop, now({ state: "stopping" }), 9000);
+  const late = noticeOf(stop, now({ state: "stopping" }), 9200);
+  expect(early?.text).toBe(late?.text);
+  expect([early?.since, late?.since]).toEqual(["asked 8.0 s ago", "asked 8.2 s ago"]);
+});
+
+test("stopped is said when the run's state says so", () => {
+  const ended = now({ state: "stopped", ended_at: "1970-01-01T00:00:02Z" });
+  expect(noticeOf(stop, ended, 2500)).toEqual({ tone: "done", text: "Run 7: stopped." });
+  expect(noticeOf(stop, ended, 60_000)).toBeNull();
+});
+
+test("without the runner nothing is claimed", () => {
+  expect(noticeOf(stop, now({}, "down"), 1200)?.text).toContain("UNCONFIRMED");
+  const unheard = { ...stop, state: "unheard", detail: "The runner does not answer." } as const;
+  expect(noticeOf(unheard, now({}, "down"), 1200)?.text).toContain(
+    "NOT SENT: use the hardware stop",
+  );
+  const unanswered = { ...stop, state: "asked" } as const;
+  expect(noticeOf(unanswered, now({}), 1500)?.tone).toBe("quiet");
+  expect(noticeOf(unanswered, now({}), 9000)?.text).toContain("NOT SENT");
+});
+
+test("a refused Stop says why", () => {
+  expect(noticeOf({ ...stop, state: "refused", detail: "no such run" }, now(null), 1200)).toEqual({
+    tone: "loud",
+    text: "Stop refused: no such run Use the hardware stop.",
+  });
+});
+
+test("an engine that was restarted has not stopped", () => {
+  const detail = "The engine was restarted while the run went on.";
+  const lost = now({ state: "lost", ended_at: "1970-01-01T00:00:02Z", detail });
+  const notice = noticeOf(stop, lost, 2500);
+  expect(notice?.tone).toBe("loud");
+  expect(notice?.text).toContain("restarted");
+});
+
+test("a Stop of somebody else that nothing proves is shouted here, too, with the reason", () => {
+  const alarm = { code: "stop_unconfirmed", at: "", text: "STOP UNCONFIRMED: it is deaf." };
+  const stopping = now({ state: "stopping", desired: "stopped", alarms: [alarm] });
+  expect(othersNotice(stopping)?.text).toBe("STOP UNCONFIRMED: run 7 on David: it is deaf.");
+  expect(othersNotice(now({ desired: "running", alarms: [alarm] }))).toBeNull();
+});
+
+test("what an engine gave up is shouted whoever asked for it, until somebody has looked", () => {
+  const unconfirmed = "Grip_0 did not obey within 5 s";
+  const left = now({ state: "unknown", desired: "running", unconfirmed });
+  expect(othersNotice(left)?.text).toContain(
+    "run 7 on David: Grip_0 did not obey within 5 s. Look",
+  );
+  const over = { state: "error", unconfirmed: null, ended_at: "1970-01-01T00:00:02Z" } as const;
+  expect(othersNotice(now({ ...over, desired: "running" }))).toBeNull();
+});
+
+test("a person's word is asked for only where no answer can prove rest", () => {
+  const run = { ended_at: null, simulated: false, started_at: "", unknown_since: null } as Run;
+  const moving = { a: { state: "RUNNING" } } as unknown as NonNullable<Run["actions"]>;
+  expect(needsRestConfirmation({ ...run, state: "running" })).toBe(false);
+  expect(needsRestConfirmation({ ...run, state: "lost" })).toBe(true);
+  expect(needsRestConfirmation({ ...run, state: "unknown", unknown_since: "1970" })).toBe(true);
+  expect(needsRestConfirmation({ ...run, state: "stopping", unconfirmed: "why" })).toBe(true);
+  expect(
+    needsRestConfirmation({ ...run, state: "running", unconfirmed: "why", actions: moving }),
+  ).toBe(false);
+  expect(needsRestConfirmation({ ...run, state: "lost", simulated: true })).toBe(false);
+});
+
+test("beside a graph, Stop means its run or the group it is in, and else everything", () => {
+  const one = { id: "a", number: 1, graph_name: "patrol", group: "g" } as Run;
+  const two = { ...one, id: "b", number: 2 };
+  expect(runToStop([])).toBeNull();
+  expect(runToStop([one])?.id).toBe("a");
+  expect(runToStop([one, two])).toEqual({ id: "g", words: "the 2 runs of patrol" });
+  expect(runToStop([one, { ...two, group: null }])).toBeNull();
+});
+
+test("a run that was called stopped and moves again is shouted before anything else", () => {
+  const text = "MOVES AGAIN: David shows Work_0 moving in patrol, after it was called stopped.";
+  const alarms = [{ code: "moves_again", at: "", text }];
+  const moves = { state: "stopping", desired: "stopped", moves_again_at: "t", alarms } as const;
+  expect(movingAgain(now(null))).toBeNull();
+  expect(movingAgain(now({ state: "stopped", ended_at: "t" }))).toBeNull();
+  const notice = movingAgain(now(moves as unknown as Partial<Run>));
+  expect(notice).toMatchObject({ tone: "loud", stays: true });
+  expect(notice?.text).toContain("MOVES AGAIN: run 7: David shows Work_0 moving");
+  expect(notice?.text).toContain("It is being stopped again.");
+  expect(notice?.text).toContain("hardware stop");
+});
+
+test("a runner that is not reached is never silence", () => {
+  for (const link of ["connecting", "down"] as const) {
+    const why = "The runner does not answer.";
+    const lost: LiveState = { ...now(null, link), unreached: { kind: "silent", why } };
+    expect(unreachableNotice(lost, 1_000)).toBeNull(); // a moment is nothing to shout about
+    const notice = unreachableNotice(lost, 60_000);
+    expect(notice?.tone).toBe("loud");
+    expect(notice?.text).toContain("The runner does not answer.");
+    expect(notice?.text).toContain("hardware stop");
+    expect(stopButtonText(link, 0)).not.toBe("nothing runs");
+  }
+  expect(unreachableNotice(now(null), 60_000)).toBeNull();
+  const mute = {
+    ...now(null, "down"),
+    unreached: { kind: "mute", why: "No socket opens." },
+  } as const;
+  expect(unreachableNotice(mute, 60_000)?.text).toContain("CANNOT BE PROVEN");
+});

@@ -1,0 +1,173 @@
+/** What became of a Stop, in words, until it is proven. */
+import { CloseButton } from "@mantine/core";
+import { useState } from "react";
+import type { LiveState, StopRequest } from "../../api/live/live-socket";
+import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
+import { needsRestConfirmation, type Run } from "../../api/runs";
+import { clock, duration, useNow } from "../../ui/times";
+import { ConfirmRestButton } from "./confirm-rest-button";
+import style from "./stop-notice.module.css";
+
+const LOUD = 2_500; // ms without proof until the notice shouts
+const HEARD = 1_200; // ms within which the runner answers a Stop, if it does
+const GONE = 6_000; // ms that a proven stop stays to be read
+
+/** `since` goes on with each moment, so it is seen but not announced again and again. */
+export type StopNoticeText = {
+  tone: "quiet" | "loud" | "done";
+  text: string;
+  since?: string;
+  stays?: true;
+} | null;
+
+function targets(stop: StopRequest, now: LiveState): Run[] {
+  if (stop.run !== "all") {
+    return [...now.runs.values()].filter((run) => [run.id, run.group].includes(stop.run));
+  }
+  return [...now.runs.values()].filter(
+    (run) => run.ended_at === null || Date.parse(run.ended_at) >= stop.at,
+  );
+}
+
+/** Why it is not proven, as the runner says; "" when it has not said so yet. */
+function reasonOf(run: Run): string {
+  if (run.unconfirmed) return `${run.unconfirmed.replace(/\.$/, "")}.`;
+  const alarm = run.alarms.findLast((each) => each.code === "stop_unconfirmed");
+  return alarm ? alarm.text.replace(/^STOP UNCONFIRMED: /, "") : "";
+}
+
+function unconfirmed(runs: readonly Run[], since?: string): StopNoticeText {
+  const each = runs.map((run) => `run ${run.number} on ${run.engine}`).join(", ");
+  const why = runs.map(reasonOf).find((reason) => reason !== "") ?? "no proof has come.";
+  const look = runs.some((run) => run.unconfirmed)
+    ? " Look at the robot; use its hardware stop."
+    : "";
+  const text = `STOP UNCONFIRMED: ${each}: ${why}${look}`;
+  return { tone: "loud", stays: true, text, ...(since === undefined ? {} : { since }) };
+}
+
+/** Never says "stopped" without the runs' own state saying so. */
+export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNoticeText {
+  const waited = at - stop.at;
+  const since = `asked ${duration(waited)} ago`;
+  if (stop.state === "refused") {
+    return { tone: "loud", text: `Stop refused: ${stop.detail} Use the hardware stop.` };
+  }
+  const unsent = stop.state === "unheard" || (stop.state === "asked" && waited > HEARD);
+  if (unsent) {
+    const why = stop.detail || "The runner does not answer.";
+    return {
+      tone: "loud",
+      stays: true,
+      text: `NOT SENT: use the hardware stop. ${why} Trying again.`,
+      since,
+    };
+  }
+  if (now.link === "down") {
+    return {
+      tone: "loud",
+      stays: true,
+      text: "STOP UNCONFIRMED: sent, but no word from the runner since.",
+      since,
+    };
+  }
+  const runs = targets(stop, now);
+  const open = runs.filter((run) => run.ended_at === null);
+  if (open.length > 0) {
+    if (waited >= LOUD) return unconfirmed(open, since);
+    const names = open.map((run) => `run ${run.number}`).join(", ");
+    return { tone: "quiet", text: `Stopping ${names} …`, since };
+  }
+  const lost = runs.filter((run) => run.state === "lost");
+  if (lost.length > 0) {
+    const ends = lost.map((run) => `run ${run.number} on ${run.engine}: ${run.detail}`).join(" ");
+    return { tone: "loud", text: `STOP UNCONFIRMED: ${ends} Look at the robot.` };
+  }
+  if (waited > GONE) return null;
+  if (stop.state === "asked") return { tone: "quiet", text: "Stop", since };
+  if (runs.length === 0) return { tone: "done", text: "The runner says that nothing runs." };
+  const ends = runs.map((run) => `Run ${run.number}: ${run.state}`).join(" · ");
+  return { tone: "done", text: `${ends}.` };
+}
+
+/** A run that was said to be over and is not: nothing else is as urgent. */
+export function movingAgain(now: LiveState): StopNoticeText {
+  const runs = openRuns(now).filter((run) => run.moves_again_at);
+  if (runs.length === 0) return null;
+  const each = runs.map((run) => {
+    const told = run.alarms.findLast((alarm) => alarm.code === "moves_again");
+    const text = (told?.text ?? "").replace(/^MOVES AGAIN: /, "");
+    const then =
+      run.desired === "stopped" ? "It is being stopped again." : "Nobody has asked to stop it.";
+    return `run ${run.number}: ${text} ${then}`;
+  });
+  const since = now.link === "down" ? ` Runner unknown since ${clock(now.since)}.` : "";
+  const text = `MOVES AGAIN: ${each.join(" ")}${since} Use the hardware stop if it must not move.`;
+  return { tone: "loud", stays: true, text };
+}
+
+/** What somebody else has asked for and what is not proven either: everybody is told. */
+export function othersNotice(now: LiveState): StopNoticeText {
+  if (now.link === "down") return null;
+  const shouting = openRuns(now).filter(
+    (run) => Boolean(run.unconfirmed) || (run.desired === "stopped" && reasonOf(run) !== ""),
+  );
+  if (shouting.length > 0) return unconfirmed(shouting);
+  const held = foreignGraphs(now).find((each) => each.held.stopping);
+  if (held === undefined) return null;
+  const { robot, held: graph } = held;
+  const text = `STOP UNCONFIRMED: ${graph.graph} on ${robot.name}: ${graph.stopping}.`;
+  return { tone: "loud", stays: true, text };
+}
+
+const UNREACHED = 6_000; // ms that the runner may take to answer before a page says that it does not
+
+/** Stop looks as always: where it would reach nobody that has to be said before it is needed. */
+export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
+  if (now.link === "live" || at - now.since < UNREACHED) return null;
+  const { kind, why } = now.unreached ?? { kind: "silent", why: "The runner does not answer." };
+  const head = kind === "mute" ? "STOP CANNOT BE PROVEN HERE" : "STOP MAY REACH NOBODY";
+  const text = `${head}: ${why} Use the hardware stop.`;
+  return { tone: "loud", stays: true, text };
+}
+
+export function StopNotice() {
+  const { now } = useLive();
+  const [dismissed, setDismissed] = useState("");
+  const last = now.stops.at(-1);
+  const watching = last !== undefined && last.id !== dismissed;
+  const open = openRuns(now).length;
+  const busy =
+    watching && (open > 0 || last.state !== "heard" || Date.now() - last.at < GONE + 1000);
+  const at = useNow(200, busy || now.link !== "live");
+  const notice =
+    movingAgain(now) ??
+    (watching ? noticeOf(last, now, at) : null) ??
+    othersNotice(now) ??
+    unreachableNotice(now, at);
+  if (notice === null) return null;
+  const looked =
+    notice.tone === "loud" && now.link !== "down"
+      ? openRuns(now).find(needsRestConfirmation)
+      : undefined;
+  return (
+    <div
+      className={style.notice}
+      data-tone={notice.tone}
+      role={notice.tone === "loud" ? "alert" : "status"}
+    >
+      <span>
+        {notice.text}
+        {notice.since !== undefined && (
+          <span aria-hidden className={style.since}>
+            {` ${notice.since}`}
+          </span>
+        )}
+      </span>
+      {looked && <ConfirmRestButton run={looked} loud />}
+      {!notice.stays && (
+        <CloseButton size="sm" aria-label="Hide" onClick={() => setDismissed(last?.id ?? "")} />
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,95 @@
+import { expect, test } from "vitest";
+import type { ActionRun, Run } from "../api/runs";
+import { progressByAid, progressOf, runEndText, runLabel } from "./progress";
+
+const run: Run = {
+  id: "r",
+  number: 1,
+  graph: "g",
+  graph_name: "g",
+  version: "v",
+  digest: "d",
+  engine: "simulator",
+  simulated: true,
+  state: "running",
+  desired: "running",
+  proof_at: null,
+  unknown_since: null,
+  moves_again_at: null,
+  result: null,
+  requested_at: "2026-01-01T00:00:00Z",
+  started_at: "2026-01-01T00:00:00Z",
+  ended_at: null,
+  author: { id: "p", name: "Ada" },
+  stopped_by: null,
+  detail: "",
+  alarms: [],
+  recorded: true,
+  group: null,
+};
+
+const visit = {
+  from: "2026-01-01T00:00:01Z",
+  not_before: "2026-01-01T00:00:00Z",
+  not_after: null,
+  until: null,
+  result: null,
+  how: "observed",
+} as const;
+
+const going: ActionRun = { aid: "a", state: "RUNNING", visits: [visit], older: 0, messages: [] };
+
+test("an action that runs says since when", () => {
+  const progress = progressOf(going, run, false);
+  expect([progress.tone, progress.word]).toEqual(["run", "running"]);
+  expect(progress.since).toBe(Date.parse(visit.from));
+});
+
+test("while nobody hears of the run, what ran is unknown", () => {
+  expect(progressOf(going, run, true).tone).toBe("unknown");
+  expect(progressOf(going, { ...run, state: "unknown" }, false).tone).toBe("unknown");
+});
+
+test("an end that was not seen is not told as one of the four outcomes", () => {
+  const ended: ActionRun = {
+    ...going,
+    state: "FINISHED",
+    visits: [{ ...visit, until: visit.from }],
+  };
+  expect(progressOf(ended, run, false)).toMatchObject({ tone: "done", word: "finished" });
+});
+
+test("actions of sub-graphs carry no place on this canvas", () => {
+  const actions = { A_0: going, SUB__A_0: { ...going, aid: null } };
+  expect([...progressByAid({ ...run, actions }, false).keys()]).toEqual(["a"]);
+});
+
+test("a run is called stopped or finished only by its own state", () => {
+  expect(runLabel({ ...run, desired: "stopped" }).word).toBe("running");
+  expect(runLabel({ ...run, state: "stopping" }).word).toBe("stopping");
+  const stopped = { ...run, state: "stopped", stopped_by: { id: "q", name: "Mari" } } as const;
+  expect(runEndText(stopped)).toBe("stopped by Mari");
+  expect(runLabel({ ...run, state: "finished", result: "on_error" }).tone).toBe("error");
+});
+
+test("a run that moves again is never called by the end that it had", () => {
+  const again = { ...run, desired: "stopped", state: "stopping", moves_again_at: "t" } as const;
+  expect(runLabel(again)).toEqual({ tone: "error", word: "MOVES AGAIN" });
+  expect(runLabel({ ...again, state: "unknown", unknown_since: "t" }).word).toBe("MOVES AGAIN");
+});
+
+test("what is known between bounds is no value, and what may go on has no upper one", () => {
+  const seen = { ...visit, until: "2026-01-01T00:00:03Z", not_after: "2026-01-01T00:00:04Z" };
+  const told = (one: Partial<typeof seen>) =>
+    progressOf({ ...going, state: "FINISHED", visits: [{ ...seen, ...one } as never] }, run, false);
+  expect(told({})).toMatchObject({ took: 2_000, atMost: 4_000 });
+  expect(told({ until: "2026-01-01T00:00:00Z" })).toMatchObject({ took: 0, atMost: 4_000 });
+  expect(told({ not_after: null as never }).atMost).toBe(Number.POSITIVE_INFINITY);
+  expect(told({ not_before: visit.from as never, not_after: seen.until }).atMost).toBeNull();
+});
+
+test("a run that finished with a result that nobody told is not called true", () => {
+  const over = { ...run, state: "finished", ended_at: "t" } as const;
+  expect(runLabel(over)).toEqual({ tone: "done", word: "finished" });
+  expect(runLabel({ ...over, result: "on_true" }).tone).toBe("true");
+});

@@ -1,0 +1,166 @@
+/** What can be said of an action of a run, and of the run, in one word and one tone. */
+import type { ActionRun, Run, Visit } from "../api/runs";
+
+export type Tone = "idle" | "run" | "true" | "false" | "error" | "stopped" | "done" | "unknown";
+
+export interface Progress {
+  /** The action's full name in the run, where it is one of a run. */
+  name?: string;
+  tone: Tone;
+  word: string;
+  /** When the present visit began, ms; null when none goes on. */
+  since: number | null;
+  /** How long the last visit took at least, ms; null when none ended. */
+  took: number | null;
+  /** How long it took at most, ms, where its ends were not seen exactly (Infinity: its code may go on
+   * still); null where they were. */
+  atMost: number | null;
+  visits: number;
+  inferred: boolean;
+  message: string | null;
+}
+
+const time = (text: string | null | undefined): number | null => (text ? Date.parse(text) : null);
+
+export function visitBegin(visit: Visit): number | null {
+  return time(visit.from) ?? time(visit.not_before) ?? time(visit.not_after);
+}
+
+export function visitEnd(visit: Visit): number | null {
+  return time(visit.until);
+}
+
+const resultTone: Record<string, Tone> = {
+  true: "true",
+  false: "false",
+  error: "error",
+  stopped: "stopped",
+  on_true: "true",
+  on_false: "false",
+  on_error: "error",
+  on_stopped: "stopped",
+  on_halted: "stopped",
+};
+
+function finished(visit: Visit | undefined): { tone: Tone; word: string } {
+  const result = visit?.result;
+  if (!result) return { tone: "done", word: "finished" };
+  const tone = resultTone[result] ?? "done";
+  return { tone, word: result.replace(/^on_/, "") };
+}
+
+function stateOf(action: ActionRun, over: boolean, unsure: boolean): { tone: Tone; word: string } {
+  const last = action.visits.at(-1);
+  switch (action.state) {
+    case "RUNNING":
+      if (over) return { tone: "unknown", word: "end not seen" };
+      return unsure ? { tone: "unknown", word: "unknown" } : { tone: "run", word: "running" };
+    case "PAUSE_REQUESTED":
+      return { tone: "run", word: "pausing" };
+    case "PAUSED":
+      return { tone: "stopped", word: "paused" };
+    case "STOPPING":
+      return { tone: "stopped", word: "stopping" };
+    case "BYPASSED":
+      return { tone: "done", word: "passed over" };
+    case "ERROR":
+      return { tone: "error", word: "error" };
+    case "FINISHED":
+      return finished(last);
+    default:
+      if (last !== undefined && visitEnd(last) !== null) return finished(last);
+      return { tone: "idle", word: over ? "did not run" : "waits" };
+  }
+}
+
+/** How long a visit took at most; null where its ends are known exactly, and while it goes on. */
+export function visitDurationBound(visit: Visit): number | null {
+  const [from, until] = [time(visit.from), time(visit.until)];
+  const [before, after] = [time(visit.not_before), time(visit.not_after)];
+  if (from === null || until === null || before === null) return null;
+  if (after === null) return Number.POSITIVE_INFINITY;
+  return before === from && until === after ? null : after - before;
+}
+
+/** How long a visit took, at least and at most, ms. */
+export function visitDuration(visit: Visit): Pick<Progress, "took" | "atMost"> {
+  const [from, until] = [visitBegin(visit), visitEnd(visit)];
+  const took = from !== null && until !== null ? Math.max(0, until - from) : null;
+  return { took, atMost: visitDurationBound(visit) };
+}
+
+/** `unsure`: nobody has heard of the run for too long. */
+export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progress {
+  const over = run.ended_at !== null;
+  const { tone, word } = stateOf(action, over, unsure || run.state === "unknown");
+  const last = action.visits.at(-1);
+  const from = last ? visitBegin(last) : null;
+  const until = last ? visitEnd(last) : null;
+  return {
+    tone,
+    word,
+    since: until === null && !over ? from : null,
+    ...(last ? visitDuration(last) : { took: null, atMost: null }),
+    visits: action.visits.length,
+    inferred: last?.how === "inferred",
+    message: action.messages.at(-1)?.text ?? null,
+  };
+}
+
+/** Progress by `aid`; actions of sub-graphs, which carry none, are left out. */
+export function progressByAid(run: Run | null, unsure: boolean): Map<string, Progress> {
+  const found = new Map<string, Progress>();
+  if (run === null) return found;
+  for (const [name, action] of Object.entries(run.actions ?? {})) {
+    if (action.aid) found.set(action.aid, { name, ...progressOf(action, run, unsure) });
+  }
+  return found;
+}
+
+function clockOf(text: string): string {
+  return new Date(text).toLocaleTimeString(undefined, { hour12: false });
+}
+
+const runWords: Record<Run["state"], { tone: Tone; word: string }> = {
+  requested: { tone: "run", word: "requested" },
+  published: { tone: "run", word: "starting" },
+  running: { tone: "run", word: "running" },
+  paused: { tone: "stopped", word: "paused" },
+  stopping: { tone: "stopped", word: "stopping" },
+  unknown: { tone: "unknown", word: "unknown" },
+  finished: { tone: "true", word: "finished" },
+  halted: { tone: "stopped", word: "halted" },
+  stopped: { tone: "stopped", word: "stopped" },
+  error: { tone: "error", word: "error" },
+  refused: { tone: "error", word: "refused" },
+  lost: { tone: "unknown", word: "lost" },
+};
+
+/** The run's state, with the result where it has one that says more. */
+export function runLabel(run: Run): { tone: Tone; word: string } {
+  if (run.moves_again_at) return { tone: "error", word: "MOVES AGAIN" };
+  if (run.unconfirmed && run.ended_at === null && run.state !== "running") {
+    return { tone: "error", word: run.state === "lost" ? "lost" : "stop unconfirmed" };
+  }
+  if (run.state === "unknown" && run.unknown_since) {
+    return { tone: "unknown", word: `unknown since ${clockOf(run.unknown_since)}` };
+  }
+  if (run.state === "finished" && run.result && run.result !== "on_true") {
+    const word = run.result.replace(/^on_/, "");
+    return { tone: resultTone[run.result] ?? "done", word: `finished: ${word}` };
+  }
+  if (run.state === "finished" && !run.result) return { tone: "done", word: "finished" };
+  return runWords[run.state] ?? { tone: "unknown", word: run.state };
+}
+
+/** The end in words, for history. */
+export function runEndText(run: Run): string {
+  const { word } = runLabel(run);
+  const by = run.stopped_by?.name;
+  if (run.state === "stopped" && by) return `stopped by ${by}`;
+  if (run.at_rest?.by) return `${word}: seen at rest by ${run.at_rest.by.name}`;
+  if (run.at_rest) return `${word}: its engine has ended`;
+  if (run.state === "lost") return "lost: nothing proves its end";
+  if (run.state === "finished" && run.result === "on_true") return "finished";
+  return word;
+}

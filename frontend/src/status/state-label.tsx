@@ -1,0 +1,57 @@
+/** A state as sign, word and colour. */
+import {
+  IconCheck,
+  IconCircle,
+  IconCircleCheck,
+  IconExclamationMark,
+  IconLoader2,
+  IconQuestionMark,
+  IconSquareFilled,
+  IconX,
+} from "@tabler/icons-react";
+import type { Tone } from "./progress";
+import style from "./state-label.module.css";
+
+const signs = {
+  idle: IconCircle,
+  run: IconLoader2,
+  true: IconCheck,
+  false: IconX,
+  error: IconExclamationMark,
+  stopped: IconSquareFilled,
+  done: IconCircleCheck,
+  unknown: IconQuestionMark,
+} as const;
+
+export const toneColor: Record<Tone, string> = {
+  idle: "var(--ink3)",
+  run: "var(--run)",
+  true: "var(--true)",
+  false: "var(--false)",
+  error: "var(--error)",
+  stopped: "var(--stopped)",
+  done: "var(--ink2)",
+  unknown: "var(--warn)",
+};
+
+interface Props {
+  tone: Tone;
+  word: string;
+  more?: string;
+  pill?: boolean;
+}
+
+export function StateLabel({ tone, word, more, pill = false }: Props) {
+  const Sign = signs[tone];
+  return (
+    <span
+      className={pill ? style.pill : style.word}
+      style={{ color: toneColor[tone] }}
+      data-tone={tone}
+    >
+      <Sign size={tone === "stopped" ? 9 : 12} stroke={2.8} aria-hidden className={style.sign} />
+      {word}
+      {more !== undefined && <span className={style.more}>· {more}</span>}
+    </span>
+  );
+}

@@ -1,0 +1,253 @@
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import * as Y from "yjs";
+import { addAction, rename } from "../graph/edit";
+import { graphNow } from "../graph/edit/document-writes";
+import { FakeEditStore } from "../testing/fake-device";
+import { FakeServer } from "../testing/fake-server";
+import { GraphConnection } from "./graph-connection";
+
+const ADA = { id: "a", name: "Ada" };
+
+let server: FakeServer;
+let device: FakeEditStore;
+const visits: GraphConnection[] = [];
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  vi.stubGlobal("fetch", async () => Response.json({ person: ADA }));
+  server = new FakeServer("one");
+  device = new FakeEditStore();
+});
+
+afterEach(() => {
+  for (const connection of visits.splice(0)) connection.leave();
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+  vi.restoreAllMocks();
+});
+
+const settle = () => vi.advanceTimersByTimeAsync(1);
+
+async function come(): Promise<GraphConnection> {
+  const connection = new GraphConnection({
+    url: "ws://host/room",
+    keep: { graph: "g", person: ADA, device },
+    open: (url) => server.open(url),
+  });
+  visits.push(connection);
+  await settle();
+  return connection;
+}
+
+async function arrive(): Promise<void> {
+  server.accept();
+  await settle();
+}
+
+const docOf = (connection: GraphConnection) => connection.now().open.doc;
+const names = (doc: Y.Doc) =>
+  graphNow(doc)
+    .actions.map(({ name }) => name)
+    .sort();
+const link = (connection: GraphConnection) => connection.now().open.room.link();
+
+/** A server with what this one has now, as a backup brings it back. */
+function backup(epoch: string): FakeServer {
+  const copy = new FakeServer(epoch);
+  Y.applyUpdate(copy.doc, Y.encodeStateAsUpdate(server.doc));
+  copy.seq = server.seq;
+  return copy;
+}
+
+test("a page names the history it knows, and the moment it has seen of it", async () => {
+  const connection = await come();
+  expect(new URL(server.last.url).search).toBe("?acks=1");
+  await arrive();
+  addAction(docOf(connection), { name: "Look" });
+  await settle();
+  server.last.end(1012);
+  await vi.advanceTimersByTimeAsync(400);
+  expect(new URL(server.last.url).search).toBe(`?acks=1&epoch=one&seq=${server.seq}`);
+  await arrive();
+  expect(link(connection).state).toBe("live");
+});
+
+test("after a restore with nothing waiting the page shows what the server has, and says so once", async () => {
+  const connection = await come();
+  await arrive();
+  addAction(docOf(connection), { name: "Before" });
+  await settle();
+  const then = backup("two");
+  addAction(docOf(connection), { name: "After" });
+  await settle();
+  server.last.end(1012);
+  server = then;
+  await vi.advanceTimersByTimeAsync(400);
+  await arrive(); // sent away
+  await arrive(); // the next room
+  expect(link(connection)).toMatchObject({ state: "live", unsaved: 0 });
+  expect(names(docOf(connection))).toEqual(["Before"]);
+  expect(names(server.doc)).toEqual(["Before"]);
+  expect(connection.now()).toMatchObject({ stranded: [], notice: "went-back" });
+  connection.dismiss();
+  expect(connection.now().notice).toBeNull();
+});
+
+/** Ada renames, adds and deletes while the server is away, which comes back from a backup. */
+async function strand(connection: GraphConnection): Promise<{ kept: string; gone: string }> {
+  await arrive();
+  const kept = addAction(docOf(connection), { name: "Look" });
+  const gone = addAction(docOf(connection), { name: "Gone" });
+  await settle();
+  const then = backup("two");
+  addAction(docOf(connection), { name: "LostWithTheDisk" });
+  await settle();
+  server.last.end(1006);
+  rename(docOf(connection), kept, "Watch");
+  rename(docOf(connection), kept, "Peek");
+  docOf(connection).getMap("actions").delete(gone);
+  await settle();
+  server = then;
+  await vi.advanceTimersByTimeAsync(2_000);
+  await arrive();
+  await arrive();
+  return { kept, gone };
+}
+
+test("edits that wait on the old history are laid aside with the values before and after", async () => {
+  const connection = await come();
+  const { kept, gone } = await strand(connection);
+  expect(names(docOf(connection))).toEqual(["Gone", "Look"]);
+  const [stranded] = connection.now().stranded;
+  expect(stranded?.edits).toBe(3);
+  expect(stranded?.before.actions.get(kept)).toBe("Look");
+  expect(stranded?.difference.actions.get(kept)).toBe("Peek");
+  expect(stranded?.before.actions.get(gone)).toBe("Gone");
+  expect(stranded?.difference.actions.has(gone)).toBe(true);
+  expect(stranded?.difference.actions.get(gone)).toBeUndefined();
+  expect([...(stranded?.difference.actions.values() ?? [])]).not.toContain("LostWithTheDisk");
+  expect(names(server.doc)).toEqual(["Gone", "Look"]);
+});
+
+test("of what was laid aside the person takes some; it is stored, and the rest is let go", async () => {
+  const connection = await come();
+  const { kept } = await strand(connection);
+  const [stranded] = connection.now().stranded;
+  if (stranded === undefined) throw new Error("nothing waits");
+  const chosen = { ...stranded.difference, actions: new Map([[kept, "Peek"]]) };
+  expect(await connection.apply(stranded, chosen)).toBe(1);
+  expect(names(server.doc)).toEqual(["Gone", "Peek"]);
+  expect(connection.now().stranded).toEqual([]);
+  expect(device.waiting).toBe(0);
+  connection.now().open.undo.undo();
+  await settle();
+  expect(names(server.doc)).toEqual(["Gone", "Look"]);
+});
+
+test("who decides later finds the same choice after closing the page, and goes on working", async () => {
+  const first = await come();
+  const { kept } = await strand(first);
+  addAction(docOf(first), { name: "New" });
+  await settle();
+  first.leave();
+  await settle();
+  const again = await come();
+  expect(names(docOf(again))).toEqual(["Gone", "Look", "New"]);
+  await arrive();
+  expect(link(again)).toMatchObject({ state: "live", unsaved: 0 });
+  const [stranded] = again.now().stranded;
+  expect(stranded?.edits).toBe(3);
+  expect(stranded?.before.actions.get(kept)).toBe("Look");
+  expect(stranded?.difference.actions.get(kept)).toBe("Peek");
+  if (stranded) await again.drop(stranded);
+  expect(again.now().stranded).toEqual([]);
+  expect(device.waiting).toBe(0);
+  expect(names(server.doc)).toEqual(["Gone", "Look", "New"]);
+});
+
+test("a server that went back without saying so is noticed, and gets another place on the device", async () => {
+  const connection = await come();
+  await arrive();
+  addAction(docOf(connection), { name: "Before" });
+  await settle();
+  const then = backup("one");
+  addAction(docOf(connection), { name: "Lost" });
+  await settle();
+  then.seq = server.seq + 5; // as if others had gone on
+  server.last.end(1006);
+  addAction(docOf(connection), { name: "Mine" });
+  server = then;
+  await vi.advanceTimersByTimeAsync(2_000);
+  await arrive();
+  await arrive();
+  expect(link(connection).state).toBe("live");
+  expect(names(docOf(connection))).toEqual(["Before"]);
+  const [stranded] = connection.now().stranded;
+  expect([...(stranded?.difference.actions.values() ?? [])]).toContain("Mine");
+  expect(names(server.doc)).toEqual(["Before"]);
+});
+
+test("a page that shows something else than the server reports it and begins anew", async () => {
+  vi.spyOn(console, "error").mockImplementation(() => undefined);
+  const connection = await come();
+  await arrive();
+  addAction(docOf(connection), { name: "Look" });
+  await vi.advanceTimersByTimeAsync(6_000);
+  expect(server.divergences).toBe(0);
+  expect(connection.now().notice).toBeNull();
+  // Both say that they hold the same entries, which have other contents.
+  Object.assign(server, { doc: twisted(server.doc) });
+  server.broadcast((doc) => doc.getMap("meta").set("name", "renamed"));
+  await vi.advanceTimersByTimeAsync(6_000);
+  expect(server.divergences).toBe(1);
+  await arrive();
+  expect(link(connection)).toMatchObject({ state: "live", unsaved: 0 });
+  expect(connection.now().notice).toBe("differed");
+  expect(names(docOf(connection))).toEqual(["Twisted"]);
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(server.divergences).toBe(1);
+});
+
+/** A document with the same state vector in which the actions have another name. */
+function twisted(doc: Y.Doc): Y.Doc {
+  const text = Y.encodeStateAsUpdate(doc);
+  const bytes = new TextDecoder("latin1").decode(text).replaceAll("w\x04Look", "w\x07Twisted");
+  const copy = new Y.Doc();
+  Y.applyUpdate(
+    copy,
+    Uint8Array.from(bytes, (letter) => letter.charCodeAt(0)),
+  );
+  return copy;
+}
+
+test("who shares a client id with somebody else takes another, and loses nothing", async () => {
+  const connection = await come();
+  await arrive();
+  const action = addAction(docOf(connection), { name: "Look" });
+  await settle();
+  server.stalled = true;
+  rename(docOf(connection), action, "Peek");
+  const { clientID } = docOf(connection);
+  server.lose();
+  server.stalled = false;
+  server.last.end(4403, "client id of another person");
+  await settle();
+  await arrive();
+  await settle();
+  expect(docOf(connection).clientID).not.toBe(clientID);
+  expect(link(connection)).toMatchObject({ state: "live", unsaved: 0 });
+  expect(names(server.doc)).toEqual(["Peek"]);
+  expect(connection.now()).toMatchObject({ stranded: [], notice: null });
+  expect(device.waiting).toBe(0);
+});
+
+test("a device that keeps nothing loses no choice while the page is open", async () => {
+  vi.spyOn(console, "warn").mockImplementation(() => undefined);
+  device.refuses = true;
+  const connection = await come();
+  const { kept } = await strand(connection);
+  const [stranded] = connection.now().stranded;
+  expect(stranded?.before.actions.get(kept)).toBe("Look");
+  if (stranded) await connection.apply(stranded, stranded.difference).catch(() => undefined);
+  expect(names(server.doc)).toEqual(["Peek"]);
+});

@@ -1,0 +1,272 @@
+/**
+ * What IndexedDB keeps of graphs that were open here: a copy to open offline, and the edits that
+ * no server has stored yet.
+ *
+ * Everything is kept per graph, epoch and person, so that on a shared tablet nobody's edits are ever
+ * sent, or shown, under another name. IndexedDB works without a secure context; where a browser
+ * refuses it, each call here rejects, and the room says that nothing is kept.
+ */
+
+import type { ReplacedEntries } from "./replaced-history";
+
+/** Whose copy of which graph. */
+export interface CopyOwner {
+  readonly graph: string;
+  readonly person: { readonly id: string; readonly name: string };
+}
+
+/** An edit that is not durable. Ids sort by the order in which they were made. */
+export interface UnsavedEdit {
+  readonly id: string;
+  readonly update: Uint8Array;
+  /** Milliseconds since 1970. */
+  readonly at: number;
+  /** What it replaced; absent where that is not known. */
+  readonly before?: ReplacedEntries;
+}
+
+export interface StoredCopy {
+  /** One history of the graph, see `epochName`. */
+  readonly epoch: string;
+  /** The copy shows the log up to this entry. */
+  readonly seq: number;
+  /** Updates that are durable; together they are the document. */
+  readonly known: readonly Uint8Array[];
+  readonly waiting: readonly UnsavedEdit[];
+}
+
+/** One write: all of it or nothing. */
+export interface StoreWrite {
+  readonly waits: readonly UnsavedEdit[];
+  readonly known: readonly Uint8Array[];
+  /** Edits that waited and are durable now. */
+  readonly durable: readonly UnsavedEdit[];
+  /** The whole document, which replaces what was known. Only of durable edits. */
+  readonly copy: Uint8Array | null;
+  readonly seq: number;
+}
+
+/** Somebody else whose edits wait here until they sign in again. */
+export interface OtherPerson {
+  readonly id: string;
+  readonly name: string;
+  readonly waiting: number;
+}
+
+export interface EditStore {
+  /** What is kept, of all histories, the last used one at the end. */
+  read(owner: CopyOwner): Promise<readonly StoredCopy[]>;
+  write(owner: CopyOwner, epoch: string, batch: StoreWrite): Promise<void>;
+  /** Lets go of everything kept of one epoch, edits that wait included. */
+  forget(owner: CopyOwner, epoch: string): Promise<void>;
+  /** The others with edits of this graph that wait here. */
+  others(owner: CopyOwner): Promise<readonly OtherPerson[]>;
+}
+
+/** Of a graph whose server has not said yet which history it has. */
+export const UNNAMED_EPOCH = "0";
+
+/** A place for a document that begins anew although the server calls the history the same. */
+export function newEpoch(name: string): string {
+  return `${name || UNNAMED_EPOCH}~${freshId()}`;
+}
+
+/** What the server calls the history that is kept under this epoch; empty when it has not said. */
+export function epochName(epoch: string): string {
+  const [name = UNNAMED_EPOCH] = epoch.split("~");
+  return name === UNNAMED_EPOCH ? "" : name;
+}
+
+const NAME = "action-assistant";
+/** Copies of graphs in which nothing waits; the least recently used go first. */
+export const MOST_COPIES = 40;
+
+interface Copy {
+  graph: string;
+  epoch: string;
+  person: string;
+  name: string;
+  seq: number;
+  usedAt: number;
+}
+
+type CopyKey = readonly [graph: string, person: string, epoch: string];
+
+/** The browser's storage. Opens it at the first call, once. */
+export function indexedDbStore(factory: IDBFactory | undefined = globalThis.indexedDB): EditStore {
+  let opened: Promise<IDBDatabase> | null = null;
+  const database = () => {
+    opened ??= openDatabase(factory, () => {
+      opened = null;
+    });
+    opened.catch(() => {
+      opened = null;
+    });
+    return opened;
+  };
+  return {
+    async read(owner) {
+      const work = (await database()).transaction(["copies", "known", "waiting"]);
+      const range = within(owner.graph, owner.person.id);
+      const copies = (await answer(work.objectStore("copies").getAll(range))) as Copy[];
+      copies.sort((a, b) => a.usedAt - b.usedAt);
+      return Promise.all(copies.map((copy) => readOne(work, copy)));
+    },
+    async write(owner, epoch, batch) {
+      const store = await database();
+      try {
+        await writeBatch(store, owner, epoch, batch);
+      } catch (error) {
+        if (!(error instanceof DOMException && error.name === "QuotaExceededError")) throw error;
+        await prune(store, owner, 0);
+        await writeBatch(store, owner, epoch, batch);
+      }
+      if (batch.copy !== null) await prune(store, owner, MOST_COPIES);
+    },
+    async forget(owner, epoch) {
+      const work = (await database()).transaction(["copies", "known", "waiting"], "readwrite");
+      remove(work, [owner.graph, owner.person.id, epoch]);
+      await finished(work);
+    },
+    async others(owner) {
+      const work = (await database()).transaction(["copies", "waiting"]);
+      const range = within(owner.graph);
+      const keys = (await answer(
+        work.objectStore("waiting").getAllKeys(range),
+      )) as unknown as CopyKey[];
+      const copies = (await answer(work.objectStore("copies").getAll(range))) as Copy[];
+      const names = new Map(copies.map((copy) => [copy.person, copy.name]));
+      const counts = new Map<string, number>();
+      for (const [, person] of keys) {
+        if (person !== owner.person.id) counts.set(person, (counts.get(person) ?? 0) + 1);
+      }
+      return [...counts].map(([id, waiting]) => ({ id, name: names.get(id) ?? "", waiting }));
+    },
+  };
+}
+
+let ofBrowser: EditStore | null = null;
+
+/** The storage of this browser, the same for all rooms. */
+export function browserStore(): EditStore {
+  ofBrowser ??= indexedDbStore();
+  return ofBrowser;
+}
+
+function openDatabase(factory: IDBFactory | undefined, onLost: () => void): Promise<IDBDatabase> {
+  return new Promise((resolve, reject) => {
+    if (factory === undefined) throw new Error("This browser stores nothing for this page");
+    const request = factory.open(NAME, 1);
+    request.onupgradeneeded = () => {
+      for (const store of ["copies", "known", "waiting"]) request.result.createObjectStore(store);
+    };
+    request.onerror = () => reject(request.error);
+    request.onblocked = () => reject(new Error("another version of this page holds the storage"));
+    request.onsuccess = () => {
+      const database = request.result;
+      database.onclose = onLost;
+      database.onversionchange = () => {
+        database.close();
+        onLost();
+      };
+      resolve(database);
+    };
+  });
+}
+
+/** All keys that begin with these parts: an array sorts after every text. */
+function within(...parts: readonly string[]): IDBKeyRange {
+  return IDBKeyRange.bound([...parts], [...parts, []]);
+}
+
+async function readOne(work: IDBTransaction, copy: Copy): Promise<StoredCopy> {
+  const range = within(copy.graph, copy.person, copy.epoch);
+  const [known, waiting] = await Promise.all([
+    answer(work.objectStore("known").getAll(range)) as Promise<Uint8Array[]>,
+    answer(work.objectStore("waiting").getAll(range)) as Promise<UnsavedEdit[]>,
+  ]);
+  return { epoch: copy.epoch, seq: copy.seq, known, waiting };
+}
+
+async function writeBatch(
+  database: IDBDatabase,
+  { graph, person }: CopyOwner,
+  epoch: string,
+  { waits, known, durable, copy, seq }: StoreWrite,
+): Promise<void> {
+  const work = database.transaction(["copies", "known", "waiting"], "readwrite", {
+    durability: "strict",
+  });
+  const done = finished(work);
+  const place: CopyKey = [graph, person.id, epoch];
+  const tail = work.objectStore("known");
+  const waiting = work.objectStore("waiting");
+  if (copy !== null) {
+    tail.delete(within(...place));
+    tail.put(copy, [...place, freshId()]);
+  }
+  for (const update of known) tail.put(update, [...place, freshId()]);
+  for (const edit of waits) waiting.put(edit, [...place, edit.id]);
+  for (const { id, update } of durable) {
+    waiting.delete([...place, id]);
+    if (copy === null) tail.put(update, [...place, freshId()]);
+  }
+  const entry: Copy = {
+    graph,
+    epoch,
+    person: person.id,
+    name: person.name,
+    seq,
+    usedAt: Date.now(),
+  };
+  work.objectStore("copies").put(entry, [...place]);
+  work.commit();
+  await done;
+}
+
+/** Lets go of copies in which nothing waits, except the newest and the one in use. */
+async function prune(database: IDBDatabase, owner: CopyOwner, most: number): Promise<void> {
+  const work = database.transaction(["copies", "known", "waiting"], "readwrite");
+  const done = finished(work);
+  const copies = (await answer(work.objectStore("copies").getAll())) as Copy[];
+  const keys = (await answer(work.objectStore("waiting").getAllKeys())) as unknown as CopyKey[];
+  const busy = new Set(
+    keys.map(([graph, person, epoch]) => JSON.stringify([graph, person, epoch])),
+  );
+  const idle = copies
+    .sort((a, b) => b.usedAt - a.usedAt)
+    .filter(({ graph, person, epoch }) => {
+      const inUse = graph === owner.graph && person === owner.person.id;
+      return !inUse && !busy.has(JSON.stringify([graph, person, epoch]));
+    });
+  for (const { graph, person, epoch } of idle.slice(most)) remove(work, [graph, person, epoch]);
+  await done;
+}
+
+function remove(work: IDBTransaction, place: CopyKey): void {
+  work.objectStore("copies").delete([...place]);
+  for (const store of ["known", "waiting"]) work.objectStore(store).delete(within(...place));
+}
+
+let made = 0;
+
+/** A key that nobody else makes, and that sorts after those made before. No secure context needed. */
+export function freshId(): string {
+  made += 1;
+  const parts = [Date.now().toString(36).padStart(9, "0"), made.toString(36).padStart(6, "0")];
+  return [...parts, Math.random().toString(36).slice(2, 10)].join("-");
+}
+
+function answer<T>(request: IDBRequest<T>): Promise<T> {
+  return new Promise((resolve, reject) => {
+    request.onsuccess = () => resolve(request.result);
+    request.onerror = () => reject(request.error);
+  });
+}
+
+function finished(work: IDBTransaction): Promise<void> {
+  return new Promise((resolve, reject) => {
+    work.oncomplete = () => resolve();
+    work.onabort = () => reject(work.error ?? new Error("the write was given up"));
+  });
+}

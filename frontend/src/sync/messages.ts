@@ -1,0 +1,95 @@
+/** The messages and close codes of a room's socket: y-protocols, and ours. */
+
+import * as encoding from "lib0/encoding";
+import { type Awareness, encodeAwarenessUpdate } from "y-protocols/awareness";
+import * as sync from "y-protocols/sync";
+import type * as Y from "yjs";
+import type { Fingerprint } from "./fingerprint";
+import type { RefusalReason } from "./room";
+
+export const SYNC = 0;
+export const AWARENESS = 1;
+export const QUERY_AWARENESS = 3;
+/** How many document messages of this socket are durable, and up to where it was sent the log. */
+export const ACK = 100;
+/** A fingerprint of what is shown: the page's, then the server's. */
+export const COMPARE = 101;
+/** A sentence: why nobody may change this document. */
+export const READ_ONLY = 102;
+/** Which history of the graph this is. */
+export const EPOCH = 103;
+
+/** Close codes after which coming again by itself is of no use. */
+const REFUSED: ReadonlyMap<number, RefusalReason> = new Map([
+  [1003, "not-accepted"],
+  [1007, "not-accepted"],
+  [1008, "forbidden"],
+  [1009, "not-accepted"],
+  [4401, "session-ended"],
+  [4403, "forbidden"],
+  [4404, "no-such-graph"],
+  [4409, "other-epoch"],
+  [4413, "full"],
+]);
+const FORBIDDEN = 4403;
+/** Two documents with one client id: this one has to take another. */
+const OTHER_CLIENT = "client id of another person";
+
+/** Why the server does not let this page in, if that is what a close says. */
+export function refusalOf(code: number, reason: string): RefusalReason | undefined {
+  return code === FORBIDDEN && reason === OTHER_CLIENT ? "other-client" : REFUSED.get(code);
+}
+
+/** Close codes of what passes. */
+export const RETRIED_CLOSES: ReadonlyMap<number, RefusalReason> = new Map([
+  [1012, "restarting"],
+  [1013, "too-slow"],
+]);
+
+/** An update that brings nothing. */
+export const EMPTY_UPDATE = new Uint8Array([0, 0]);
+
+type Bytes = Uint8Array<ArrayBuffer>;
+
+/** Sync step 1: what we have. */
+export function syncStep1(doc: Y.Doc): Bytes {
+  return message(SYNC, (encoder) => sync.writeSyncStep1(encoder, doc));
+}
+
+/** Sync step 2, what the server lacks. */
+export function syncStep2(update: Uint8Array): Bytes {
+  return edit(sync.messageYjsSyncStep2, update);
+}
+
+/** One update. */
+export function updateMessage(update: Uint8Array): Bytes {
+  return edit(sync.messageYjsUpdate, update);
+}
+
+/** What we show after entry `seq` of the log. */
+export function compareMessage(seq: number, { entries, total }: Fingerprint): Bytes {
+  return message(COMPARE, (encoder) => {
+    for (const number of [seq, entries, total]) encoding.writeVarUint(encoder, number);
+  });
+}
+
+/** What we say about ourselves. */
+export function awarenessMessage(awareness: Awareness): Bytes {
+  return message(AWARENESS, (encoder) =>
+    encoding.writeVarUint8Array(encoder, encodeAwarenessUpdate(awareness, [awareness.clientID])),
+  );
+}
+
+function edit(step: number, update: Uint8Array): Bytes {
+  return message(SYNC, (encoder) => {
+    encoding.writeVarUint(encoder, step);
+    encoding.writeVarUint8Array(encoder, update);
+  });
+}
+
+function message(kind: number, write: (encoder: encoding.Encoder) => void): Bytes {
+  const encoder = encoding.createEncoder();
+  encoding.writeVarUint(encoder, kind);
+  write(encoder);
+  return encoding.toUint8Array(encoder) as Bytes;
+}

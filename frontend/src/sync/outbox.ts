@@ -1,0 +1,71 @@
+/**
+ * The person's edits that the server has not stored yet.
+ *
+ * The room acknowledges by counting this socket's document messages (sync step 2 and updates), so
+ * each waiting edit remembers the message that carried it. A new socket counts from nothing: what
+ * was not acknowledged on the old one goes again, with the first step 2.
+ */
+
+import type { UnsavedEdit } from "./indexed-db";
+
+const NOT_SENT = Number.POSITIVE_INFINITY;
+
+export class Outbox {
+  /** In the order in which they were made. */
+  private waiting: { readonly edit: UnsavedEdit; message: number }[] = [];
+  private sent = 0;
+  private answeredSync = false;
+
+  /** How many edits are not durable. */
+  get unsaved(): number {
+    return this.waiting.length;
+  }
+
+  /** The edits that are not durable. */
+  get edits(): readonly UnsavedEdit[] {
+    return this.waiting.map(({ edit }) => edit);
+  }
+
+  /** Whether the room has been given what it lacked, so that single updates may follow. */
+  get answered(): boolean {
+    return this.answeredSync;
+  }
+
+  /** A new socket. */
+  fresh(): void {
+    this.sent = 0;
+    this.answeredSync = false;
+    for (const each of this.waiting) each.message = NOT_SENT;
+  }
+
+  /** The person changed something. */
+  edited(edit: UnsavedEdit): void {
+    this.waiting.push({ edit, message: NOT_SENT });
+  }
+
+  /** A message went out that carries everything so far, or nothing. */
+  sentAll(): void {
+    this.sentSome(this.waiting.length);
+  }
+
+  /** A message went out that carries the first `count` edits and what went before. */
+  sentSome(count: number): void {
+    this.answeredSync = true;
+    this.sent += 1;
+    for (const each of this.waiting.slice(0, count)) {
+      if (each.message === NOT_SENT) each.message = this.sent;
+    }
+  }
+
+  /** The first `count` messages of this socket are durable. Answers the edits that are so since. */
+  durable(count: number): UnsavedEdit[] {
+    const done = this.waiting.filter(({ message }) => message <= count);
+    if (done.length > 0) this.waiting = this.waiting.filter(({ message }) => message > count);
+    return done.map(({ edit }) => edit);
+  }
+
+  /** Lets go of what waits. */
+  clear(): void {
+    this.waiting = [];
+  }
+}

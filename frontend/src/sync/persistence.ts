@@ -1,0 +1,202 @@
+/**
+ * Persistence of a room's edits on this device: they are stored as they are made and let go once durable.
+ *
+ * Writes are grouped: while one is under way, what comes next waits for the one after it. What
+ * others change is written with the next edit that may build on it, or a little later.
+ */
+
+import {
+  type CopyOwner,
+  type EditStore,
+  type StoredCopy,
+  type StoreWrite,
+  UNNAMED_EPOCH,
+  type UnsavedEdit,
+} from "./indexed-db";
+
+/** A device that has not answered by then is not waited for. */
+const PATIENCE_MS = 3_000;
+const KNOWN_LATER_MS = 2_000;
+const AGAIN_MS = 10_000;
+/** After so many updates the copy is written anew as a whole. */
+const TAIL = 200;
+
+export class Persistence {
+  /** Under which history all this is kept. */
+  epoch = UNNAMED_EPOCH;
+  private readonly only: string | null;
+  private readonly device: EditStore;
+  private readonly owner: CopyOwner;
+  private readonly onChange: () => void;
+  private waits: UnsavedEdit[] = [];
+  private known: Uint8Array[] = [];
+  private durable: UnsavedEdit[] = [];
+  private seq = 0;
+  private tail = 0;
+  private copy: (() => Uint8Array | null) | null = null;
+  private writing: Promise<void> | null = null;
+  private timer: ReturnType<typeof setTimeout> | undefined;
+  private opened = false;
+  private failed = false;
+  private closed = false;
+
+  /** `only` this history, if it is given; else the one that was used last. */
+  constructor(device: EditStore, owner: CopyOwner, only: string | null, onChange: () => void) {
+    this.device = device;
+    this.owner = owner;
+    this.only = only;
+    this.epoch = only ?? UNNAMED_EPOCH;
+    this.onChange = onChange;
+  }
+
+  /** Whether all edits that wait are stored on this device. */
+  get kept(): boolean {
+    return this.opened && !this.failed && this.waits.length === 0;
+  }
+
+  /** The server has said which history this is: what was kept without a name moves there. */
+  name(epoch: string, waiting: () => readonly UnsavedEdit[]): void {
+    if (this.epoch === UNNAMED_EPOCH) void this.move(epoch, waiting);
+  }
+
+  private async move(epoch: string, waiting: () => readonly UnsavedEdit[]): Promise<void> {
+    while (this.writing !== null) await this.writing;
+    this.epoch = epoch;
+    this.waits = [...waiting()];
+    this.tail = TAIL + 1; // the copy is written whole
+    this.flush();
+    while (this.writing !== null) await this.writing;
+    try {
+      if (this.opened && !this.failed) await this.device.forget(this.owner, UNNAMED_EPOCH);
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  /** What is kept; `late` is called when the device answers only after we went on without it. */
+  async load(late: (kept: StoredCopy | null) => void): Promise<StoredCopy | null> {
+    let given = false;
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const reading = this.read();
+    const patience = new Promise<null>((resolve) => {
+      timer = setTimeout(() => {
+        given = true;
+        resolve(null);
+      }, PATIENCE_MS);
+    });
+    const kept = await Promise.race([reading, patience]);
+    clearTimeout(timer);
+    if (given) void reading.then(late);
+    return kept;
+  }
+
+  private async read(): Promise<StoredCopy | null> {
+    try {
+      const all = await this.device.read(this.owner);
+      // It may have been named meanwhile.
+      const only = this.epoch === UNNAMED_EPOCH ? this.only : this.epoch;
+      const kept = (only === null ? all.at(-1) : all.find((each) => each.epoch === only)) ?? null;
+      this.opened = true;
+      this.epoch = kept?.epoch ?? this.epoch;
+      this.seq = Math.max(this.seq, kept?.seq ?? 0);
+      this.tail += kept?.known.length ?? 0;
+      if (this.waits.length > 0) this.flush();
+      return kept;
+    } catch (error) {
+      this.fail(error);
+      return null;
+    }
+  }
+
+  /** The person changed something. */
+  edited(edit: UnsavedEdit): void {
+    this.waits.push(edit);
+    this.flush();
+  }
+
+  /** Something durable came from the server. */
+  learned(update: Uint8Array): void {
+    this.known.push(update);
+    this.soon();
+  }
+
+  /** These edits are stored by the server. */
+  stored(edits: readonly UnsavedEdit[]): void {
+    this.durable.push(...edits);
+    this.flush();
+  }
+
+  /** Shows the log up to `seq`; `copy` gives the whole document while it holds nothing that waits. */
+  shows(seq: number, copy: () => Uint8Array | null): void {
+    if (seq === this.seq && this.copy !== null) return;
+    this.seq = seq;
+    this.copy = copy;
+    this.soon();
+  }
+
+  /** Forgets everything that is kept of this epoch. */
+  async forget(): Promise<void> {
+    clearTimeout(this.timer);
+    this.waits = [];
+    while (this.writing !== null) await this.writing;
+    this.waits = [];
+    this.known = [];
+    this.durable = [];
+    if (this.opened) await this.device.forget(this.owner, this.epoch);
+    this.opened = false;
+  }
+
+  /** Writes what is left to write. */
+  close(): void {
+    this.closed = true;
+    clearTimeout(this.timer);
+    if (this.waits.length + this.known.length + this.durable.length > 0) this.flush();
+  }
+
+  private soon(wait = KNOWN_LATER_MS): void {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.flush(), wait);
+  }
+
+  private flush(): void {
+    if (!this.opened || this.writing !== null) return;
+    const batch = this.batch();
+    this.writing = this.device.write(this.owner, this.epoch, batch).then(
+      () => this.wrote(batch),
+      (error: unknown) => this.lost(batch, error),
+    );
+  }
+
+  private batch(): StoreWrite {
+    const { waits, known, durable, seq } = this;
+    this.tail += known.length + durable.length;
+    const copy = this.tail > TAIL ? (this.copy?.() ?? null) : null;
+    if (copy !== null) this.tail = 1;
+    this.known = [];
+    this.durable = [];
+    return { waits: [...waits], known: copy === null ? known : [], durable, copy, seq };
+  }
+
+  private wrote(batch: StoreWrite): void {
+    const written = new Set(batch.waits);
+    this.writing = null;
+    this.failed = false;
+    this.waits = this.waits.filter((edit) => !written.has(edit));
+    if (this.waits.length > 0 || this.durable.length > 0) this.flush();
+    this.onChange();
+  }
+
+  private lost(batch: StoreWrite, error: unknown): void {
+    this.writing = null;
+    this.known.unshift(...batch.known);
+    this.durable.unshift(...batch.durable);
+    if (!this.closed) this.soon(AGAIN_MS);
+    this.fail(error);
+  }
+
+  private fail(error: unknown): void {
+    if (!this.failed) console.warn("This device does not keep edits:", error);
+    this.failed = true;
+    this.onChange();
+  }
+}

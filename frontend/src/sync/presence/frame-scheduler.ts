@@ -1,0 +1,57 @@
+/**
+ * Schedules updates with animation frames: what comes from others is told with a frame, what comes together once.
+ *
+ * A message with an edit is followed by one that names its place in the log, and twenty people send
+ * many of both. Drawing after each would only make frames late that nobody sees.
+ */
+
+/** Calls `tell` soon, once, however often it is asked until then. */
+export type Schedule = (tell: () => void) => void;
+
+export const immediately: Schedule = (tell) => tell();
+
+export interface FrameScheduler {
+  readonly soon: Schedule;
+  /** What still waits is not told any more. */
+  close(): void;
+}
+
+/** Where there are no frames, as in a page that nobody sees, it is told nevertheless, ms. */
+const UNSEEN_MS = 100;
+
+/** `gap`: what is told rests so long, ms, before it is told again. */
+export function frameScheduler(gap = 0): FrameScheduler {
+  const waiting = new Set<() => void>();
+  let frame: number | undefined;
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  let told = Number.NEGATIVE_INFINITY;
+  const rest = () => {
+    if (frame !== undefined) globalThis.cancelAnimationFrame?.(frame);
+    clearTimeout(timer);
+    timer = undefined;
+  };
+  const tellAll = () => {
+    rest();
+    told = performance.now();
+    const all = [...waiting];
+    waiting.clear();
+    for (const tell of all) tell();
+  };
+  const tellWithFrame = () => {
+    frame = globalThis.requestAnimationFrame?.(tellAll);
+    timer = setTimeout(tellAll, UNSEEN_MS);
+  };
+  return {
+    soon(tell) {
+      waiting.add(tell);
+      if (timer !== undefined) return;
+      const wait = told + gap - performance.now();
+      if (wait <= 0) tellWithFrame();
+      else timer = setTimeout(tellWithFrame, wait);
+    },
+    close() {
+      rest();
+      waiting.clear();
+    },
+  };
+}

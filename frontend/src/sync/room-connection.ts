@@ -1,0 +1,405 @@
+/**
+ * The connection of one document to its room: Yjs sync, awareness and acknowledgements.
+ *
+ * Speaks y-protocols (sync 0, awareness 1, query awareness 3) and, as our server offers it, kinds of
+ * its own: how many of this socket's messages are durable and up to which entry of the log this
+ * client has been sent (so that the page can say "saved" and mean it), which history this is, and
+ * whether both show the same.
+ *
+ * Works without React. Edits go into `doc` at any time, also before the first answer and while
+ * offline; they are merged, and counted in `unsaved` until the server has stored them. With a
+ * device (see `keep`) they also survive the closing of the page.
+ */
+
+import * as decoding from "lib0/decoding";
+import * as awarenessProtocol from "y-protocols/awareness";
+import { Awareness, removeAwarenessStates } from "y-protocols/awareness";
+import * as sync from "y-protocols/sync";
+import * as Y from "yjs";
+import { FingerprintCheck } from "./fingerprint";
+import { browserStore, epochName, freshId, type StoredCopy, type UnsavedEdit } from "./indexed-db";
+import * as messages from "./messages";
+import { Outbox } from "./outbox";
+import { Persistence } from "./persistence";
+import { ReconnectingSocket, type SocketHandler } from "./reconnecting-socket";
+import {
+  lacksKnownEdits,
+  type ReplacedEntries,
+  ReplacedValues,
+  type StrandedEdits,
+  strandedEditsIn,
+} from "./replaced-history";
+import type {
+  PersistenceOptions,
+  RefusalReason,
+  Room,
+  RoomLink,
+  RoomOptions,
+  Socket,
+} from "./room";
+
+export * from "./room";
+
+/** Above this, edits that wait travel one by one; a message may have 1 MiB. */
+const LARGE = 1 << 19;
+
+type LinkChange = Partial<Omit<RoomLink, "why" | "readOnly">> & {
+  why?: RefusalReason | undefined;
+  readOnly?: string | undefined;
+};
+
+const madeNow = (update: Uint8Array, before: ReplacedEntries): UnsavedEdit => ({
+  id: freshId(),
+  update,
+  at: Date.now(),
+  before,
+});
+
+export function connectRoom(options: RoomOptions): Room {
+  return new Connection(options);
+}
+
+class Connection implements Room, SocketHandler {
+  readonly doc: Y.Doc;
+  readonly awareness: Awareness;
+  private readonly address: string;
+  private readonly outbox = new Outbox();
+  private readonly listeners = new Set<() => void>();
+  private readonly persistence: Persistence | null;
+  private readonly replaced: ReplacedValues;
+  private readonly fingerprintCheck: FingerprintCheck;
+  private readonly socket: ReconnectingSocket;
+  private current: RoomLink = { state: "connecting", unsaved: 0, seq: 0 };
+  /** The history that this document belongs to; empty while nobody has said. */
+  private epoch = "";
+  private told = "";
+  private closed = false;
+  /** Whether the page shows more than the entry of the log that the server named last. */
+  private isAhead = false;
+
+  constructor(options: RoomOptions) {
+    this.doc = options.doc ?? new Y.Doc();
+    this.awareness = new Awareness(this.doc);
+    this.address = options.url;
+    this.replaced = new ReplacedValues(this.doc, this);
+    this.doc.on("update", this.onUpdate);
+    this.awareness.on("update", this.onAwareness);
+    this.fingerprintCheck = new FingerprintCheck(this.doc, this.atRest);
+    this.socket = new ReconnectingSocket(
+      {
+        url: () => this.url(),
+        open: options.open ?? ((address) => new WebSocket(address) as unknown as Socket),
+        random: options.random ?? Math.random,
+        admit: options.admit ?? null,
+      },
+      this,
+    );
+    this.persistence = options.keep ? this.keepingOf(options.keep) : null;
+    if (this.persistence !== null) void this.recall(this.persistence);
+    else this.socket.dial();
+  }
+
+  // Bound, so that they can be handed to `useSyncExternalStore`.
+  readonly link = (): RoomLink => this.current;
+
+  readonly onLink = (listener: () => void): (() => void) => {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  };
+
+  settled(signal?: AbortSignal): Promise<number> {
+    return new Promise((resolve, reject) => {
+      const look = () => {
+        const reason = signal?.aborted
+          ? signal.reason
+          : this.closed && new Error("the room was left");
+        const { state, unsaved } = this.current;
+        const done = state === "live" && unsaved === 0 && !this.isAhead;
+        if (!reason && !done) return;
+        stop();
+        signal?.removeEventListener("abort", look);
+        if (reason) reject(reason);
+        else resolve(this.current.seq);
+      };
+      const stop = this.onLink(look);
+      signal?.addEventListener("abort", look);
+      look();
+    });
+  }
+
+  reconnect(): void {
+    if (this.closed) return;
+    this.say({ state: "connecting", why: undefined });
+    this.socket.redial();
+  }
+
+  close(): void {
+    if (this.closed) return;
+    this.awareness.setLocalState(null);
+    this.closed = true;
+    this.doc.off("update", this.onUpdate);
+    this.awareness.off("update", this.onAwareness);
+    this.replaced.close();
+    this.fingerprintCheck.close();
+    this.socket.close();
+    this.awareness.destroy();
+    this.persistence?.close();
+    this.say({ state: "offline" });
+  }
+
+  histories(): { readonly here: string; readonly theirs: string } {
+    return { here: this.persistence?.epoch ?? this.epoch, theirs: this.told };
+  }
+
+  stranded(): StrandedEdits | null {
+    const { edits } = this.outbox;
+    return edits.length === 0 ? null : strandedEditsIn(this.doc, edits);
+  }
+
+  async forget(): Promise<void> {
+    await this.persistence?.forget();
+    this.outbox.clear();
+    this.say({ unsaved: 0 });
+  }
+
+  private say(change: LinkChange): void {
+    const { why, readOnly, ...rest } = { ...this.current, ...change };
+    const kept = this.persistence && { kept: this.persistence.kept };
+    const next: RoomLink = { ...rest, ...kept, ...(why && { why }), ...(readOnly && { readOnly }) };
+    const old = this.current;
+    if (
+      old.state === next.state &&
+      old.why === next.why &&
+      old.unsaved === next.unsaved &&
+      old.kept === next.kept &&
+      old.readOnly === next.readOnly &&
+      old.seq === next.seq &&
+      !this.closed
+    )
+      return;
+    this.current = next;
+    for (const listener of [...this.listeners]) listener();
+  }
+
+  // -- the device -----------------------------------------------------------------------------
+
+  private keepingOf({
+    device = browserStore(),
+    graph,
+    person,
+    epoch,
+  }: PersistenceOptions): Persistence {
+    return new Persistence(device, { graph, person }, epoch ?? null, () => this.say({}));
+  }
+
+  private async recall(persistence: Persistence): Promise<void> {
+    const kept = await persistence.load((late) => {
+      if (this.closed || late === null) return;
+      this.adopt(late);
+      if (late.waiting.length > 0) this.socket.redial(); // so that they go the usual way
+    });
+    if (this.closed) return;
+    this.epoch = epochName(persistence.epoch);
+    if (kept !== null) this.adopt(kept);
+    this.socket.dial();
+  }
+
+  private adopt({ known, waiting, seq }: StoredCopy): void {
+    this.doc.transact(() => {
+      for (const update of known) Y.applyUpdate(this.doc, update, this);
+      for (const { update } of waiting) Y.applyUpdate(this.doc, update, this);
+    }, this);
+    const recent = this.outbox.edits;
+    this.outbox.clear();
+    for (const edit of [...waiting, ...recent]) this.outbox.edited(edit);
+    this.say({ unsaved: this.outbox.unsaved, seq: Math.max(seq, this.current.seq) });
+  }
+
+  /** The whole document, when it holds nothing but what is durable. */
+  private readonly copy = (): Uint8Array | null =>
+    this.current.state === "live" && this.outbox.unsaved === 0
+      ? Y.encodeStateAsUpdate(this.doc)
+      : null;
+
+  // -- socket ---------------------------------------------------------------------------------
+
+  private url(): string {
+    const url = new URL(this.address);
+    url.searchParams.set("acks", "1");
+    if (this.epoch !== "") {
+      url.searchParams.set("epoch", this.epoch);
+      if (this.current.seq > 0) url.searchParams.set("seq", String(this.current.seq));
+    }
+    return url.href;
+  }
+
+  hasWork(): boolean {
+    return this.outbox.unsaved > 0;
+  }
+
+  probe(): Uint8Array<ArrayBuffer> {
+    return messages.syncStep1(this.doc);
+  }
+
+  onOpen(): void {
+    this.outbox.fresh();
+    this.say({ readOnly: undefined });
+    this.socket.send(messages.syncStep1(this.doc));
+    // The others saw us go: only a newer clock brings us back.
+    const state = this.awareness.getLocalState();
+    if (state !== null) this.awareness.setLocalState(state);
+  }
+
+  onAway(why: RefusalReason | undefined): void {
+    this.say({ state: "offline", why });
+  }
+
+  onRefused(why: RefusalReason): void {
+    this.say({ state: "refused", why });
+  }
+
+  /** The others are out of sight until the socket is back. */
+  onDrop(): void {
+    const others = [...this.awareness.meta.keys()].filter((id) => id !== this.doc.clientID);
+    removeAwarenessStates(this.awareness, others, this);
+    // Whoever is still there comes back with the clock that is known; only strangers may do that.
+    for (const id of others) this.awareness.meta.delete(id);
+  }
+
+  // -- what comes in --------------------------------------------------------------------------
+
+  onMessage(data: Uint8Array): void {
+    this.take(decoding.createDecoder(data));
+  }
+
+  private take(decoder: decoding.Decoder): void {
+    switch (decoding.readVarUint(decoder)) {
+      case messages.SYNC:
+        this.takeSync(decoder);
+        break;
+      case messages.AWARENESS: {
+        const update = decoding.readVarUint8Array(decoder);
+        awarenessProtocol.applyAwarenessUpdate(this.awareness, update, this);
+        break;
+      }
+      case messages.QUERY_AWARENESS:
+        this.sendAwareness();
+        break;
+      case messages.ACK: {
+        const stored = this.outbox.durable(decoding.readVarUint(decoder));
+        const seq = decoding.readVarUint(decoder);
+        if (stored.length > 0) this.persistence?.stored(stored);
+        this.persistence?.shows(seq, this.copy);
+        this.isAhead = false;
+        this.say({ unsaved: this.outbox.unsaved, seq });
+        this.fingerprintCheck.stir();
+        break;
+      }
+      case messages.COMPARE:
+        if (this.fingerprintCheck.differs(decoder)) this.socket.refuse("differs");
+        break;
+      case messages.READ_ONLY:
+        this.say({ readOnly: decoding.readVarString(decoder) });
+        break;
+      case messages.EPOCH:
+        this.named(decoding.readVarString(decoder));
+        break;
+    }
+  }
+
+  private takeSync(decoder: decoding.Decoder): void {
+    const step = decoding.readVarUint(decoder);
+    const content = decoding.readVarUint8Array(decoder);
+    switch (step) {
+      case sync.messageYjsSyncStep1:
+        if (lacksKnownEdits(this.doc, this.outbox.edits, content))
+          this.socket.refuse("other-epoch");
+        else this.give(content);
+        break;
+      case sync.messageYjsSyncStep2:
+        this.learn(content);
+        this.socket.arrived();
+        this.isAhead = false;
+        this.say({ state: "live", why: undefined });
+        break;
+      case sync.messageYjsUpdate:
+        this.isAhead = true;
+        this.learn(content);
+        break;
+    }
+  }
+
+  /** The server says which history it has. */
+  private named(epoch: string): void {
+    this.told = epoch;
+    if (this.epoch !== "") return;
+    this.epoch = epoch;
+    this.persistence?.name(epoch, () => this.outbox.edits);
+  }
+
+  /** What is shown, when everything of it is the log up to `seq` and nothing else. */
+  private readonly atRest = (): {
+    readonly seq: number;
+    send(frame: Uint8Array<ArrayBuffer>): void;
+  } | null => {
+    const { state, unsaved, seq } = this.current;
+    if (state !== "live" || unsaved > 0 || seq === 0) return null;
+    return { seq, send: (frame) => this.socket.send(frame) };
+  };
+
+  private learn(update: Uint8Array): void {
+    Y.applyUpdate(this.doc, update, this);
+    this.persistence?.learned(update);
+  }
+
+  // -- what goes out --------------------------------------------------------------------------
+
+  /** The answer to a step 1: what the server lacks, in pieces when that is too much for one. */
+  private give(state: Uint8Array): void {
+    const whole = Y.encodeStateAsUpdate(this.doc, state);
+    const edits = this.outbox.edits;
+    if (whole.length <= LARGE || edits.length === 0) {
+      this.outbox.sentAll();
+      this.socket.send(messages.syncStep2(whole));
+      return;
+    }
+    this.outbox.sentSome(0);
+    this.socket.send(messages.syncStep2(messages.EMPTY_UPDATE));
+    edits.forEach(({ update }, n) => {
+      this.outbox.sentSome(n + 1);
+      this.socket.send(messages.updateMessage(update));
+    });
+  }
+
+  private readonly onUpdate = (
+    update: Uint8Array,
+    origin: unknown,
+    _doc: Y.Doc,
+    transaction: Y.Transaction,
+  ): void => {
+    if (origin === this) return;
+    if (transaction.local) {
+      const edit = madeNow(update, this.replaced.take());
+      this.persistence?.edited(edit);
+      this.outbox.edited(edit);
+    }
+    // Until the room asked for what it lacks, everything travels with that answer, in order.
+    if (this.outbox.answered && this.socket.isOpen) {
+      this.outbox.sentAll();
+      this.socket.send(messages.updateMessage(update));
+    }
+    this.say({ unsaved: this.outbox.unsaved });
+  };
+
+  private readonly onAwareness = (
+    { added, updated, removed }: { added: number[]; updated: number[]; removed: number[] },
+    origin: unknown,
+  ): void => {
+    if (origin === this) return;
+    if ([...added, ...updated, ...removed].includes(this.doc.clientID)) this.sendAwareness();
+  };
+
+  private sendAwareness(): void {
+    this.socket.send(messages.awarenessMessage(this.awareness));
+  }
+}

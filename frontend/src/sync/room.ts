@@ -1,0 +1,102 @@
+/** What a room is to those who use it, and what it needs to be opened. */
+
+import type { Awareness } from "y-protocols/awareness";
+import type * as Y from "yjs";
+import { serverPath } from "../api/page-url";
+import type { CopyOwner, EditStore } from "./indexed-db";
+import type { StrandedEdits } from "./replaced-history";
+
+/** Why a room does not let this page in, or let it go. */
+export type RefusalReason =
+  | "session-ended"
+  | "other-person"
+  | "forbidden"
+  | "no-such-graph"
+  | "other-epoch"
+  | "other-client"
+  | "differs"
+  | "full"
+  | "not-accepted"
+  | "restarting"
+  | "too-slow"
+  | "no-socket";
+
+export interface RoomLink {
+  /** `refused` does not come back by itself: see `why` and `reconnect`. */
+  readonly state: "connecting" | "live" | "offline" | "refused";
+  readonly why?: RefusalReason;
+  /** Edits of this person that are not durable yet. */
+  readonly unsaved: number;
+  /** Whether those edits survive closing this page. Absent for a room that keeps nothing. */
+  readonly kept?: boolean;
+  /** Why nobody may change this graph now, in a sentence of the server's; absent when one may. */
+  readonly readOnly?: string;
+  /** The page shows the log up to this entry, plus what is `unsaved`. 0 before the first sync. */
+  readonly seq: number;
+}
+
+export interface Room {
+  readonly doc: Y.Doc;
+  readonly awareness: Awareness;
+  /** The same object until something of it changes. */
+  link(): RoomLink;
+  onLink(listener: () => void): () => void;
+  /** Resolves with `seq` once everything is stored; rejects when the room closes or `signal` aborts. */
+  settled(signal?: AbortSignal): Promise<number>;
+  /** Tries at once, also after a refusal (the person signed in again, say). */
+  reconnect(): void;
+  /** Which history is kept here, and which one the server named last; empty when none is known. */
+  histories(): { readonly here: string; readonly theirs: string };
+  /** The edits that are not durable, as values; null when there are none. */
+  stranded(): StrandedEdits | null;
+  /** Forgets everything kept here of this history, edits that wait included. */
+  forget(): Promise<void>;
+  /** Leaves the room. Edits that were not stored stay in `doc`, and on the device if there is one. */
+  close(): void;
+}
+
+/** The part of `WebSocket` that a room uses, so that tests can bring their own. */
+export interface Socket {
+  binaryType: BinaryType;
+  readonly readyState: number;
+  onopen: (() => void) | null;
+  onmessage: ((event: { data: unknown }) => void) | null;
+  onclose: ((event: { code: number; reason?: string }) => void) | null;
+  onerror: (() => void) | null;
+  send(data: Uint8Array<ArrayBuffer>): void;
+  close(code?: number): void;
+}
+
+export interface RoomOptions {
+  /** `wss://host/api/graphs/ID/room`; `roomUrl` makes it. */
+  readonly url: string;
+  readonly doc?: Y.Doc;
+  /** Opens a socket; the browser's by default. */
+  readonly open?: (url: string) => Socket;
+  /** 0 … 1, for the spread of reconnects. */
+  readonly random?: () => number;
+  /** Keeps the graph and the edits that wait on this device, for this person only. */
+  readonly keep?: PersistenceOptions;
+  /**
+   * Asked before each attempt: why not to come in, or null. A browser cannot tell a refused upgrade
+   * from a dead server, nor whose cookie an upgrade carries. `again` after an attempt or a connection broke off.
+   * Throwing means that nobody answers.
+   */
+  readonly admit?: AdmissionCheck;
+}
+
+export type AdmissionCheck = (again: boolean) => Promise<RefusalReason | null>;
+
+export interface PersistenceOptions extends CopyOwner {
+  /** The browser's storage by default. */
+  readonly device?: EditStore;
+  /** Only this history: what is kept of others stays where it is and is not shown. */
+  readonly epoch?: string;
+}
+
+/** The address of a graph's room on the server that the page came from. */
+export function roomUrl(graph: string, from: string | URL = window.location.href): string {
+  const url = new URL(serverPath(`/api/graphs/${encodeURIComponent(graph)}/room`), from);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  return url.href;
+}

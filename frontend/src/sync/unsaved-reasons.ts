@@ -1,0 +1,60 @@
+/** Why edits are not saved, in sentences for people. */
+
+import type { OtherPerson } from "./indexed-db";
+import type { RefusalReason, RoomLink } from "./room-connection";
+
+/** What is with the edits that wait, or with the room; null when everything is saved. */
+export function unsavedReason(link: RoomLink): string | null {
+  const edits = changes(link.unsaved);
+  const keeps = link.unsaved === 0 ? "" : ` ${where(link)}`;
+  switch (link.state) {
+    case "live":
+      if (link.readOnly !== undefined) return `${link.readOnly}${keeps}`;
+      return link.unsaved === 0 ? null : `${edits} on the way to the server.`;
+    case "refused":
+      return `${refusals[link.why ?? "not-accepted"]}${keeps}`;
+    case "connecting":
+    case "offline": {
+      const why = link.why === undefined ? "The server does not answer." : refusals[link.why];
+      if (link.unsaved === 0) return link.state === "connecting" ? null : why;
+      return `${why}${keeps} Sent when it is back.`;
+    }
+  }
+}
+
+/** Whose edits wait on this device until they sign in again; null when nobody's do. */
+export function otherPeopleWait(others: readonly OtherPerson[]): string | null {
+  if (others.length === 0) return null;
+  const parts = others.map(({ name, waiting }) => `${changes(waiting)} of ${name || "a guest"}`);
+  const [only] = others;
+  const one = others.length === 1 && only?.waiting === 1;
+  return `${parts.join(" and ")} ${one ? "waits" : "wait"} on this device until they sign in again.`;
+}
+
+const refusals: Readonly<Record<RefusalReason, string>> = {
+  "session-ended": "You are signed out.",
+  "other-person": "Somebody else is signed in in this browser now.",
+  forbidden: "You may look at this graph, not change it.",
+  "no-such-graph": "This graph is gone.",
+  "other-epoch": "The server went back to an older state of this graph, from a backup perhaps.",
+  "other-client": "This page is opened anew.",
+  differs: "This page showed something else than the server has and is opened anew.",
+  full: "This graph is full: it may have 5,000 actions and 32 MiB. Take back what you added last, then try again.",
+  "not-accepted": "The server refused a change.",
+  restarting: "The server restarts.",
+  "too-slow": "The connection is too slow.",
+  "no-socket":
+    "The server answers, but no live connection to it opens: a proxy in between may not pass WebSockets on.",
+};
+
+function where(link: RoomLink): string {
+  const edits = changes(link.unsaved);
+  const [wait, survive] = link.unsaved === 1 ? ["waits", "survives"] : ["wait", "survive"];
+  return link.kept
+    ? `${edits} ${wait} on this device and ${survive} closing the page.`
+    : `${edits} ${wait} in this page only: keep it open.`;
+}
+
+function changes(n: number): string {
+  return n === 1 ? "1 change" : `${n} changes`;
+}

@@ -1,0 +1,285 @@
+/** A room for React: one provider, and hooks that draw again only what changed. */
+
+import {
+  createContext,
+  type ReactNode,
+  useCallback,
+  useContext,
+  useEffect,
+  useMemo,
+  useRef,
+  useState,
+  useSyncExternalStore,
+} from "react";
+import { isEqual } from "../graph/equal";
+import { EMPTY_GRAPH, type Graph } from "../graph/model";
+import {
+  type ConnectionNotice,
+  GraphConnection,
+  type GraphConnectionState,
+} from "./graph-connection";
+import { browserStore, type OtherPerson } from "./indexed-db";
+import type { OpenRoom } from "./open-room";
+import type { Participant } from "./presence/presence";
+import { type StrandedEdits, strandedEditsOf } from "./replaced-history";
+import type { PersistenceOptions, RoomLink } from "./room-connection";
+
+export type { OpenRoom } from "./open-room";
+
+/** What there is to decide about edits that wait on a history which the server has left. */
+export interface StrandedEditsChoice {
+  readonly stranded: StrandedEdits;
+  /** Makes these of the changes in the graph as it is now, and lets go of the rest once stored. */
+  apply(chosen: StrandedEdits["difference"]): Promise<number>;
+  /** Lets go of the edits. */
+  drop(): Promise<void>;
+}
+
+interface RoomContextValue {
+  readonly connection: GraphConnection;
+  readonly connectionState: GraphConnectionState;
+  readonly keep: PersistenceOptions | undefined;
+}
+
+const RoomContext = createContext<RoomContextValue | null>(null);
+
+/**
+ * Keeps the room at `url` open as long as it is shown. Children see it through the hooks below.
+ * With `keep`, edits that wait survive closing the page, for that person only.
+ */
+export function RoomProvider({
+  url,
+  keep: given,
+  fallback = null,
+  children,
+}: {
+  readonly url: string;
+  readonly keep?: PersistenceOptions;
+  /** Shown for the moment in which the room is made. */
+  readonly fallback?: ReactNode;
+  readonly children: ReactNode;
+}) {
+  const keep = useStablePersistence(given);
+  const [roomContext, setHeld] = useState<RoomContextValue | null>(null);
+  useEffect(() => {
+    const connection = new GraphConnection({ url, ...(keep && { keep }) });
+    const show = () => setHeld({ connection, connectionState: connection.now(), keep });
+    const stop = connection.onChange(show);
+    show();
+    return () => {
+      stop();
+      connection.leave();
+      setHeld(null);
+    };
+  }, [url, keep]);
+  useBeforeLeaving(roomContext);
+  return roomContext === null ? (
+    fallback
+  ) : (
+    <RoomContext value={roomContext}>{children}</RoomContext>
+  );
+}
+
+/** Asks before the page is closed, when something would be lost by that. */
+function useBeforeLeaving(roomContext: RoomContextValue | null): void {
+  const open = roomContext?.connectionState.open;
+  useEffect(() => {
+    const onLeave = (event: BeforeUnloadEvent) => {
+      const link = open?.room.link();
+      if (link && link.unsaved > 0 && !link.kept) event.preventDefault();
+    };
+    window.addEventListener("beforeunload", onLeave);
+    return () => window.removeEventListener("beforeunload", onLeave);
+  }, [open]);
+}
+
+/** The same object as long as graph and person are the same; the name in it is the newest. */
+function useStablePersistence(
+  keep: PersistenceOptions | undefined,
+): PersistenceOptions | undefined {
+  const { graph, device, person } = keep ?? {};
+  const id = person?.id;
+  const name = useRef("");
+  name.current = person?.name ?? "";
+  return useMemo(() => {
+    if (graph === undefined || id === undefined) return undefined;
+    const latest = {
+      id,
+      get name() {
+        return name.current;
+      },
+    };
+    return { graph, person: latest, ...(device && { device }) };
+  }, [graph, device, id]);
+}
+
+function useRoomContext(): RoomContextValue {
+  const roomContext = useContext(RoomContext);
+  if (roomContext === null) throw new Error("useRoom needs a RoomProvider around it");
+  return roomContext;
+}
+
+/** The room around this component. */
+export function useRoom(): OpenRoom {
+  return useRoomContext().connectionState.open;
+}
+
+/** The name of the person at this page; empty in a room that keeps nothing. */
+export function useMyName(): string {
+  return useRoomContext().keep?.person.name ?? "";
+}
+
+/** The graph now. Actions and relations that did not change are the same objects as before. */
+export function useGraph(): Graph {
+  const { source } = useRoom();
+  return useSyncExternalStore(source.subscribe, source.graph, () => EMPTY_GRAPH);
+}
+
+/** The graph for what stands beside the canvas: own edits at once, those of others some times a second. */
+export function useThrottledGraph(): Graph {
+  const { source, throttled: calm } = useRoom();
+  return useSyncExternalStore(calm.onGraph, source.graph, () => EMPTY_GRAPH);
+}
+
+/** One thing of the graph, say `(graph) => graph.name`; draws again only when it is another. */
+export function useGraphPart<T>(part: (graph: Graph) => T): T {
+  const { source } = useRoom();
+  const get = () => part(source.graph());
+  return useSyncExternalStore(source.subscribe, get, get);
+}
+
+/** How the page stands with the server, and how many edits are not stored yet. */
+export function useLink(): RoomLink {
+  const { room, onLink } = useRoom();
+  return useSyncExternalStore(onLink, room.link);
+}
+
+/** The link, as old as the calm graph where only its place in the log is another. */
+export function useThrottledLink(): RoomLink {
+  const { room, throttled: calm } = useRoom();
+  return useSyncExternalStore(calm.onLink, room.link);
+}
+
+/** One thing of the link; draws again only when it is another. */
+export function useLinkPart<T>(part: (link: RoomLink) => T): T {
+  const { room, onLink } = useRoom();
+  return useSyncExternalStore(onLink, () => part(room.link()));
+}
+
+/** The others in the room. */
+export function usePeople(): readonly Participant[] {
+  const { presence } = useRoom();
+  return useSyncExternalStore(presence.onPeople, presence.people);
+}
+
+/** Somebody at a field: who they are, and nothing that changes while they are there. */
+export type FieldEditor = Pick<Participant, "client" | "id" | "name">;
+
+const NO_EDITORS: readonly FieldEditor[] = [];
+
+/** The others who edit one field, `<key>|<field>`; draws again only when somebody comes or goes. */
+export function useEditors(field: string): readonly FieldEditor[] {
+  const { presence } = useRoom();
+  const last = useRef(NO_EDITORS);
+  return useSyncExternalStore(presence.onPeople, () => {
+    const found = presence
+      .people()
+      .filter((person) => person.presence.editing === field)
+      .map(({ client, id, name }) => ({ client, id, name }));
+    if (!isEqual(found, last.current)) last.current = found;
+    return last.current;
+  });
+}
+
+/** Whom this page follows, and how to begin and end that. */
+export function useFollowing() {
+  const { following } = useRoom();
+  const whom = useSyncExternalStore(following.onChange, following.whom);
+  const follow = useCallback((client: number | null) => following.follow(client), [following]);
+  return { whom, follow };
+}
+
+/** What there is to decide about edits that wait on another history; null when nothing is. */
+export function useStrandedEdits(): StrandedEditsChoice | null {
+  const { connection, connectionState } = useRoomContext();
+  const [stranded] = connectionState.stranded;
+  return useMemo(() => {
+    if (stranded === undefined) return null;
+    return {
+      stranded,
+      apply: (chosen) => connection.apply(stranded, chosen),
+      drop: () => connection.drop(stranded),
+    };
+  }, [connection, stranded]);
+}
+
+/** What may be said softly about this room, until it was read. */
+export function useNotice(): { readonly notice: ConnectionNotice; dismiss(): void } | null {
+  const { connection, connectionState } = useRoomContext();
+  const { notice } = connectionState;
+  return useMemo(
+    () => notice && { notice, dismiss: () => connection.dismiss() },
+    [connection, notice],
+  );
+}
+
+const NOBODY: readonly OtherPerson[] = [];
+
+/** The others whose edits of this graph wait on this device until they sign in again. */
+export interface OthersWaiting {
+  readonly others: readonly OtherPerson[];
+  /** What somebody changed, to save it as a file; never to send it. */
+  read(id: string): Promise<readonly StrandedEdits[]>;
+  /** Lets go of somebody's edits for good. */
+  forget(id: string): Promise<void>;
+}
+
+export function useOthersWaiting(): OthersWaiting {
+  const { keep } = useRoomContext();
+  const [others, setOthers] = useState(NOBODY);
+  const device = keep && (keep.device ?? browserStore());
+  useEffect(() => {
+    if (keep === undefined || device === undefined) return;
+    let gone = false;
+    device.others(keep).then(
+      (found) => !gone && setOthers(found),
+      () => !gone && setOthers(NOBODY), // a device that keeps nothing keeps nobody's
+    );
+    return () => {
+      gone = true;
+    };
+  }, [keep, device]);
+  return useMemo(() => {
+    const waiting = async (id: string) => {
+      if (keep === undefined || device === undefined) return [];
+      const all = await device.read({ graph: keep.graph, person: { id, name: "" } });
+      return all.filter((kept) => kept.waiting.length > 0);
+    };
+    return {
+      others,
+      read: async (id) => (await waiting(id)).map(strandedEditsOf),
+      forget: async (id) => {
+        if (keep === undefined || device === undefined) return;
+        const owner = { graph: keep.graph, person: { id, name: "" } };
+        for (const { epoch } of await waiting(id)) await device.forget(owner, epoch);
+        setOthers((now) => now.filter((other) => other.id !== id));
+      },
+    };
+  }, [keep, device, others]);
+}
+
+/** Whether there is something to undo or redo. */
+export function useUndo(): { readonly canUndo: boolean; readonly canRedo: boolean } {
+  const { undo } = useRoom();
+  const [can, setCan] = useState({ canUndo: false, canRedo: false });
+  useEffect(() => {
+    const look = () => setCan({ canUndo: undo.canUndo(), canRedo: undo.canRedo() });
+    const events = ["stack-item-added", "stack-item-popped", "stack-cleared"] as const;
+    for (const event of events) undo.on(event, look);
+    look();
+    return () => {
+      for (const event of events) undo.off(event, look);
+    };
+  }, [undo]);
+  return can;
+}

@@ -1,0 +1,86 @@
+/** A device in memory for tests, which can refuse, hang, and lose what was not written yet. */
+
+import type { CopyOwner, EditStore, StoredCopy, StoreWrite, UnsavedEdit } from "../sync/indexed-db";
+
+interface StoredGraph {
+  graph: string;
+  person: CopyOwner["person"];
+  epoch: string;
+  seq: number;
+  known: Uint8Array[];
+  waiting: Map<string, UnsavedEdit>;
+}
+
+export class FakeEditStore implements EditStore {
+  readonly entries: StoredGraph[] = [];
+  /** While set, every call fails. */
+  refuses = false;
+  writes = 0;
+  /** Resolves reads when it does; a hanging device otherwise. */
+  ready: Promise<void> = Promise.resolve();
+
+  async read({ graph, person }: CopyOwner): Promise<readonly StoredCopy[]> {
+    await this.ready;
+    this.check();
+    return this.entries
+      .filter((e) => e.graph === graph && e.person.id === person.id)
+      .map(({ epoch, seq, known, waiting }) => ({
+        epoch,
+        seq,
+        known: [...known],
+        waiting: [...waiting.values()],
+      }));
+  }
+
+  async write(owner: CopyOwner, epoch: string, batch: StoreWrite): Promise<void> {
+    this.check();
+    this.writes += 1;
+    const entry = this.entry(owner, epoch);
+    if (batch.copy !== null) entry.known = [batch.copy];
+    entry.known.push(...batch.known);
+    for (const edit of batch.waits) entry.waiting.set(edit.id, edit);
+    for (const { id, update } of batch.durable) {
+      entry.waiting.delete(id);
+      if (batch.copy === null) entry.known.push(update);
+    }
+    entry.seq = batch.seq;
+  }
+
+  async forget({ graph, person }: CopyOwner, epoch: string): Promise<void> {
+    this.check();
+    const keep = this.entries.filter(
+      (e) => e.graph !== graph || e.person.id !== person.id || e.epoch !== epoch,
+    );
+    this.entries.splice(0, this.entries.length, ...keep);
+  }
+
+  async others({ graph, person }: CopyOwner) {
+    this.check();
+    return this.entries
+      .filter((e) => e.graph === graph && e.person.id !== person.id && e.waiting.size > 0)
+      .map((e) => ({ ...e.person, waiting: e.waiting.size }));
+  }
+
+  /** How many edits wait here. */
+  get waiting(): number {
+    return this.entries.reduce((sum, entry) => sum + entry.waiting.size, 0);
+  }
+
+  private entry({ graph, person }: CopyOwner, epoch: string): StoredGraph {
+    const old = this.entries.find(
+      (e) => e.graph === graph && e.person.id === person.id && e.epoch === epoch,
+    );
+    if (old !== undefined) {
+      this.entries.splice(this.entries.indexOf(old), 1);
+      this.entries.push(old);
+      return old;
+    }
+    const fresh = { graph, person, epoch, seq: 0, known: [], waiting: new Map() };
+    this.entries.push(fresh);
+    return fresh;
+  }
+
+  private check(): void {
+    if (this.refuses) throw new DOMException("no room", "QuotaExceededError");
+  }
+}

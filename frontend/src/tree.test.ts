@@ -1,0 +1,128 @@
+/** The tree of the page: small folders, layers without circles, and one meaning for each type name. */
+import { readdirSync, readFileSync } from "node:fs";
+import { dirname, join, relative, resolve } from "node:path";
+import { expect, test } from "vitest";
+
+const SRC = import.meta.dirname;
+const MOST_MODULES = 15;
+
+const files = readdirSync(SRC, { recursive: true, encoding: "utf8" })
+  .filter((file) => /\.tsx?$/.test(file) && !file.endsWith(".d.ts"))
+  .map((file) => file.replaceAll("\\", "/"))
+  .sort();
+const isTest = (file: string) => /\.test\.tsx?$/.test(file);
+const modules = files.filter((file) => !isTest(file));
+const known = new Set(files);
+const textOf = (file: string) => readFileSync(join(SRC, file), "utf8");
+const folderOf = (file: string) => dirname(file);
+const topOf = (file: string) => file.split("/")[0] ?? "";
+
+/** The modules that a module imports, types included. */
+function importsOf(file: string): string[] {
+  const found: string[] = [];
+  for (const [, path = ""] of textOf(file).matchAll(/\b(?:from|import)\s*\(?\s*"(\.[^"]*)"/g)) {
+    const base = relative(SRC, resolve(SRC, dirname(file), path)).replaceAll("\\", "/");
+    const target = [".ts", ".tsx", "/index.ts"].map((end) => base + end).find((f) => known.has(f));
+    if (target !== undefined) found.push(target);
+    else if (!path.endsWith(".css")) throw new Error(`${file} imports ${path}, which is not there`);
+  }
+  return found;
+}
+const imports = new Map(files.map((file) => [file, importsOf(file)]));
+
+const BELOW_EDITOR = ["graph", "ui", "api", "status", "canvas", "sync", "dry-run", "edit-actions"];
+/** What each folder may import besides itself: what stands above it here, as far as it needs that. */
+const LAYERS: Readonly<Record<string, readonly string[]>> = {
+  graph: [],
+  ui: [],
+  api: ["graph"],
+  status: ["graph", "ui", "api"],
+  canvas: ["graph", "ui", "api", "status"],
+  sync: ["graph", "api"],
+  "dry-run": ["graph", "api", "status"],
+  "edit-actions": ["graph", "ui", "api", "canvas", "dry-run"],
+  people: BELOW_EDITOR,
+  comments: BELOW_EDITOR,
+  find: BELOW_EDITOR,
+  outline: BELOW_EDITOR,
+  inspector: [...BELOW_EDITOR, "people", "comments"],
+  editor: [...BELOW_EDITOR, "people", "comments", "find", "outline", "inspector"],
+  // Features of their own know neither the editor nor each other.
+  runs: ["graph", "ui", "api", "status", "canvas"],
+  review: ["graph", "ui", "api", "status", "canvas"],
+  robots: ["ui", "api", "status"],
+  library: ["graph", "ui", "api", "status", "canvas"],
+  account: ["ui", "api"],
+  app: ["graph", "ui", "api", "status", "canvas", "sync", "editor"].concat([
+    "runs",
+    "review",
+    "robots",
+    "library",
+    "account",
+  ]),
+};
+
+test("every folder has between two and fifteen modules", () => {
+  const counts = new Map<string, number>();
+  for (const file of modules) counts.set(folderOf(file), (counts.get(folderOf(file)) ?? 0) + 1);
+  const wrong = [...counts].filter(([, count]) => count < 2 || count > MOST_MODULES);
+  expect(wrong).toEqual([]);
+});
+
+test("folders import only what lies below them", () => {
+  const wrong: string[] = [];
+  for (const file of modules.filter((module) => topOf(module) !== "testing")) {
+    const allowed = LAYERS[topOf(file)];
+    if (allowed === undefined) wrong.push(`${topOf(file)} is in no layer`);
+    for (const target of imports.get(file) ?? []) {
+      const top = topOf(target);
+      if (top !== topOf(file) && !allowed?.includes(top)) wrong.push(`${file} imports ${target}`);
+    }
+  }
+  expect(wrong).toEqual([]);
+});
+
+test("layers stand in their order, so that no two folders need each other", () => {
+  const order = Object.keys(LAYERS);
+  const wrong = Object.entries(LAYERS).flatMap(([folder, allowed]) =>
+    allowed.filter((other) => order.indexOf(other) >= order.indexOf(folder)),
+  );
+  expect(wrong).toEqual([]);
+});
+
+test("no folders import each other in a circle, folders in folders neither", () => {
+  const edges = new Map<string, Set<string>>();
+  for (const file of modules) {
+    for (const target of imports.get(file) ?? []) {
+      const [from, to] = [folderOf(file), folderOf(target)];
+      if (from !== to) edges.set(from, (edges.get(from) ?? new Set()).add(to));
+    }
+  }
+  const reaches = (from: string, goal: string, seen = new Set<string>()): boolean =>
+    [...(edges.get(from) ?? [])].some((next) => {
+      if (next === goal) return true;
+      if (seen.has(next)) return false;
+      seen.add(next);
+      return reaches(next, goal, seen);
+    });
+  expect([...edges.keys()].filter((folder) => reaches(folder, folder))).toEqual([]);
+});
+
+test("what only tests need is imported by tests only", () => {
+  const wrong = modules.filter(
+    (file) =>
+      topOf(file) !== "testing" && (imports.get(file) ?? []).some((t) => topOf(t) === "testing"),
+  );
+  expect(wrong).toEqual([]);
+});
+
+test("a type name has one meaning", () => {
+  const homes = new Map<string, string[]>();
+  for (const file of modules) {
+    const declared = textOf(file).matchAll(/^(?:export )?(?:type|interface|class) (\w+)/gm);
+    for (const [, name = ""] of declared) homes.set(name, [...(homes.get(name) ?? []), file]);
+  }
+  // `Props` are those of the one component that a module exports.
+  const several = [...homes].filter(([name, where]) => name !== "Props" && where.length > 1);
+  expect(several).toEqual([]);
+});

@@ -1,0 +1,47 @@
+/** Colours and initials for names: stable, the same for everybody. */
+const COLOURS = 6;
+
+function hash(text: string): number {
+  let h = 2166136261;
+  for (let i = 0; i < text.length; i += 1) h = Math.imul(h ^ text.charCodeAt(i), 16777619);
+  return h >>> 0;
+}
+
+export function colorOfName(name: string): string {
+  return name === "" ? "var(--ink4)" : `var(--robot-${hash(name) % COLOURS})`;
+}
+
+export function colorOfId(id: string): string {
+  return `var(--robot-${hash(id) % COLOURS})`;
+}
+
+/** A colour for each of the people in one place, each their own as long as colours last. */
+export function distinctColors(ids: readonly string[]): Map<string, string> {
+  const colors = new Map<string, string>();
+  const taken = new Set<number>();
+  for (const id of [...new Set(ids)].sort()) {
+    let at = hash(id) % COLOURS;
+    for (let i = 0; i < COLOURS && taken.has(at); i += 1) at = (at + 1) % COLOURS;
+    taken.add(at);
+    colors.set(id, `var(--robot-${at})`);
+  }
+  return colors;
+}
+
+const letters = new Intl.Segmenter(undefined, { granularity: "grapheme" });
+
+/** The first two letters of a name, or those of its first and last word, in any script. */
+export function initials(name: string): string {
+  const words = name.trim().split(/\s+/);
+  const [first = "", last = ""] = [words[0], words.length > 1 ? words.at(-1) : undefined];
+  const own = lettersOf(first);
+  const found =
+    last === "" ? own.slice(0, 2) : [...own.slice(0, 1), ...lettersOf(last).slice(0, 1)];
+  return found.join("").toUpperCase() || "?";
+}
+
+/** What people would call letters; of a pile of marks only the first few. */
+function lettersOf(word: string): string[] {
+  const start = word.slice(0, 64);
+  return [...letters.segment(start)].map(({ segment }) => segment.slice(0, 12));
+}

@@ -1,0 +1,100 @@
+/** Drag and drop by pointer events, so that it works for fingers too. */
+import { type PointerEvent as ReactPointerEvent, useEffect, useSyncExternalStore } from "react";
+import style from "./pointer-drag.module.css";
+
+export interface DraggedItem<T> {
+  readonly payload: T;
+  readonly label: string;
+  readonly x: number;
+  readonly y: number;
+}
+
+type DropHandler<T> = (draggedItem: DraggedItem<T>) => void;
+
+const THRESHOLD = 6; // px until a press becomes a drag
+
+/** One carrier for each kind of load. */
+export class PointerDrag<T> {
+  #now: DraggedItem<T> | null = null;
+  #listeners = new Set<() => void>();
+  #taker: DropHandler<T> | null = null;
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  };
+  now = (): DraggedItem<T> | null => this.#now;
+
+  /** Who takes what is dropped; answers how to stop taking. */
+  onDrop(taker: DropHandler<T>): () => void {
+    this.#taker = taker;
+    return () => {
+      if (this.#taker === taker) this.#taker = null;
+    };
+  }
+
+  /** To be called by `onPointerDown`: becomes a drag when the pointer moves, else stays a click. */
+  press(event: ReactPointerEvent, load: T, label: string): void {
+    if (event.button !== 0) return;
+    const [x0, y0, id] = [event.clientX, event.clientY, event.pointerId];
+    const onMove = (move: PointerEvent) => {
+      if (move.pointerId !== id) return;
+      const far = Math.hypot(move.clientX - x0, move.clientY - y0) > THRESHOLD;
+      if (this.#now === null && !far) return;
+      move.preventDefault();
+      this.#set({ payload: load, label, x: move.clientX, y: move.clientY });
+    };
+    const end = (drop: boolean) => (up: PointerEvent | KeyboardEvent) => {
+      if ("pointerId" in up && up.pointerId !== id) return;
+      if ("key" in up && up.key !== "Escape") return;
+      window.removeEventListener("pointermove", onMove);
+      window.removeEventListener("pointerup", onUp);
+      window.removeEventListener("pointercancel", onCancel);
+      window.removeEventListener("keydown", onCancel);
+      const draggedItem = this.#now;
+      this.#set(null);
+      if (drop && draggedItem) {
+        swallowClick();
+        this.#taker?.(draggedItem);
+      }
+    };
+    const onUp = end(true);
+    const onCancel = end(false);
+    window.addEventListener("pointermove", onMove, { passive: false });
+    window.addEventListener("pointerup", onUp);
+    window.addEventListener("pointercancel", onCancel);
+    window.addEventListener("keydown", onCancel);
+  }
+
+  #set(next: DraggedItem<T> | null): void {
+    this.#now = next;
+    for (const listener of this.#listeners) listener();
+  }
+}
+
+/** The click that a browser makes of the end of a drag is none. */
+function swallowClick(): void {
+  const swallow = (event: MouseEvent) => event.stopPropagation();
+  window.addEventListener("click", swallow, { capture: true, once: true });
+  setTimeout(() => window.removeEventListener("click", swallow, { capture: true }), 0);
+}
+
+/** What is carried, under the pointer. */
+export function DragPreview<T>({ carrier }: { carrier: PointerDrag<T> }) {
+  const draggedItem = useSyncExternalStore(carrier.subscribe, carrier.now);
+  const active = draggedItem !== null;
+  useEffect(() => {
+    document.body.classList.toggle(style.carrying ?? "", active);
+    return () => document.body.classList.remove(style.carrying ?? "");
+  }, [active]);
+  if (draggedItem === null) return null;
+  return (
+    <div
+      className={style.ghost}
+      style={{ transform: `translate(${draggedItem.x - 104}px, ${draggedItem.y - 24}px)` }}
+      aria-hidden
+    >
+      {draggedItem.label}
+    </div>
+  );
+}
