@@ -19,7 +19,7 @@ import msgspec
 import pytest
 from websockets.sync.client import connect
 
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from runner.process import body
 from runner.world import order, sequence
 from support.product import TOKEN, Product, running

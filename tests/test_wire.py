@@ -10,18 +10,11 @@ from hypothesis import strategies as st
 from pycrdt import Doc, Map
 
 from action_assistant.editor import document
-from action_assistant.umrf import codec
 from action_assistant.umrf.check import check
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph, Parameter, Position, Relation
-from action_assistant.umrf.semantics import (
-    Behaviour,
-    GraphState,
-    NotReady,
-    Script,
-    Trace,
-    simulate,
-)
+from action_assistant.umrf.semantics import Behaviour, GraphState, NotReady, Script, Trace, simulate
 from support.page import Page, graph_of, open_page
 
 VECTORS = sorted((Path(__file__).parent / "vectors" / "document").glob("*.json"))

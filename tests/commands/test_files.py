@@ -9,8 +9,8 @@ import pytest
 
 from action_assistant import places
 from action_assistant.cli import main
-from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 from support.product import COMMAND
 
 EXAMPLES = sorted(places.examples().glob("*.json"))

@@ -8,7 +8,7 @@ import pytest
 from action_assistant import cli
 from action_assistant.commands.practice import _index, _texts
 from action_assistant.runner.links import why_not
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from runner.world import sequence
 
 

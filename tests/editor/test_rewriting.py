@@ -14,7 +14,7 @@ from action_assistant.editor.contents import Moment
 from action_assistant.editor.document import Maps
 from action_assistant.editor.rewriting import Rewriting, rewriting
 from action_assistant.errors import BadInput, NotUmrf
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from editor.test_api import NAV, assert_problem, imported
 from strategies import graphs

@@ -38,7 +38,7 @@ from action_assistant.runner.runs import ENDED
 from action_assistant.runner.standin import StandInNode
 from action_assistant.runner.standin_wire import Quirks
 from action_assistant.runner.steering import RestRequest, confirm_rest
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import Execution
 from ros.robots import robot
 from runner.air import run_of

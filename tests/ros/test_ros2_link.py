@@ -31,8 +31,8 @@ from action_assistant.runner.links.port import (
     Report,
 )
 from action_assistant.runner.links.ros2 import Ros2
-from action_assistant.umrf import codec
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files import codec
 from ros.echo_engine import EchoEngine, graph_text
 from runner.world import sequence
 

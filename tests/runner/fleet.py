@@ -19,8 +19,8 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
-from action_assistant.umrf import codec
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph, Parameter
 from runner.world import Robot, engine, wall
 

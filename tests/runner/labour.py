@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from action_assistant.errors import Conflict
-from action_assistant.umrf.codec import Unreadable
+from action_assistant.umrf.files.codec import Unreadable
 
 
 def pid() -> int:

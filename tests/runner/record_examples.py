@@ -23,7 +23,7 @@ from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Quirks, Start, index_of
 from action_assistant.runner.steering import RestRequest
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,

@@ -27,7 +27,7 @@ from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Quirks, Start, index_of
 from action_assistant.runner.starting import GroupRequest
 from action_assistant.runner.steering import RestRequest
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
 from action_assistant.umrf.semantics import script_from
 from runner import world

@@ -29,7 +29,7 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.runs import Run, begin
 from action_assistant.runner.seen import Snapshot
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from runner.world import ANN, BEN, EPOCH, MemoryLedger, at_once, live_through, wall
 
 LETTERS = {

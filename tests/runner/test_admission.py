@@ -8,9 +8,9 @@ import pytest
 from action_assistant.errors import BadInput, Conflict, NotUmrf
 from action_assistant.runner.admission import admit, read_request
 from action_assistant.runner.events import Override
-from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, SIMULATED
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Relation
 from runner.world import GO_ON, order, sequence
 

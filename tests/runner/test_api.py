@@ -8,7 +8,7 @@ import httpx
 import msgspec
 import pytest
 
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import EXIT, Action
 from runner.process import RunnerProcess, body, over, started
 from runner.world import carousel, order, sequence

@@ -26,7 +26,7 @@ from action_assistant.runner.runs import ENDED, State
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Pause, Quirks, Start, Stop
 from action_assistant.runner.steering import RestRequest, confirm_rest
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import Execution, script_from
 from runner.air import Air, Node, now, now_ms, run_of

@@ -12,8 +12,8 @@ from action_assistant.runner.parts import Parts
 from action_assistant.runner.seen import Snapshot
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import index_of
-from action_assistant.umrf import codec
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 from runner.air import Node, now_ms

@@ -11,8 +11,8 @@ from action_assistant.runner.control import Control
 from action_assistant.runner.links.port import Link, NotSent, Order, Registration
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.standin_wire import Start
-from action_assistant.umrf import codec
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
 from runner.fleet import Fleet, Open
 from runner.scene import PATROL, Scene, asked, shown
 from runner.test_robots import NEVER, fleet, group

@@ -13,7 +13,7 @@ from action_assistant.runner.refusals import StartLog, why_refused
 from action_assistant.runner.runs import Run
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Index, Quirks, Start
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter, Signature
 from action_assistant.umrf.semantics import script_from
 from runner.air import Node, now, now_ms

@@ -24,7 +24,7 @@ from action_assistant.runner.live import Hub
 from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.starting import GroupRequest
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.fleet import Fleet, Open, given
 from runner.world import ANN, BEN, World, at_once, order, sequence, until, virtual, wall

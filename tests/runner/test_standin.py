@@ -22,10 +22,10 @@ from action_assistant.runner.standin_wire import (
     Stop,
     index_of,
 )
-from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.echo import echo
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 from runner.world import sequence

@@ -6,7 +6,7 @@ import msgspec
 
 from action_assistant.runner.links.port import Answer, Feedback, Order
 from action_assistant.runner.standin_wire import Quirks, Start
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from runner.fleet import Open
 from runner.scene import OTHER, PATROL, Scene, asked, shown
 from runner.test_robots import NEVER, fleet

@@ -21,7 +21,7 @@ from action_assistant.runner.robots import Robots
 from action_assistant.runner.seen import Snapshot
 from action_assistant.runner.standin_wire import Quirks, Start, Stop
 from action_assistant.runner.steering import RestRequest
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Conditions
 from runner.scene import Scene, asked, shown
 from runner.world import (

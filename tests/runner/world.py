@@ -38,9 +38,9 @@ from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run, replay
 from action_assistant.runner.seen import Snapshot
-from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,

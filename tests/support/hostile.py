@@ -21,8 +21,8 @@ from action_assistant.runner.events import Ended, Observed, Published, Requested
 from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.runs import RunEvent
 from action_assistant.runner.seen import GraphState, NodeState
-from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 from action_assistant.web.keys import Keys
 
 LONG = "long"

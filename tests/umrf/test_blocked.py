@@ -12,8 +12,8 @@ import msgspec
 import pytest
 
 from action_assistant.umrf.check import blocking, check_reading, refused_by_parser
-from action_assistant.umrf.codec import read
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import Signature
 from action_assistant.umrf.semantics import GraphState, Hazard, simulate
 

@@ -18,8 +18,8 @@ from action_assistant.umrf.check import (
     check_reading,
     refused_by_parser,
 )
-from action_assistant.umrf.codec import Unreadable, read
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import Unreadable, read
 from action_assistant.umrf.model import Graph, Problem, Signature
 from action_assistant.umrf.semantics import Hazard, NodeState, simulate
 from strategies import graphs

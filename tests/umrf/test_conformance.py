@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import msgspec
 import pytest
 
-from action_assistant.umrf import codec
 from action_assistant.umrf.check import refused_by_parser
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Signature
 from action_assistant.umrf.semantics import Behaviour, Engine, EngineRefused, Script, Trace
 

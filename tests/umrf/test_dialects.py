@@ -10,8 +10,8 @@ import pytest
 
 from action_assistant.umrf import semantics
 from action_assistant.umrf.check import STRUCTURAL, check, check_reading
-from action_assistant.umrf.codec import Reading, read, write
 from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.files.codec import Reading, read, write
 from action_assistant.umrf.model import ENTRY, EXIT
 
 ROOT = Path(__file__).parents[2]

@@ -5,7 +5,7 @@ from importlib import resources
 import pytest
 
 from action_assistant.umrf.check import check
-from action_assistant.umrf.codec import read, write
+from action_assistant.umrf.files.codec import read, write
 from action_assistant.umrf.semantics import (
     GraphResult,
     Hazard,

@@ -10,8 +10,8 @@ from action_assistant.umrf.check import check
 from action_assistant.umrf.checks.flow import Reach
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.together import Together
-from action_assistant.umrf.codec import read
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import Graph, Problem
 from action_assistant.umrf.semantics import (
     Behaviour,

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from action_assistant.umrf.codec import read
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import ENTRY, EXIT, RESPONSES, Action, Conditions, Graph, Relation
 from action_assistant.umrf.semantics import (
     Behaviour,

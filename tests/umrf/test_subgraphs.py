@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from action_assistant.umrf.check import blocking, check, check_reading
-from action_assistant.umrf.codec import read
+from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import Graph, Signature
 from action_assistant.umrf.semantics import Engine, EngineRefused
 

@@ -9,7 +9,7 @@ import msgspec
 from action_assistant.commands.client import No, Server, print_json, refused, running
 from action_assistant.runner.review.again import Departure, Step, course, departure
 from action_assistant.runner.review.desk import Expectation
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
 
 _WORDS: Final = {"result": "ends", "runs": "is told to", "state": "is", "hazard": "does"}

@@ -11,10 +11,11 @@ import msgspec
 
 from action_assistant.errors import CannotStart
 from action_assistant.umrf import check as checks
-from action_assistant.umrf import codec, semantics
-from action_assistant.umrf.action_files import ACTION_DIALECTS
+from action_assistant.umrf import semantics
 from action_assistant.umrf.codes import rank
 from action_assistant.umrf.facts import PINNED, SIMULATED, EngineFacts, facts_for
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.files.action_files import ACTION_DIALECTS
 from action_assistant.umrf.fixes import with_examples
 from action_assistant.umrf.model import Graph, Note, Problem, Signature, Where
 from action_assistant.umrf.signatures import signature_of

@@ -140,7 +140,7 @@ def _graphs(options: argparse.Namespace) -> int:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    from action_assistant.commands.expected import verify  # slow to load
+    from action_assistant.commands.expected import verify
 
     return verify(options)
 

@@ -14,11 +14,11 @@ from pycrdt import Doc
 from action_assistant.editor import document
 from action_assistant.editor.document import Maps
 from action_assistant.editor.sameness import Fingerprint, fingerprint
-from action_assistant.umrf import codec
 from action_assistant.umrf.check import check_written
 from action_assistant.umrf.difference import difference
 from action_assistant.umrf.digest import digest
-from action_assistant.umrf.jsontext import parse_small
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Graph, Problem
 
 _REMEMBERED: Final = 4  # moments of graphs

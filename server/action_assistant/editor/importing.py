@@ -8,9 +8,9 @@ from action_assistant.editor import changes, document
 from action_assistant.editor.contents import About, about_graph
 from action_assistant.editor.fullness import refuse_too_long, refuse_too_much, refuse_too_wide
 from action_assistant.errors import BadInput, NotUmrf, TooLarge
-from action_assistant.umrf import codec
-from action_assistant.umrf.action_files import ACTION_DIALECTS
 from action_assistant.umrf.check import check
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.files.action_files import ACTION_DIALECTS
 from action_assistant.umrf.model import Note, Problem
 
 

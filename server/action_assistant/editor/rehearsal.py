@@ -6,8 +6,9 @@ import msgspec
 
 from action_assistant.editor.contents import Sight, read
 from action_assistant.errors import BadInput, Conflict
-from action_assistant.umrf import codec, semantics
+from action_assistant.umrf import semantics
 from action_assistant.umrf.check import refused_by_parser
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 
 EVENTS: Final = 4_000  # of one rehearsal; the page shows no more

@@ -19,9 +19,9 @@ from action_assistant.editor.contents import Moment, Sight, read
 from action_assistant.editor.document import Maps
 from action_assistant.editor.document_values import ends_of, is_aid, number
 from action_assistant.errors import NotUmrf
-from action_assistant.umrf import codec
 from action_assistant.umrf.check import check
-from action_assistant.umrf.jsonplaces import places_of, pointer
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.places import places_of, pointer
 from action_assistant.umrf.model import Action, Graph, Key, Problem
 
 _ORDERS: Final = ("order", "po", "co")

@@ -32,14 +32,7 @@ from action_assistant.editor.happenings import DEFERRED, UPDATED
 from action_assistant.editor.loading import Loaded, load
 from action_assistant.editor.member import Member
 from action_assistant.editor.presence import Attendance, News
-from action_assistant.editor.replica import (
-    Brought,
-    Foreign,
-    Kept,
-    Panicked,
-    Replica,
-    TooMuchWaits,
-)
+from action_assistant.editor.replica import Brought, Foreign, Kept, Panicked, Replica, TooMuchWaits
 from action_assistant.editor.sameness import Fingerprint
 from action_assistant.editor.scan import Outline, outline
 from action_assistant.editor.trial import TooSlow

@@ -8,7 +8,7 @@ import msgspec
 
 from action_assistant.editor.contents import Sight, read
 from action_assistant.editor.kinds import when
-from action_assistant.umrf.jsontext import dump, parse_small
+from action_assistant.umrf.json.text import dump, parse_small
 from action_assistant.umrf.model import Action, Graph, JsonText, Parameter
 
 

@@ -13,7 +13,7 @@ from action_assistant.editor.sights import Sights
 from action_assistant.errors import BadInput, NotFound
 from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.web.keys import Author
 
 LABEL_LIMIT: Final = 200  # characters

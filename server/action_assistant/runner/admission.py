@@ -8,10 +8,10 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
 from action_assistant.runner.events import Override
-from action_assistant.umrf import codec
 from action_assistant.umrf.check import STRUCTURAL, blocking, check
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.laps import Laps, laps
 from action_assistant.umrf.model import Graph, Problem
 from action_assistant.umrf.semantics import Script, script_from

@@ -27,8 +27,8 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.seen import Snapshot
-from action_assistant.umrf import codec
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Signature
 from action_assistant.umrf.signatures import signature_of
 

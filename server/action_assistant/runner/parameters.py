@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import msgspec
 
-from action_assistant.umrf import codec
-from action_assistant.umrf.jsontext import MAX_DEPTH, Unreadable, parse
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.text import MAX_DEPTH, Unreadable, parse
 from action_assistant.umrf.parameters import flatten
 from action_assistant.umrf.semantics.values import Opaque, Slot, slots_of
 

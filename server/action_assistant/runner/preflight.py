@@ -17,9 +17,9 @@ from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.proof import strangers
 from action_assistant.runner.runs import Run
 from action_assistant.runner.seen import Snapshot
-from action_assistant.umrf import codec
 from action_assistant.umrf.check import STRUCTURAL, check
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Problem
 
 Verdict: TypeAlias = Literal["passed", "warned", "blocked"]

@@ -27,7 +27,7 @@ from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.recordings import Recording
 from action_assistant.runner.registered import Robot
 from action_assistant.runner.starting import read_group
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Signature
 from action_assistant.web.access import Needs
 from action_assistant.web.crowd import Turns

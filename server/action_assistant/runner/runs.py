@@ -40,15 +40,8 @@ from action_assistant.runner.events import (
 from action_assistant.runner.seen import ACTIVE, TERMINAL, Seen, Snapshot
 from action_assistant.runner.sights import key_of as key_of
 from action_assistant.runner.sights import names_all, observe
-from action_assistant.runner.visits import (
-    KEPT,
-    ActionRun,
-    Message,
-    awaits_answer,
-    is_heard,
-    paused,
-)
-from action_assistant.umrf import codec
+from action_assistant.runner.visits import KEPT, ActionRun, Message, awaits_answer, is_heard, paused
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.laps import Laps, laps
 
 State: TypeAlias = Literal[

@@ -1,9 +1,9 @@
 """Whether the graph that an engine shows is the one that was sent (SPEC 1.4). Pure."""
 
-from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.echo import echo
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 
 

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from action_assistant.runner.runs import Run
 from action_assistant.runner.seen import ACTIVE, Snapshot
 from action_assistant.runner.visits import ActionRun
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import (
     ENTRY,
     EXIT,

@@ -39,13 +39,7 @@ from action_assistant.runner.standin_wire import (
     unknown,
 )
 from action_assistant.umrf.facts import PINNED, EngineFacts
-from action_assistant.umrf.semantics import (
-    Engine,
-    EngineRefused,
-    Execution,
-    Script,
-    Trace,
-)
+from action_assistant.umrf.semantics import Engine, EngineRefused, Execution, Script, Trace
 
 _NEXT_MS: Final = 0.2  # between two messages that wait
 _TOLD_MS: Final = 10.0  # from the end of a stop to the line that says so

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Final, TypeAlias
 import msgspec
 
 from action_assistant.umrf import check as checks
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Key, Signature
 from action_assistant.umrf.semantics.printing import printed_action
 from action_assistant.umrf.signatures import signature_of

@@ -22,7 +22,7 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.sameness import difference
 from action_assistant.runner.seen import Snapshot
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 
 

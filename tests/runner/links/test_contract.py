@@ -21,7 +21,7 @@ from action_assistant.runner.links.port import (
 from action_assistant.runner.seen import NodeState, Snapshot
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Stop
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
 from runner.air import Air, now_ms
 from runner.air_link import AirLink

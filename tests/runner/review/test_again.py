@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from action_assistant.runner.review.again import Recorded, fitted, recorded
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
 from runner.process import RunnerProcess, over, started
 from runner.review.test_compare import PLAN, went

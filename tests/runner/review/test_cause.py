@@ -24,7 +24,7 @@ from action_assistant.runner.review.cause import Cause, causes
 from action_assistant.runner.review.cause_words import words
 from action_assistant.runner.runs import Run, replay
 from action_assistant.runner.seen import GraphState, NodeResult, NodeState
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.process import RunnerProcess
 from runner.record_examples import graph, line, recorded

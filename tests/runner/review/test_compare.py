@@ -8,8 +8,8 @@ from action_assistant.runner.events import Ended, Observed, Published
 from action_assistant.runner.review.compare import compare
 from action_assistant.runner.runs import Run, replay
 from action_assistant.runner.seen import NodeResult, NodeState
-from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
 from runner.test_runs import REQUESTED
 from runner.world import sequence

@@ -13,7 +13,7 @@ import pytest
 from mcap.reader import make_reader
 
 from action_assistant.cli import main
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
 from runner.process import RunnerProcess, over, started
 from runner.world import order, sequence

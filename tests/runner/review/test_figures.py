@@ -19,7 +19,7 @@ from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.review import about, again, compare, exports, statistics
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.review.shelf import Shelf
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.bounds import Air, Lived, lived
 from runner.test_bounds import AIRS, CALL

@@ -38,8 +38,9 @@ from action_assistant.runner.seen import (
     NodeState,
     Snapshot,
 )
-from action_assistant.umrf import codec, semantics
+from action_assistant.umrf import semantics
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 
 _GRAIN_MS: Final = 0.01  # clocks are not finer: what is due so soon is due now

@@ -14,7 +14,7 @@ from action_assistant.runner import refusals, stall
 from action_assistant.runner.events import Overridden
 from action_assistant.runner.runs import Alarm, Run
 from action_assistant.runner.visits import ActionRun, Message, Visit
-from action_assistant.umrf.jsontext import parse_small
+from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import EXIT, Action, Graph, Precondition, Relation
 
 _UNRESOLVED: Final = "Could not resolve graph"

@@ -8,8 +8,8 @@ import msgspec
 from action_assistant.runner import shapes
 from action_assistant.runner.runs import Run
 from action_assistant.runner.visits import ActionRun, Visit
-from action_assistant.umrf import codec
 from action_assistant.umrf.difference import ActionChange, Difference, difference
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 
 _MOST: Final = 2_000  # steps in an answer

@@ -30,7 +30,7 @@ from action_assistant.runner.review.reel import Reels
 from action_assistant.runner.review.shelf import Archived, Shelf
 from action_assistant.runner.runs import Run
 from action_assistant.runner.workers import Crashed
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import inf
 from typing import TypeAlias
 
+from action_assistant.umrf.files.writing import name_order
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
@@ -18,7 +19,6 @@ from action_assistant.umrf.model import (
 )
 from action_assistant.umrf.semantics.script import Behaviour
 from action_assistant.umrf.semantics.values import Slot, slots_of
-from action_assistant.umrf.writing import name_order
 
 ENTRY_NODE = "graph_entry_0"
 EXIT_NODE = "graph_exit_0"

@@ -2,7 +2,7 @@
 
 from typing import Final, NamedTuple
 
-from action_assistant.umrf.dialects_old import (
+from action_assistant.umrf.files.older_dialects import (
     EFFECTS,
     Old,
     from_action,
@@ -10,7 +10,7 @@ from action_assistant.umrf.dialects_old import (
     from_umrf_actions,
     items_of,
 )
-from action_assistant.umrf.jsontext import Json, Number, pointer
+from action_assistant.umrf.json.text import Json, Number, pointer
 from action_assistant.umrf.model import Note, Problem
 from action_assistant.umrf.relations import MAX_REFERRED_ID, whole_of
 

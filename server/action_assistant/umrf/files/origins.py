@@ -9,7 +9,7 @@ from typing import TypeAlias, TypeVar
 
 from msgspec.structs import replace
 
-from action_assistant.umrf.jsonplaces import places_of
+from action_assistant.umrf.json.places import places_of
 from action_assistant.umrf.model import Note, Problem, Where
 
 #: Where values came from, in one step: a pointer → the pointer before it. What is not named stands

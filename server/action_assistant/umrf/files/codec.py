@@ -4,18 +4,18 @@ from collections.abc import Iterable
 
 import msgspec
 
-from action_assistant.umrf.action_files import (
+from action_assistant.umrf.files.action_files import (
     ACTION_DIALECTS,
     ActionReading,
     read_action,
     write_action,
 )
-from action_assistant.umrf.dialects import dialect_of, translated
-from action_assistant.umrf.jsontext import Json, Unreadable, decoded, parse, pointer
+from action_assistant.umrf.files.dialects import dialect_of, translated
+from action_assistant.umrf.files.origins import located, moved, placed
+from action_assistant.umrf.files.reading import Tree, read_tree
+from action_assistant.umrf.files.writing import Stamp, write
+from action_assistant.umrf.json.text import Json, Unreadable, decoded, parse, pointer
 from action_assistant.umrf.model import Graph, Key, Note, Problem, Where
-from action_assistant.umrf.places import located, moved, placed
-from action_assistant.umrf.reading import Tree, read_tree
-from action_assistant.umrf.writing import Stamp, write
 
 __all__ = [
     "ActionReading", "Reading", "Stamp", "Unreadable", "read", "read_action", "stamp_of", "write",

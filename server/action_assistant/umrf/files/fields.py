@@ -3,7 +3,7 @@
 import re
 from typing import Final, TypeAlias
 
-from action_assistant.umrf.jsontext import Json, Number, dump
+from action_assistant.umrf.json.text import Json, Number, dump
 from action_assistant.umrf.model import Parameter, Position
 from action_assistant.umrf.parameters import flatten
 from action_assistant.umrf.relations import whole_of

@@ -7,7 +7,7 @@ from typing import Final, TypeAlias
 
 import msgspec
 
-from action_assistant.umrf.fields import (
+from action_assistant.umrf.files.fields import (
     Extra,
     action_attributes,
     graph_attributes,
@@ -17,7 +17,8 @@ from action_assistant.umrf.fields import (
     position_of,
     text_of,
 )
-from action_assistant.umrf.jsontext import Json, dump, pointer
+from action_assistant.umrf.files.notes import Notes
+from action_assistant.umrf.json.text import Json, dump, pointer
 from action_assistant.umrf.model import (
     ENGINE_DEFAULTS,
     ENTRY,
@@ -33,7 +34,6 @@ from action_assistant.umrf.model import (
     Remap,
     Where,
 )
-from action_assistant.umrf.notes import Notes
 from action_assistant.umrf.relations import conditions_of, remap_of
 
 #: Problems of one code that are kept.

@@ -4,11 +4,11 @@ What `deviations` finds by differences is found here the plain way: for graphs w
 which stop others as they please, and to hold the two together.
 """
 
+from action_assistant.umrf.courses.course import LAPS, MORE, Kind, Outcome
+from action_assistant.umrf.courses.network import Network
 from action_assistant.umrf.model import Graph
-from action_assistant.umrf.semantics.course import LAPS, MORE, Kind, Outcome
 from action_assistant.umrf.semantics.engine import Engine
 from action_assistant.umrf.semantics.graphs import EngineRefused
-from action_assistant.umrf.semantics.network import Network
 from action_assistant.umrf.semantics.parts import EXIT_NODE, Node, Running
 from action_assistant.umrf.semantics.parts import Outcome as Result
 from action_assistant.umrf.semantics.script import Behaviour, Script

@@ -9,8 +9,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final, Literal, NamedTuple, TypeAlias
 
+from action_assistant.umrf.courses.network import Asked, Mask, Network
 from action_assistant.umrf.model import Precondition
-from action_assistant.umrf.semantics.network import Asked, Mask, Network
 
 #: What an action does: nothing; runs until `due`; ends a stop at `due`; is paused; was stopped while
 #: it was paused and is given up at `due`; is given up, its thread never ends.

@@ -5,13 +5,13 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.umrf.dialects import action_dialect, dialect_of, translated
-from action_assistant.umrf.dialects_old import RELATIONS
-from action_assistant.umrf.jsontext import Json, Unreadable, decoded, dump, dump_indented, parse
+from action_assistant.umrf.files.dialects import action_dialect, dialect_of, translated
+from action_assistant.umrf.files.older_dialects import RELATIONS
+from action_assistant.umrf.files.origins import located, moved, placed
+from action_assistant.umrf.files.reading import read_tree
+from action_assistant.umrf.files.writing import tree_of
+from action_assistant.umrf.json.text import Json, Unreadable, decoded, dump, dump_indented, parse
 from action_assistant.umrf.model import Action, Graph, Note, Problem
-from action_assistant.umrf.places import located, moved, placed
-from action_assistant.umrf.reading import read_tree
-from action_assistant.umrf.writing import tree_of
 
 ACTION_DIALECTS: Final = frozenset({"D3-action", "D0"})
 _PLACE: Final = "/actions/0"

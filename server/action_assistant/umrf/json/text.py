@@ -14,8 +14,8 @@ from typing import Final, NoReturn, TypeAlias
 
 import msgspec
 
-from action_assistant.umrf.jsonplaces import doubled_in, path_at, place_at, places_of
-from action_assistant.umrf.jsonplaces import pointer as pointer
+from action_assistant.umrf.json.places import doubled_in, path_at, place_at, places_of
+from action_assistant.umrf.json.places import pointer as pointer
 
 MAX_BYTES: Final = 10 * 1024 * 1024
 MAX_DEPTH: Final = 64

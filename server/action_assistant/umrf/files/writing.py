@@ -5,7 +5,7 @@ from operator import attrgetter
 
 import msgspec
 
-from action_assistant.umrf.jsontext import Json, Number, dump_indented, number, parse_small
+from action_assistant.umrf.json.text import Json, Number, dump_indented, number, parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Key, Position, Relation
 from action_assistant.umrf.parameters import nest
 from action_assistant.umrf.relations import conditions_text

@@ -11,10 +11,10 @@ from bisect import bisect_left
 from heapq import heappop, heappush
 from typing import Final
 
+from action_assistant.umrf.courses.course import LAPS, MORE, Course, Outcome, stuck
+from action_assistant.umrf.courses.instants import ACTIVE, DUE, IDLE, RUNS, Instant, State
+from action_assistant.umrf.courses.network import Mask
 from action_assistant.umrf.model import Precondition
-from action_assistant.umrf.semantics.course import LAPS, MORE, Course, Outcome, stuck
-from action_assistant.umrf.semantics.instants import ACTIVE, DUE, IDLE, RUNS, Instant, State
-from action_assistant.umrf.semantics.network import Mask
 
 #: Differences that are remembered with what came of them.
 _FEW: Final = 8

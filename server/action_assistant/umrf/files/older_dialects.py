@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from typing import Final
 
-from action_assistant.umrf.jsontext import Json, Number, pointer
+from action_assistant.umrf.files.notes import Notes
+from action_assistant.umrf.files.origins import origin
+from action_assistant.umrf.json.text import Json, Number, pointer
 from action_assistant.umrf.model import Problem, Severity, Where
-from action_assistant.umrf.notes import Notes
-from action_assistant.umrf.places import origin
 
 EFFECTS: Final = {"synchronous": "sync", "asynchronous": "async", "sync": "sync", "async": "async"}
 #: What says how an action stands among others; by itself it has no place.
