@@ -18,8 +18,6 @@ from table import Table, seconds
 
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
-from action_assistant.journal.tables import action_sum, review, run_label
-from action_assistant.journal.tables import run as runs
 from action_assistant.runner import archive, shapes
 from action_assistant.runner.events import Author, Ended, Observed, Published, Requested, encode
 from action_assistant.runner.history import Aside
@@ -31,6 +29,8 @@ from action_assistant.runner.review.film import film
 from action_assistant.runner.review.reel import APART, Reels
 from action_assistant.runner.runs import replay
 from action_assistant.runner.seen import NodeResult, NodeState
+from action_assistant.schema.runner_tables import action_sum, review, run_label
+from action_assistant.schema.runner_tables import run as runs
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 

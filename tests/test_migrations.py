@@ -13,8 +13,8 @@ from sqlalchemy import JSON, Column, Connection, MetaData, insert, inspect, sele
 
 from action_assistant import places
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import database_of
-from action_assistant.journal.migrate import BRANCHES, Branch, config_for, migrate
+from action_assistant.journal.databases import database_of, migrate
+from action_assistant.journal.migrate import BRANCHES, Branch, config_for
 
 branches = pytest.mark.parametrize("branch", ["editor", "runner"])
 Deed: TypeAlias = Callable[[Connection], Any]

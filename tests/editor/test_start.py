@@ -9,7 +9,7 @@ from sqlalchemy import select
 
 from action_assistant.editor import edits
 from action_assistant.editor.app import open_house
-from action_assistant.journal import tables
+from action_assistant.schema import editor_tables
 from action_assistant.settings import EditorSettings
 from action_assistant.web.keys import Person
 from editor.process import Editor, running
@@ -89,7 +89,7 @@ async def test_tables_made_again_from_the_log_are_the_same(settings: EditorSetti
         await house.catalogue.recover(made.id, "ada")
         queries = [
             select(table).order_by(table.c.id)
-            for table in (tables.graph, tables.version, tables.person)
+            for table in (editor_tables.graph, editor_tables.version, editor_tables.person)
         ]
         before = [await house.journal.query(query) for query in queries]
         await house.journal.rebuild()
@@ -118,5 +118,7 @@ async def test_a_name_that_changed_just_before_the_end_is_noticed_later(
             await edits.rename(room, "ada", name="new", description=None)
     async with open_house(settings) as house:
         assert (await house.catalogue.get(made.id)).name == "new"
-        rows = await house.journal.query(select(tables.graph).where(tables.graph.c.id == made.id))
+        rows = await house.journal.query(
+            select(editor_tables.graph).where(editor_tables.graph.c.id == made.id)
+        )
         assert rows[0].name == "new"

@@ -12,11 +12,11 @@ from sqlalchemy import select, text
 
 from action_assistant.editor import happenings as h
 from action_assistant.errors import CannotStart
-from action_assistant.journal import tables
 from action_assistant.journal.copying import copy
-from action_assistant.journal.database import database_of
+from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Event
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from journal.servers import Server
 
 
@@ -62,7 +62,7 @@ async def everything(url: str) -> tuple[list[Event], dict[str, list[Any]]]:
             events += more
         rows = {
             name: sorted(map(tuple, await journal.query(select(table))), key=repr)
-            for name, table in tables.EDITOR.tables.items()
+            for name, table in editor_tables.EDITOR.tables.items()
         }
         return events, rows
     finally:
@@ -139,7 +139,7 @@ async def test_a_damaged_journal_is_not_copied(ways: tuple[str, str], harm: str)
 
 
 async def test_an_older_journal_is_copied_without_being_changed(ways: tuple[str, str]) -> None:
-    from action_assistant.journal.migrate import migrate
+    from action_assistant.journal.databases import migrate
 
     source, target = ways
     await asyncio.to_thread(migrate, source, "editor", "editor_0001")

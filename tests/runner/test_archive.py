@@ -7,12 +7,12 @@ from msgspec.structs import replace
 from sqlalchemy import select
 
 from action_assistant.journal.journal import Journal
-from action_assistant.journal.tables import robot, run
 from action_assistant.runner import archive, shapes
 from action_assistant.runner.app import wall_clock
 from action_assistant.runner.control import Control
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots import Robots
+from action_assistant.schema.runner_tables import robot, run
 from runner.world import ANN, BEN, order, sequence, until
 
 

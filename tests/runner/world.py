@@ -19,7 +19,6 @@ from sqlalchemy import Row, Select, StaticPool, create_engine
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.events import Snapshot as Kept
-from action_assistant.journal.tables import RUNNER
 from action_assistant.runner import archive
 from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.control import Control
@@ -38,6 +37,7 @@ from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run, replay
 from action_assistant.runner.seen import Snapshot
+from action_assistant.schema.runner_tables import RUNNER
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.files import codec

@@ -26,8 +26,9 @@ from action_assistant.commands.data_folder import (
 )
 from action_assistant.commands.progress import Progress
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import Branch, database_of
-from action_assistant.journal.tables import invitation
+from action_assistant.journal.database import Branch
+from action_assistant.journal.databases import database_of
+from action_assistant.schema.editor_tables import invitation
 from action_assistant.web.keys import TOKEN_FILE
 
 #: What archives are of, in their folder.

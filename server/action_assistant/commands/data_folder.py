@@ -14,12 +14,13 @@ from sqlalchemy import Row, Select, select
 from action_assistant.commands.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copying import sentence
-from action_assistant.journal.database import Branch, database_of
+from action_assistant.journal.database import Branch
+from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Fold
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.removal import Removed
-from action_assistant.journal.tables import runner_event
 from action_assistant.runner.review.raw import RawPut
+from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
 from action_assistant.web import certificate, keys, revoked
 

@@ -24,7 +24,8 @@ from action_assistant.commands.processes import port_number
 from action_assistant.editor import location
 from action_assistant.errors import CannotStart
 from action_assistant.interpreter import for_runner
-from action_assistant.journal.database import cause_of, database_of
+from action_assistant.journal.database import cause_of
+from action_assistant.journal.databases import database_of
 from action_assistant.journal.migrate import recognize
 from action_assistant.plain import one_line
 from action_assistant.private import holds_nothing_else, open_to_others, prove_writable

@@ -244,8 +244,8 @@ def _runner(options: argparse.Namespace) -> int:
 
 def _migrate(options: argparse.Namespace) -> int:
     from action_assistant.editor import location
-    from action_assistant.journal.database import database_of
-    from action_assistant.journal.migrate import Branch, migrate
+    from action_assistant.journal.databases import database_of, migrate
+    from action_assistant.journal.migrate import Branch
 
     data = settings.data_folder(options.data.resolve())
     database = options.database or location.of(data)

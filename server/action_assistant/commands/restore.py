@@ -33,8 +33,9 @@ from action_assistant.commands.data_folder import (
 )
 from action_assistant.commands.progress import Progress
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import Branch, cause_of, database_of
-from action_assistant.journal.tables import editor_event
+from action_assistant.journal.database import Branch, cause_of
+from action_assistant.journal.databases import database_of
+from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.keys import TOKEN_FILE
 
 _WORK: Final = ".restore-"

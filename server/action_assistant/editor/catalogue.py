@@ -13,9 +13,9 @@ from action_assistant.editor.document import new_aid
 from action_assistant.editor.rooms import Rooms
 from action_assistant.editor.sights import Sights
 from action_assistant.errors import BadInput, NotFound
-from action_assistant.journal import tables
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from action_assistant.umrf.check import check
 from action_assistant.umrf.model import Graph
 from action_assistant.web.keys import Author
@@ -73,7 +73,7 @@ class Catalogue:
 
     async def all(self, *, deleted: bool = False) -> list[GraphView]:
         """Every graph, the last changed first; or those that were deleted."""
-        gone = tables.graph.c.deleted_at
+        gone = editor_tables.graph.c.deleted_at
         chosen = _rows().where(gone.is_not(None) if deleted else gone.is_(None))
         rows = await self._journal.query(chosen)
         views = [await self._view(row) for row in rows]
@@ -154,7 +154,7 @@ class Catalogue:
         return await self.get(made)
 
     async def _row(self, graph: str, *, deleted: bool = False) -> Row[Any]:
-        rows = await self._journal.query(_rows().where(tables.graph.c.id == graph))
+        rows = await self._journal.query(_rows().where(editor_tables.graph.c.id == graph))
         if not rows or (rows[0].deleted_at is not None and not deleted):
             raise NotFound(f"There is no graph {graph!r}.")
         return rows[0]
@@ -188,7 +188,7 @@ class Catalogue:
 
 def _rows() -> Select[Any]:
     """Graphs with the number and time of their document's last change."""
-    event, graph = tables.editor_event, tables.graph
+    event, graph = editor_tables.editor_event, editor_tables.graph
     last = (
         select(event.c.seq)
         .where(event.c.stream == "graph/" + graph.c.id)

@@ -18,16 +18,16 @@ from sqlalchemy import select
 
 from action_assistant.editor import happenings as h
 from action_assistant.errors import Unavailable
-from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
 from action_assistant.private import opener
+from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
 
 MARK: Final = "editor.mark"
 _EVERY: Final = 60.0  # seconds between marks
 _STREAM: Final = "epochs"
-_event: Final = tables.editor_event.c
+_event: Final = editor_tables.editor_event.c
 
 
 Why: TypeAlias = Literal["the first", "a backup was restored", "the log had gone back"]

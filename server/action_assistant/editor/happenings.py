@@ -13,8 +13,8 @@ from sqlalchemy import Executable, delete, insert, update
 from action_assistant.editor.kinds import DEFERRED as DEFERRED
 from action_assistant.editor.kinds import UPDATED as UPDATED
 from action_assistant.editor.kinds import when as when
-from action_assistant.journal import tables
 from action_assistant.journal.events import Draft, Event
+from action_assistant.schema import editor_tables
 from action_assistant.web.roles import Role
 
 CREATED: Final = "graph.created.v1"
@@ -131,8 +131,8 @@ def fold(event: Event) -> Sequence[Executable]:
         named = msgspec.json.decode(event.body, type=Named)
         row = {"id": event.author, "name": named.name, "seen_at": event.at}
         return [
-            delete(tables.person).where(tables.person.c.id == event.author),
-            insert(tables.person).values(row),
+            delete(editor_tables.person).where(editor_tables.person.c.id == event.author),
+            insert(editor_tables.person).values(row),
         ]
     if event.stream == INVITATIONS:
         return _invitation(event)
@@ -150,7 +150,7 @@ def _invitation(event: Event) -> Sequence[Executable]:
                 "made_at": event.at,
                 "made_by": event.author,
             }
-            return [insert(tables.invitation).values(row)]
+            return [insert(editor_tables.invitation).values(row)]
         case "invitation.accepted.v1":
             came = msgspec.json.decode(event.body, type=AcceptedInvitation)
             row = {
@@ -159,18 +159,24 @@ def _invitation(event: Event) -> Sequence[Executable]:
                 "name": came.name,
                 "at": event.at,
             }
-            same = (tables.guest.c.invitation == came.id, tables.guest.c.person == event.author)
-            return [delete(tables.guest).where(*same), insert(tables.guest).values(row)]
+            same = (
+                editor_tables.guest.c.invitation == came.id,
+                editor_tables.guest.c.person == event.author,
+            )
+            return [
+                delete(editor_tables.guest).where(*same),
+                insert(editor_tables.guest).values(row),
+            ]
         case "invitation.revoked.v1":
             gone = msgspec.json.decode(event.body, type=RevokedInvitation)
-            this = update(tables.invitation).where(tables.invitation.c.id == gone.id)
+            this = update(editor_tables.invitation).where(editor_tables.invitation.c.id == gone.id)
             return [this.values(revoked_at=event.at, revoked_by=event.author)]
         case _:
             return ()
 
 
 def _about(event: Event, graph: str) -> Sequence[Executable]:
-    this = update(tables.graph).where(tables.graph.c.id == graph)
+    this = update(editor_tables.graph).where(editor_tables.graph.c.id == graph)
     match event.kind:
         case "graph.created.v1":
             created = msgspec.json.decode(event.body, type=Created)
@@ -181,7 +187,7 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
                 "made_at": event.at,
                 "made_by": event.author,
             }
-            return [insert(tables.graph).values(row)]
+            return [insert(editor_tables.graph).values(row)]
         case "graph.described.v1":
             now = msgspec.json.decode(event.body, type=Described)
             return [this.values(name=now.name, description=now.description)]
@@ -190,7 +196,7 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
         case "graph.recovered.v1":
             return [this.values(deleted_at=None)]
         case "version.published.v1":
-            return [insert(tables.version).values(_version(event, graph))]
+            return [insert(editor_tables.version).values(_version(event, graph))]
         case _:
             return ()
 

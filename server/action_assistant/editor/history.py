@@ -11,8 +11,8 @@ from sqlalchemy import Row, select
 from action_assistant.editor import happenings as h
 from action_assistant.editor.people import People
 from action_assistant.editor.versions import Versions, VersionView
-from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from action_assistant.web.keys import Author
 
 _ONE_GO: Final = 5 * 60  # seconds between two edits of one entry
@@ -57,7 +57,7 @@ class History:
         return found[::-1][:limit]
 
     async def _rows(self, graph: str, before: int | None) -> list[Row[Any]]:
-        event = tables.editor_event.c
+        event = editor_tables.editor_event.c
         document = h.graph_stream(graph)
         chosen = (
             select(event.seq, event.kind, event.author, event.at)
@@ -72,7 +72,7 @@ class History:
 
     async def _restored(self, graph: str) -> dict[int, int]:
         """Which changes went back to which."""
-        event = tables.editor_event.c
+        event = editor_tables.editor_event.c
         chosen = select(event.body).where(
             event.stream == h.about_stream(graph), event.kind == h.RESTORED
         )

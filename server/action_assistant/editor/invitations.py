@@ -28,8 +28,8 @@ from action_assistant.errors import (
     Unavailable,
     Withdrawn,
 )
-from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from action_assistant.web.keys import Author, Keys
 from action_assistant.web.revoked import Revoked
 from action_assistant.web.roles import OWNER, Role
@@ -172,8 +172,10 @@ class Invitations:
                 if by.name:
                     await self._people.seen(by)
                 await self._append(h.REVOKED, by.id, h.RevokedInvitation(invitation))
-                when = select(tables.invitation.c.revoked_at)
-                row = await self._journal.query(when.where(tables.invitation.c.id == invitation))
+                when = select(editor_tables.invitation.c.revoked_at)
+                row = await self._journal.query(
+                    when.where(editor_tables.invitation.c.id == invitation)
+                )
             except Unavailable as error:
                 if not told:
                     log.warning(
@@ -210,7 +212,7 @@ class Invitations:
         if any(each.person.id == person.id for each in guests):
             return
         await self._append(h.ACCEPTED, person.id, h.AcceptedInvitation(invitation, person.name))
-        guest = tables.guest.c
+        guest = editor_tables.guest.c
         mine = select(guest.at).where(guest.invitation == invitation, guest.person == person.id)
         (row,) = await self._journal.query(mine)
         if not any(each.person.id == person.id for each in guests):
@@ -221,9 +223,9 @@ class Invitations:
 
     async def _read(self, new: str | None = None) -> None:
         """What the log says, of all or of a new one."""
-        which = select(tables.invitation)
+        which = select(editor_tables.invitation)
         if new is not None:
-            which = which.where(tables.invitation.c.id == new)
+            which = which.where(editor_tables.invitation.c.id == new)
         for row in await self._journal.query(which):
             over = row.revoked_at is not None
             self._made[row.id] = Invitation(
@@ -238,7 +240,9 @@ class Invitations:
             )
         if new is not None:
             return
-        for each in await self._journal.query(select(tables.guest).order_by(tables.guest.c.at)):
+        for each in await self._journal.query(
+            select(editor_tables.guest).order_by(editor_tables.guest.c.at)
+        ):
             if each.invitation in self._made:
                 guest = Guest(Author(each.person, each.name), h.when(each.at))
                 self._made[each.invitation].guests.append(guest)

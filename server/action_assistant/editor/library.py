@@ -4,8 +4,8 @@ from sqlalchemy import select
 
 from action_assistant.editor.sights import Sights
 from action_assistant.editor.uses import NOTHING, Use, merged, used
-from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from action_assistant.web.workers import HOPELESS
 
 
@@ -21,7 +21,7 @@ class Library:
     async def all(self) -> bytes:
         """Every action that a graph uses, by name: JSON of a list of `Known`. Graphs that cannot be
         read are left out."""
-        graph, event = tables.graph, tables.editor_event
+        graph, event = editor_tables.graph, editor_tables.editor_event
         last = (
             select(event.c.seq)
             .where(event.c.stream == "graph/" + graph.c.id)

@@ -18,8 +18,9 @@ from sqlalchemy.exc import ArgumentError
 
 from action_assistant.editor.epochs import MARK, Mark
 from action_assistant.errors import CannotStart
-from action_assistant.journal import tables
-from action_assistant.journal.database import cause_of, database_of
+from action_assistant.journal.database import cause_of
+from action_assistant.journal.databases import database_of
+from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
 
@@ -29,7 +30,7 @@ FILE: Final = "editor.database"
 #: The journal of a folder that holds its graphs itself.
 JOURNAL: Final = "editor.db"
 _SECRET: Final = "password"  # names of parameters that hold one contain this
-_event, _graph = tables.editor_event.c, tables.graph.c
+_event, _graph = editor_tables.editor_event.c, editor_tables.graph.c
 
 
 class Kept(msgspec.Struct, frozen=True):
@@ -161,7 +162,7 @@ def _graphs(url: str) -> int | None:
     counted = select(func.count()).where(_graph.deleted_at.is_(None))
 
     def count(connection: Connection) -> int:
-        if not inspect(connection).has_table(tables.graph.name):
+        if not inspect(connection).has_table(editor_tables.graph.name):
             return 0
         return connection.execute(counted).scalar_one()
 
@@ -185,7 +186,7 @@ def _holds(url: str, mark: Path) -> bool:
     found = select(_event.chain).where(_event.position == last.position)
 
     def look(connection: Connection) -> bool:
-        if not inspect(connection).has_table(tables.editor_event.name):
+        if not inspect(connection).has_table(editor_tables.editor_event.name):
             return False
         chain = connection.execute(found).scalar()
         return chain is not None and bytes(chain).hex() == last.chain

@@ -4,8 +4,8 @@ from sqlalchemy import select
 
 from action_assistant.editor.happenings import EXAMPLES, NAMED, PEOPLE, SERVER, Named, draft
 from action_assistant.errors import Unavailable
-from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from action_assistant.web.keys import Author
 
 _OURS = {SERVER: "Action Assistant", EXAMPLES: "Examples"}
@@ -21,7 +21,7 @@ class People:
     @classmethod
     async def known(cls, journal: Journal) -> "People":
         """Those in the journal."""
-        rows = await journal.query(select(tables.person.c.id, tables.person.c.name))
+        rows = await journal.query(select(editor_tables.person.c.id, editor_tables.person.c.name))
         return cls(journal, {row.id: row.name for row in rows})
 
     async def seen(self, person: Author) -> None:

@@ -8,10 +8,10 @@ from sqlalchemy import Select, select
 
 from action_assistant.editor.folding import Damaged
 from action_assistant.errors import Unavailable
-from action_assistant.journal import tables
 from action_assistant.journal.chain import START, link
 from action_assistant.journal.events import Event
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
 
@@ -76,9 +76,9 @@ class Tail:
         return found
 
     async def _ask(self, after: int, limit: int) -> Sequence[Sequence[Any]]:
-        chosen = _rows_of(self._stream).where(tables.editor_event.c.seq > after)
+        chosen = _rows_of(self._stream).where(editor_tables.editor_event.c.seq > after)
         if self._upto is not None:
-            chosen = chosen.where(tables.editor_event.c.seq <= self._upto)
+            chosen = chosen.where(editor_tables.editor_event.c.seq <= self._upto)
         return await self._journal.query(chosen.limit(limit))
 
     def _fault(self, row: Sequence[Any]) -> str | None:
@@ -104,6 +104,6 @@ class Tail:
 
 
 def _rows_of(stream: str) -> Select[Any]:
-    columns = tables.editor_event.c
+    columns = editor_tables.editor_event.c
     chosen = select(*(columns[name] for name in _COLUMNS))
     return chosen.where(columns.stream == stream).order_by(columns.seq)

@@ -11,8 +11,8 @@ from action_assistant.editor import happenings as h
 from action_assistant.editor.document import new_aid
 from action_assistant.editor.sights import Sights
 from action_assistant.errors import BadInput, NotFound
-from action_assistant.journal import tables
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from action_assistant.umrf.files import codec
 from action_assistant.web.keys import Author
 
@@ -72,7 +72,7 @@ class Versions:
 
     async def get(self, version: str) -> VersionView:
         """One version, with its UMRF. Raises NotFound."""
-        chosen = select(tables.version).where(tables.version.c.id == version)
+        chosen = select(editor_tables.version).where(editor_tables.version.c.id == version)
         rows = await self._journal.query(chosen)
         if not rows:
             raise NotFound(f"There is no version {version!r}.")
@@ -90,8 +90,8 @@ class Versions:
         return {row.event_seq: _view(row) for row in await self._rows(graph)}
 
     async def _rows(self, graph: str, seq: int | None = None) -> list[Row[Any]]:
-        version = tables.version.c
-        chosen = select(tables.version).where(version.graph == graph)
+        version = editor_tables.version.c
+        chosen = select(editor_tables.version).where(version.graph == graph)
         if seq is not None:
             chosen = chosen.where(version.seq == seq)
         return await self._journal.query(chosen.order_by(version.event_seq.desc()))

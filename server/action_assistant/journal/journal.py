@@ -12,14 +12,16 @@ from sqlalchemy import Connection, delete, insert, select
 
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.chain import Damage, Head, Inspector
-from action_assistant.journal.database import Branch, Database, Session, cause_of, database_of
+from action_assistant.journal.database import Branch, Database, Session, cause_of
+from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.follower import Follower
 from action_assistant.journal.migrate import BRANCHES
 from action_assistant.journal.reader import Reader, body_of, following, seal_of
 from action_assistant.journal.removal import STREAM, Removed, delete_some, taken_out
-from action_assistant.journal.tables import LOG, editor_head, editor_snapshot
 from action_assistant.journal.writer import Job, Outcome, Pen, Writer
+from action_assistant.schema.editor_tables import editor_head, editor_snapshot
+from action_assistant.schema.log_tables import LOG
 
 T = TypeVar("T")
 

@@ -13,7 +13,7 @@ from action_assistant.errors import Unavailable
 from action_assistant.journal.chain import NOTHING, Head
 from action_assistant.journal.database import cause_of
 from action_assistant.journal.events import Event, Snapshot
-from action_assistant.journal.tables import editor_event, editor_head, editor_snapshot
+from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
 
 T = TypeVar("T")
 

@@ -13,7 +13,7 @@ from sqlalchemy import Connection, delete, func, select
 from action_assistant.errors import Conflict
 from action_assistant.journal.chain import Head
 from action_assistant.journal.events import Event
-from action_assistant.journal.tables import editor_event, editor_snapshot
+from action_assistant.schema.editor_tables import editor_event, editor_snapshot
 
 #: The stream of all removals.
 STREAM: Final = "removed"

@@ -13,10 +13,10 @@ from sqlalchemy import Connection, Select, func, select
 from sqlalchemy.exc import DBAPIError, IntegrityError
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
-from action_assistant.journal import tables
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.database import Database, Session, cause_of
 from action_assistant.journal.events import Addition, Event, Fold
+from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
 
@@ -29,7 +29,7 @@ _TOGETHER: Final = 1000  # jobs after which no others join a transaction
 _HEAVY: Final = 16 << 20  # bytes in one statement, beyond which no other job joins
 _KNOWN: Final = 10_000  # streams whose ends are kept in memory
 _AGAIN: Final = 0.1  # seconds between attempts to find out about a commit
-_LAST: Final = select(func.coalesce(func.max(tables.editor_event.c.position), 0))
+_LAST: Final = select(func.coalesce(func.max(editor_tables.editor_event.c.position), 0))
 
 
 def now() -> int:
@@ -168,7 +168,7 @@ class Pen:
     def _head(self, stream: str) -> Head:
         head = self._heads.get(stream)
         if head is None:
-            table = tables.editor_head
+            table = editor_tables.editor_head
             found = select(table.c.seq, table.c.chain).where(table.c.stream == stream)
             row = self._session.connection.execute(found).first()
             head = self._heads[stream] = Head(*row) if row is not None else NOTHING
@@ -265,7 +265,7 @@ class Writer:
 
     def _stored(self, event: Event, chain: bytes) -> bool | None:
         """Whether an event is in the log; None when the database cannot be asked for too long."""
-        table = tables.editor_event
+        table = editor_tables.editor_event
         found = select(table.c.chain).where(table.c.position == event.position)
         until = time.monotonic() + self._database.patience
         while True:

@@ -26,7 +26,6 @@ from sqlalchemy import (
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Event
-from action_assistant.journal.tables import FAILED, review, robot, run, run_label
 from action_assistant.runner.events import (
     AlarmRaised,
     Answered,
@@ -41,6 +40,7 @@ from action_assistant.runner.events import (
 )
 from action_assistant.runner.registered import Registered, Removed
 from action_assistant.runner.review import about, again
+from action_assistant.schema.runner_tables import FAILED, review, robot, run, run_label
 
 _OPEN: Final = "open"
 

@@ -13,11 +13,11 @@ from sqlalchemy import Executable
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Event
-from action_assistant.journal.tables import expectation
 from action_assistant.runner.durations import of_visit
 from action_assistant.runner.events import Author
 from action_assistant.runner.runs import Run
 from action_assistant.runner.visits import ActionRun, Visit
+from action_assistant.schema.runner_tables import expectation
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import (

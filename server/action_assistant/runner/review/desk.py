@@ -12,7 +12,6 @@ from sqlalchemy import Row, Select, func, select
 
 from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refused, TooLarge
 from action_assistant.journal.events import Draft, Event
-from action_assistant.journal.tables import expectation, review, run, run_label
 from action_assistant.runner import recorded_runs, shapes
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import Clock, OpenRun
@@ -30,6 +29,7 @@ from action_assistant.runner.review.reel import Reels
 from action_assistant.runner.review.shelf import Archived, Shelf
 from action_assistant.runner.runs import Run
 from action_assistant.runner.workers import Crashed
+from action_assistant.schema.runner_tables import expectation, review, run, run_label
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from

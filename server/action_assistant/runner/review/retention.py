@@ -19,7 +19,6 @@ from sqlalchemy import Row, Select, exists, literal, or_, select
 from action_assistant.errors import Conflict, Refused
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.removal import Removed
-from action_assistant.journal.tables import review, run, runner_event
 from action_assistant.runner import shapes
 from action_assistant.runner.driving import Clock
 from action_assistant.runner.history import Aside
@@ -28,6 +27,7 @@ from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review import about, bundle
 from action_assistant.runner.review.raw import RawPut, stream_of_raw
 from action_assistant.runner.review.shelf import Journaled
+from action_assistant.schema.runner_tables import review, run, runner_event
 from action_assistant.settings import Keep
 
 log: Final = logging.getLogger(__name__)

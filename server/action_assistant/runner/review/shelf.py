@@ -12,11 +12,11 @@ from action_assistant.errors import Refused
 from action_assistant.journal.chain import Head
 from action_assistant.journal.events import Addition, Draft, Event, Snapshot
 from action_assistant.journal.removal import Removed
-from action_assistant.journal.tables import run
 from action_assistant.runner import shapes
 from action_assistant.runner.history import Aside
 from action_assistant.runner.review import bundle
 from action_assistant.runner.review.reel import Archive
+from action_assistant.schema.runner_tables import run
 
 _PREFIX: Final = "run/"
 _KEPT: Final = 64 << 20  # bytes of events from archives in memory
