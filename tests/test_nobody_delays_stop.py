@@ -22,7 +22,7 @@ import httpx
 import psutil
 import pytest
 
-from action_assistant.web.keys import Keys
+from action_assistant.web.auth.keys import Keys
 from runner.process import TOKEN, RunnerProcess, body, started
 from runner.world import order, sequence
 from support.hostile import long_run

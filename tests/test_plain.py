@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from action_assistant.plain import PlainLog, one_line, plain
-from action_assistant.web.keys import Keys
+from action_assistant.web.auth.keys import Keys
 from journal import servers
 from support.product import COMMAND, TOKEN, Product, free_ports
 

@@ -18,10 +18,10 @@ from action_assistant.interpreter import Interpreter, for_runner
 from action_assistant.private import opener
 from action_assistant.settings import EVERYWHERE, Reached, more_hosts
 from action_assistant.sharing import invitations_as_text, is_ours
-from action_assistant.web.addresses import addresses_of
-from action_assistant.web.certificate import Certificate
-from action_assistant.web.keys import Keys
-from action_assistant.web.listen import bound
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.network.addresses import addresses_of
+from action_assistant.web.network.certificate import Certificate
+from action_assistant.web.server.listen import bound
 
 _PATIENCE: Final = 30.0  # seconds until a start that does not answer is called failed
 _STEADY: Final = 30.0  # seconds after which a process counts as healthy again

@@ -12,8 +12,8 @@ from typing import Any, Final
 import msgspec
 import segno
 
-from action_assistant.web.keys import Keys, Proof
-from action_assistant.web.roles import may
+from action_assistant.web.auth.keys import Keys, Proof
+from action_assistant.web.auth.roles import may
 
 _ROLES: Final = ("viewer", "editor", "operator")
 _PATIENCE_S: Final = 10.0

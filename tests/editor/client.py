@@ -9,7 +9,7 @@ from action_assistant.editor import wire
 from action_assistant.editor.member import Member
 from action_assistant.editor.room import Room
 from action_assistant.editor.sameness import Fingerprint
-from action_assistant.web.keys import Person
+from action_assistant.web.auth.keys import Person
 
 
 class Client:

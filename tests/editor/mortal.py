@@ -21,7 +21,7 @@ from action_assistant.editor.rooms import Rooms
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.sqlite import SqliteSession
-from action_assistant.web.keys import Person
+from action_assistant.web.auth.keys import Person
 
 #: Where a process can die, as an edit passes through.
 POINTS: Final = (

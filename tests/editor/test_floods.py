@@ -17,7 +17,7 @@ import pytest
 from pycrdt import Doc, Map
 
 from action_assistant.editor import wire
-from action_assistant.web.crowd import AT_ONCE, OF_A_PERSON
+from action_assistant.web.network.connection_limits import AT_ONCE, OF_A_PERSON
 from editor import forge
 from editor.process import BEARER, Editor, running
 from editor.test_sockets import acks, closed, eventually, goodbye, masked, upgraded

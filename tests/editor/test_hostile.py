@@ -16,7 +16,13 @@ from action_assistant.editor.scan import outline
 from action_assistant.editor.wire import Malformed
 from action_assistant.errors import TooMany
 from action_assistant.journal.journal import Journal
-from action_assistant.web.crowd import AT_ONCE, OF_A_PERSON, OF_AN_ADDRESS, PER_MINUTE, Crowd
+from action_assistant.web.network.connection_limits import (
+    AT_ONCE,
+    OF_A_PERSON,
+    OF_AN_ADDRESS,
+    PER_MINUTE,
+    Crowd,
+)
 from editor import forge
 from editor.client import Client, settle
 

@@ -15,7 +15,7 @@ from action_assistant.editor.contents import labels_of
 from action_assistant.editor.happenings import graph_stream
 from action_assistant.settings import EditorSettings
 from action_assistant.umrf.model import Graph
-from action_assistant.web.workers import GaveUp
+from action_assistant.web.workers.lanes import GaveUp
 from editor.client import Client
 from editor.test_api import NAV
 

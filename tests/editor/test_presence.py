@@ -10,7 +10,7 @@ from action_assistant.editor import wire
 from action_assistant.editor.presence import STATE_LIMIT, Attendance, Seat, colour_of
 from action_assistant.editor.rooms import Rooms
 from action_assistant.editor.wire import Entry
-from action_assistant.web.keys import Person
+from action_assistant.web.auth.keys import Person
 from editor.client import Client, settle
 
 

@@ -11,7 +11,7 @@ from action_assistant.editor import edits
 from action_assistant.editor.app import open_house
 from action_assistant.schema import editor_tables
 from action_assistant.settings import EditorSettings
-from action_assistant.web.keys import Person
+from action_assistant.web.auth.keys import Person
 from editor.process import Editor, running
 from support.product import COMMAND, free_ports
 

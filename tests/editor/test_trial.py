@@ -13,7 +13,7 @@ from action_assistant.editor.rooms import Rooms
 from action_assistant.editor.trial import tried
 from action_assistant.errors import TooMany
 from action_assistant.journal.journal import Journal
-from action_assistant.web.workers import Crashed, GaveUp, Lane
+from action_assistant.web.workers.lanes import Crashed, GaveUp, Lane
 from editor.client import Client, settle
 from editor.test_nobody_waits import at_once
 

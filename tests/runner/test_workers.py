@@ -13,8 +13,8 @@ import pytest
 
 from action_assistant.errors import Conflict, TooLarge, TooMany, Unavailable
 from action_assistant.runner.workers import Crashed, Lane, Workers
-from action_assistant.web import access
-from action_assistant.web.access import Caller, done_for_nobody
+from action_assistant.web.auth import access
+from action_assistant.web.auth.access import Caller, done_for_nobody
 from runner.labour import devour, die, pid, refuse, spin, standing, stumble
 
 

@@ -23,7 +23,7 @@ from action_assistant.runner.runs import RunEvent
 from action_assistant.runner.seen import GraphState, NodeState
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
-from action_assistant.web.keys import Keys
+from action_assistant.web.auth.keys import Keys
 
 LONG = "long"
 _US = 1_000_000

@@ -11,7 +11,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from action_assistant.public import proxies
-from action_assistant.web.behind import Forwarded
+from action_assistant.web.server.proxy import Forwarded
 from support.product import TOKEN, Product, running
 
 ORIGIN = "https://robots.example.org"

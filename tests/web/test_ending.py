@@ -10,9 +10,9 @@ import httpx
 import pytest
 
 from action_assistant.errors import NotFound, Unavailable
-from action_assistant.web.keys import Keys, Session
-from action_assistant.web.revoked import Revoked
-from action_assistant.web.signed_in import SignedInBrowsers
+from action_assistant.web.auth.keys import Keys, Session
+from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.session_files import SignedInBrowsers
 from editor.process import running as editor_running
 from journal import servers
 from support.product import TOKEN, Product, running

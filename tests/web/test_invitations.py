@@ -19,9 +19,9 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from action_assistant.sharing import invitations_as_text
-from action_assistant.web.crowd import Pace
-from action_assistant.web.keys import Keys
-from action_assistant.web.revoked import Revoked
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.network.connection_limits import Pace
 from editor.process import Editor
 from editor.process import running as editor_running
 from support.product import COMMAND, TOKEN, Product, running

@@ -14,9 +14,9 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from action_assistant.editor import wire
-from action_assistant.web.crowd import OF_A_PERSON, OF_AN_ADDRESS
-from action_assistant.web.keys import Keys
-from action_assistant.web.roles import Deed, Role, allowed, may
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.roles import Deed, Role, allowed, may
+from action_assistant.web.network.connection_limits import OF_A_PERSON, OF_AN_ADDRESS
 from support.product import TOKEN, Product, running
 
 KEYS = Keys(TOKEN)

@@ -29,7 +29,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import database_of
 from action_assistant.schema.editor_tables import invitation
-from action_assistant.web.keys import TOKEN_FILE
+from action_assistant.web.auth.keys import TOKEN_FILE
 
 #: What archives are of, in their folder.
 _ARCHIVES: Final = ("runs", "raw")

@@ -15,8 +15,8 @@ import msgspec
 
 from action_assistant import places
 from action_assistant.errors import CannotStart
-from action_assistant.web.certificate import Certificate
-from action_assistant.web.keys import Keys
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.network.certificate import Certificate
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     import httpx

@@ -22,13 +22,14 @@ from action_assistant.journal.removal import Removed
 from action_assistant.runner.review.raw import RawPut
 from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
-from action_assistant.web import certificate, keys, revoked
+from action_assistant.web.auth import keys, revocations
+from action_assistant.web.network import certificate
 
 BRANCHES: Final[tuple[Branch, ...]] = ("editor", "runner")
 RECORDINGS: Final = "recordings"
 #: What is taken along beside journals and archives. A folder of these is put back file by file, if
 #: its files never change; the others are put back where there is none.
-MERGED: Final = frozenset({revoked.FOLDER, RECORDINGS})
+MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS})
 WHOLE: Final = frozenset({keys.TOKEN_FILE, certificate.FOLDER, "sessions", "sessions.db"})
 #: What is made anew, or belongs to this place alone.
 _OWN: Final = frozenset(

@@ -7,7 +7,7 @@ from action_assistant.commands.client import No, Server, command, print_json, re
 from action_assistant.errors import CannotStart, Refused
 from action_assistant.plain import one_line
 from action_assistant.private import own_folder
-from action_assistant.web.revoked import Revoked
+from action_assistant.web.auth.revocations import Revoked
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

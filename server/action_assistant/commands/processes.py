@@ -11,7 +11,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.plain import PlainLog
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
-    from action_assistant.web.listen import Identity
+    from action_assistant.web.server.listen import Identity
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -137,9 +137,9 @@ def _identity(
     chosen: settings.EditorSettings | settings.RunnerSettings, page_port: int
 ) -> "Identity | None":
     """The certificate of a process, with --tls."""
-    from action_assistant.web.addresses import addresses_of
-    from action_assistant.web.certificate import Certificate
-    from action_assistant.web.listen import Identity
+    from action_assistant.web.network.addresses import addresses_of
+    from action_assistant.web.network.certificate import Certificate
+    from action_assistant.web.server.listen import Identity
 
     if not chosen.tls:
         return None
@@ -150,7 +150,7 @@ def _identity(
 
 
 def _log(data: Path) -> None:
-    from action_assistant.web.keys import Keys
+    from action_assistant.web.auth.keys import Keys
 
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(PlainLog(Keys.of(data).token))
@@ -199,7 +199,7 @@ def _serve(options: argparse.Namespace) -> int:
 
 def _editor(options: argparse.Namespace) -> int:
     from action_assistant.editor.app import create_app
-    from action_assistant.web.listen import serve as listen
+    from action_assistant.web.server.listen import serve as listen
 
     data = settings.data_folder(options.data.resolve())
     _log(data)
@@ -216,7 +216,7 @@ def _editor(options: argparse.Namespace) -> int:
 
 def _runner(options: argparse.Namespace) -> int:
     from action_assistant.runner.app import create_app
-    from action_assistant.web.listen import serve as listen
+    from action_assistant.web.server.listen import serve as listen
 
     data = settings.data_folder(options.data.resolve())
     _log(data)

@@ -8,7 +8,7 @@ import httpx
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.web.keys import Keys, Proof
+from action_assistant.web.auth.keys import Keys, Proof
 
 _API: Final = "/api/"
 

@@ -36,7 +36,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.databases import database_of
 from action_assistant.schema.editor_tables import editor_event
-from action_assistant.web.keys import TOKEN_FILE
+from action_assistant.web.auth.keys import TOKEN_FILE
 
 _WORK: Final = ".restore-"
 _JOURNALS: Final = tuple(f"{branch}.db" for branch in BRANCHES)

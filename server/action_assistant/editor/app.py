@@ -20,13 +20,13 @@ from action_assistant.editor.workers import Workers
 from action_assistant.errors import BadInput
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
-from action_assistant.web.addresses import addresses_of
-from action_assistant.web.asgi import Readiness, application
-from action_assistant.web.keys import Keys
-from action_assistant.web.revoked import Revoked
-from action_assistant.web.sessions import session_routes
-from action_assistant.web.signed_in import SignedInBrowsers
-from action_assistant.web.workers import here
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.session_files import SignedInBrowsers
+from action_assistant.web.auth.sessions import session_routes
+from action_assistant.web.network.addresses import addresses_of
+from action_assistant.web.server.application import Readiness, application
+from action_assistant.web.workers.lanes import here
 
 log: Final = logging.getLogger(__name__)
 

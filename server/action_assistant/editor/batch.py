@@ -15,8 +15,8 @@ from action_assistant.editor.scan import Outline
 from action_assistant.editor.trial import TooSlow, tried
 from action_assistant.editor.wire import Malformed
 from action_assistant.errors import BadInput, Refused, TooLarge
-from action_assistant.web.access import acting_for
-from action_assistant.web.workers import Aside, Crashed
+from action_assistant.web.auth.access import acting_for
+from action_assistant.web.workers.lanes import Aside, Crashed
 
 LARGE: Final = 8 * 1024  # bytes of an update that is tried on a copy first, and by itself
 _BATCH: Final = 200  # items of one commit

@@ -18,8 +18,8 @@ from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.check import check
 from action_assistant.umrf.model import Graph
-from action_assistant.web.keys import Author
-from action_assistant.web.workers import Aside, here
+from action_assistant.web.auth.keys import Author
+from action_assistant.web.workers.lanes import Aside, here
 
 NAME_LIMIT: Final = 200  # characters
 DESCRIPTION_LIMIT: Final = 10_000

@@ -2,7 +2,7 @@
 
 from action_assistant.editor.changes import renaming, restoring
 from action_assistant.editor.room import Room
-from action_assistant.web.workers import Aside, here
+from action_assistant.web.workers.lanes import Aside, here
 
 
 async def rename(

@@ -15,7 +15,7 @@ from action_assistant.editor.kinds import UPDATED as UPDATED
 from action_assistant.editor.kinds import when as when
 from action_assistant.journal.events import Draft, Event
 from action_assistant.schema import editor_tables
-from action_assistant.web.roles import Role
+from action_assistant.web.auth.roles import Role
 
 CREATED: Final = "graph.created.v1"
 IMPORTED: Final = "graph.imported.v1"  # the body is the file as it came

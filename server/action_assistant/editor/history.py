@@ -13,7 +13,7 @@ from action_assistant.editor.people import People
 from action_assistant.editor.versions import Versions, VersionView
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
-from action_assistant.web.keys import Author
+from action_assistant.web.auth.keys import Author
 
 _ONE_GO: Final = 5 * 60  # seconds between two edits of one entry
 _CHANGES: Final = 10_000  # changes of the document that one answer looks at

@@ -12,9 +12,9 @@ from action_assistant.editor.versions import Versions
 from action_assistant.editor.workers import Workers
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
-from action_assistant.web.crowd import Crowd
-from action_assistant.web.keys import Keys
-from action_assistant.web.revoked import Revoked
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.network.connection_limits import Crowd
 
 
 class House:

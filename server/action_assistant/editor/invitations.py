@@ -30,10 +30,10 @@ from action_assistant.errors import (
 )
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
-from action_assistant.web.keys import Author, Keys
-from action_assistant.web.revoked import Revoked
-from action_assistant.web.roles import OWNER, Role
-from action_assistant.web.sessions import Invited
+from action_assistant.web.auth.keys import Author, Keys
+from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.roles import OWNER, Role
+from action_assistant.web.auth.sessions import Invited
 
 log: Final = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ from action_assistant.editor.sights import Sights
 from action_assistant.editor.uses import NOTHING, Use, merged, used
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
-from action_assistant.web.workers import HOPELESS
+from action_assistant.web.workers.lanes import HOPELESS
 
 
 class Library:

@@ -11,7 +11,7 @@ from action_assistant.editor.tail import Tail
 from action_assistant.errors import Unavailable
 from action_assistant.journal.events import Snapshot
 from action_assistant.journal.journal import Journal
-from action_assistant.web.workers import Aside, here
+from action_assistant.web.workers.lanes import Aside, here
 
 log: Final = logging.getLogger(__name__)
 

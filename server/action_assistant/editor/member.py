@@ -6,7 +6,7 @@ from typing import Final
 
 from action_assistant.editor import wire
 from action_assistant.editor.presence import News, Seat
-from action_assistant.web.keys import Author
+from action_assistant.web.auth.keys import Author
 
 WAITING_FRAMES: Final = 256
 WAITING_BYTES: Final = 1 << 20

@@ -6,7 +6,7 @@ from action_assistant.editor.happenings import EXAMPLES, NAMED, PEOPLE, SERVER, 
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
-from action_assistant.web.keys import Author
+from action_assistant.web.auth.keys import Author
 
 _OURS = {SERVER: "Action Assistant", EXAMPLES: "Examples"}
 

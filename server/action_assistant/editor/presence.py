@@ -9,7 +9,7 @@ import msgspec
 
 from action_assistant.editor import wire
 from action_assistant.editor.wire import Entry
-from action_assistant.web.keys import Author
+from action_assistant.web.auth.keys import Author
 
 STATE_LIMIT: Final = 32_768  # bytes of one client's entry
 _GONE: Final = b"null"

@@ -41,8 +41,8 @@ from action_assistant.editor.wire import Entry, Malformed
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
-from action_assistant.web.access import done_for_nobody
-from action_assistant.web.workers import Aside, here
+from action_assistant.web.auth.access import done_for_nobody
+from action_assistant.web.workers.lanes import Aside, here
 
 log: Final = logging.getLogger(__name__)
 

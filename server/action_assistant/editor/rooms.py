@@ -11,8 +11,8 @@ from action_assistant.editor.room import Room
 from action_assistant.editor.window import LENGTH, Window
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.web.access import done_for_person
-from action_assistant.web.workers import Aside, here
+from action_assistant.web.auth.access import done_for_person
+from action_assistant.web.workers.lanes import Aside, here
 
 LINGER: Final = 5.0  # seconds that a room stays after the last one left
 _TICK: Final = 2.0  # seconds

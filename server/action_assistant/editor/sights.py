@@ -15,7 +15,7 @@ from action_assistant.editor.replica import Kept
 from action_assistant.editor.rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.web.workers import HOPELESS, Aside, Crashed, here
+from action_assistant.web.workers.lanes import HOPELESS, Aside, Crashed, here
 
 log: Final = logging.getLogger(__name__)
 

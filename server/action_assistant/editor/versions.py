@@ -14,7 +14,7 @@ from action_assistant.errors import BadInput, NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.files import codec
-from action_assistant.web.keys import Author
+from action_assistant.web.auth.keys import Author
 
 LABEL_LIMIT: Final = 200  # characters
 

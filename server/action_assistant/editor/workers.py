@@ -8,11 +8,11 @@ from typing import Any, Final
 import msgspec
 from anyio import CapacityLimiter
 
-from action_assistant.web.workers import Lane, kept_warm
+from action_assistant.web.workers.lanes import Lane, kept_warm
 
 #: What the server process has imported before it forks anybody.
 _PRELOADED: Final = (
-    "action_assistant.web.hands",
+    "action_assistant.web.workers.child_process",
     "action_assistant.editor.folding",
     "action_assistant.editor.importing",
     "action_assistant.editor.rehearsal",

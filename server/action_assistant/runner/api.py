@@ -35,8 +35,8 @@ from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.review.stored import Asked, json_of
 from action_assistant.runner.runs import Run, State
 from action_assistant.runner.steering import RestRequest
-from action_assistant.web.access import Needs, person_of, refuse, require
-from action_assistant.web.crowd import Crowd, Turns
+from action_assistant.web.auth.access import Needs, person_of, refuse, require
+from action_assistant.web.network.connection_limits import Crowd, Turns
 
 _PAGE: Final = 500  # events read at once
 _BODIES: Final = 4  # large ones of a person at a time

@@ -30,12 +30,12 @@ from action_assistant.runner.review.stored import Asked, Place
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.workers import Workers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
-from action_assistant.web.addresses import addresses_of
-from action_assistant.web.asgi import Readiness, application
-from action_assistant.web.crowd import Crowd
-from action_assistant.web.keys import Keys
-from action_assistant.web.revoked import Revoked
-from action_assistant.web.sessions import revocation
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.sessions import revocation
+from action_assistant.web.network.addresses import addresses_of
+from action_assistant.web.network.connection_limits import Crowd
+from action_assistant.web.server.application import Readiness, application
 
 #: For so long (seconds) a thread may keep the interpreter to itself while the loop waits for it.
 _SWITCH_S: Final = 0.0005

@@ -11,8 +11,8 @@ from litestar.connection import ASGIConnection
 
 from action_assistant.errors import Unavailable
 from action_assistant.runner.events import Author
-from action_assistant.web.access import person_of, session_of
-from action_assistant.web.crowd import Turns
+from action_assistant.web.auth.access import person_of, session_of
+from action_assistant.web.network.connection_limits import Turns
 
 #: Bytes of a body that carries a graph: 5,000 actions, the most that the editor takes, are 1.2 MB.
 LARGE: Final = 2_000_000

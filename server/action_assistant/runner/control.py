@@ -31,7 +31,7 @@ from action_assistant.runner.robots import Ground, Robots
 from action_assistant.runner.runs import Run
 from action_assistant.runner.starting import Cleared, Grouped, GroupRequest, Started, Starting
 from action_assistant.runner.stragglers import Stragglers
-from action_assistant.web.access import done_for_nobody
+from action_assistant.web.auth.access import done_for_nobody
 
 log: Final = logging.getLogger(__name__)
 

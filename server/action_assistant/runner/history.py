@@ -11,7 +11,7 @@ from action_assistant.journal.events import Event
 from action_assistant.runner.events import ModifyRequested, Requested, RunEvent, decode
 from action_assistant.runner.recorder import Store, stream_of
 from action_assistant.runner.runs import Run, replay
-from action_assistant.web.workers import Aside
+from action_assistant.web.workers.lanes import Aside
 
 __all__ = ["Aside", "History", "Ledger", "Past"]
 

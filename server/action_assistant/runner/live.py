@@ -26,7 +26,7 @@ from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.events import Author
 from action_assistant.runner.registered import Robot
 from action_assistant.runner.runs import Run
-from action_assistant.web.access import session_of
+from action_assistant.web.auth.access import session_of
 
 log: Final = logging.getLogger(__name__)
 

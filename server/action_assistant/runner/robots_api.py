@@ -29,8 +29,8 @@ from action_assistant.runner.registered import Robot
 from action_assistant.runner.starting import read_group
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Signature
-from action_assistant.web.access import Needs
-from action_assistant.web.crowd import Turns
+from action_assistant.web.auth.access import Needs
+from action_assistant.web.network.connection_limits import Turns
 
 _EVENTS: Final = 200
 _Asking = Request[Any, Any, Any]

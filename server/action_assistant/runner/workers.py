@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from anyio import CapacityLimiter
 
-from action_assistant.web import workers
-from action_assistant.web.workers import Crashed, Lane, kept_warm
+from action_assistant.web.workers import lanes as workers
+from action_assistant.web.workers.lanes import Crashed, Lane, kept_warm
 
 __all__ = ["Crashed", "Lane", "Workers", "child"]
 

@@ -20,8 +20,8 @@ from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.version import VERSION
-from action_assistant.web.addresses import Addresses
-from action_assistant.web.keys import Author
+from action_assistant.web.auth.keys import Author
+from action_assistant.web.network.addresses import Addresses
 
 _SILENCE: Final = 10.0  # seconds after which a listener is told that we are still here
 

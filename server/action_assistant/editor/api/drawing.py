@@ -10,8 +10,8 @@ from action_assistant.editor.house import Door
 from action_assistant.editor.importing import Pieces
 from action_assistant.editor.rehearsal import Rehearsal, Rehearsing, rehearsed
 from action_assistant.editor.workers import encoded
-from action_assistant.web.access import Needs
-from action_assistant.web.asgi import BODY_LIMIT
+from action_assistant.web.auth.access import Needs
+from action_assistant.web.server.application import BODY_LIMIT
 
 _SCRIPT: Final = 1_000_000  # bytes of a body that says what to play
 

@@ -17,8 +17,8 @@ from action_assistant.editor.rewriting import Rewriting, rewritten
 from action_assistant.editor.workers import encoded
 from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.model import Problem
-from action_assistant.web.access import Needs, person_of
-from action_assistant.web.asgi import BODY_LIMIT
+from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.server.application import BODY_LIMIT
 
 Asking = Request[Any, Any, Any]
 Seq = Annotated[int, Parameter(ge=1)]

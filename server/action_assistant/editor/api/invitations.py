@@ -12,10 +12,10 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.editor.house import Door
 from action_assistant.editor.invitations import Invitation
 from action_assistant.errors import BadInput, Conflict
-from action_assistant.web.access import Needs, person_of
-from action_assistant.web.addresses import Addresses
-from action_assistant.web.keys import Author
-from action_assistant.web.signed_in import OpenSession, SignedInBrowsers
+from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.keys import Author
+from action_assistant.web.auth.session_files import OpenSession, SignedInBrowsers
+from action_assistant.web.network.addresses import Addresses
 
 
 class Sharing(msgspec.Struct, frozen=True):

@@ -15,8 +15,8 @@ from action_assistant.editor.house import Door
 from action_assistant.editor.member import Member
 from action_assistant.editor.room import Room
 from action_assistant.errors import Refused
-from action_assistant.web.access import person_of, plain, refuse
-from action_assistant.web.roles import allowed
+from action_assistant.web.auth.access import person_of, plain, refuse
+from action_assistant.web.auth.roles import allowed
 
 log: Final = logging.getLogger(__name__)
 

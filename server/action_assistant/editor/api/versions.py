@@ -8,7 +8,7 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.house import Door
 from action_assistant.editor.versions import VersionView
-from action_assistant.web.access import Needs, person_of
+from action_assistant.web.auth.access import Needs, person_of
 
 
 class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

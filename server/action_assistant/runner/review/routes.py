@@ -26,8 +26,8 @@ from action_assistant.runner.review.raw import Raw
 from action_assistant.runner.review.retention import Retention, Swept
 from action_assistant.runner.review.statistics import Statistics
 from action_assistant.runner.review.stored import Asked, json_of
-from action_assistant.web.access import Needs
-from action_assistant.web.crowd import Turns
+from action_assistant.web.auth.access import Needs
+from action_assistant.web.network.connection_limits import Turns
 
 _Asking = Request[Any, Any, Any]
 _TYPES: Final[dict[str, str]] = {

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final
 
 from action_assistant.errors import Unavailable
-from action_assistant.web.keys import Session
+from action_assistant.web.auth.keys import Session
 
 log: Final = logging.getLogger(__name__)
 

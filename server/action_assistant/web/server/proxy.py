@@ -19,7 +19,7 @@ from litestar.types import (
 
 from action_assistant.errors import Misrouted
 from action_assistant.public import RUNNER, Network
-from action_assistant.web.access import Needs
+from action_assistant.web.auth.access import Needs
 
 #: Under this name the state of a request has the path at which the page lies for whoever asks.
 MOUNT: Final = "mount"

@@ -11,14 +11,20 @@ from litestar.params import JSONBody
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, TooMany, Unauthenticated, Unavailable
-from action_assistant.web.access import Needs, cookie_name, known_person, live_session, session_of
-from action_assistant.web.addresses import Addresses
-from action_assistant.web.crowd import Pace
-from action_assistant.web.keys import SESSION_SECONDS, Author, Keys, Person, Session
-from action_assistant.web.problems import PROBLEM_JSON, problem_of
-from action_assistant.web.revoked import Revoked
-from action_assistant.web.roles import Role, rank
-from action_assistant.web.signed_in import SignedInBrowsers
+from action_assistant.web.auth.access import (
+    Needs,
+    cookie_name,
+    known_person,
+    live_session,
+    session_of,
+)
+from action_assistant.web.auth.keys import SESSION_SECONDS, Author, Keys, Person, Session
+from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.roles import Role, rank
+from action_assistant.web.auth.session_files import SignedInBrowsers
+from action_assistant.web.http.problems import PROBLEM_JSON, problem_of
+from action_assistant.web.network.addresses import Addresses
+from action_assistant.web.network.connection_limits import Pace
 
 _BODY: Final = 10_000  # bytes; strangers send it
 _NAME: Final = 60  # characters

@@ -16,8 +16,8 @@ import msgspec
 
 from action_assistant.errors import NotFound
 from action_assistant.private import opener
-from action_assistant.web.keys import SESSION_SECONDS, Person, Session
-from action_assistant.web.revoked import Revoked
+from action_assistant.web.auth.keys import SESSION_SECONDS, Person, Session
+from action_assistant.web.auth.revocations import Revoked
 
 log: Final = logging.getLogger(__name__)
 

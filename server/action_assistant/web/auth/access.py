@@ -23,12 +23,12 @@ from action_assistant.errors import (
     WrongHost,
     WrongOrigin,
 )
-from action_assistant.web import cookies
-from action_assistant.web.addresses import Addresses
-from action_assistant.web.keys import Keys, Person, Session
-from action_assistant.web.problems import problem_of
-from action_assistant.web.revoked import SESSION_ENDED, Leashes, Revoked
-from action_assistant.web.roles import OWNER, Deed, allowed, may
+from action_assistant.web.auth.keys import Keys, Person, Session
+from action_assistant.web.auth.revocations import SESSION_ENDED, Leashes, Revoked
+from action_assistant.web.auth.roles import OWNER, Deed, allowed, may
+from action_assistant.web.http import cookies
+from action_assistant.web.http.problems import problem_of
+from action_assistant.web.network.addresses import Addresses
 
 log: Final = logging.getLogger(__name__)
 

@@ -22,10 +22,10 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from action_assistant.errors import BadInput, CannotStart
 from action_assistant.public import Network
 from action_assistant.settings import EVERYWHERE
-from action_assistant.web.access import KNOWN
-from action_assistant.web.behind import Forwarded
-from action_assistant.web.certificate import Certificate
-from action_assistant.web.connections import Connections, raise_limit
+from action_assistant.web.auth.access import KNOWN
+from action_assistant.web.network.certificate import Certificate
+from action_assistant.web.network.connections import Connections, raise_limit
+from action_assistant.web.server.proxy import Forwarded
 
 log: Final = logging.getLogger(__name__)
 

@@ -19,8 +19,8 @@ import anyio
 from anyio import CapacityLimiter, to_thread
 
 from action_assistant.errors import TooLarge, TooMany, Unavailable
-from action_assistant.web.access import Caller, caller
-from action_assistant.web.hands import LAST, child, serve, wire
+from action_assistant.web.auth.access import Caller, caller
+from action_assistant.web.workers.child_process import LAST, child, serve, wire
 
 __all__ = ["HOPELESS", "Aside", "Crashed", "GaveUp", "Lane", "child", "here", "kept_warm"]
 

@@ -18,14 +18,14 @@ from litestar.routes import HTTPRoute
 from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive, Scope, Send
 
 from action_assistant.version import VERSION
-from action_assistant.web.access import Access, Needs, require
-from action_assistant.web.addresses import Addresses, host_name
-from action_assistant.web.behind import MOUNT, Mounted, misrouted
-from action_assistant.web.keys import Keys, Proof
-from action_assistant.web.page import Page
-from action_assistant.web.problems import problem_handlers
-from action_assistant.web.revoked import Revoked
-from action_assistant.web.roles import Deed
+from action_assistant.web.auth.access import Access, Needs, require
+from action_assistant.web.auth.keys import Keys, Proof
+from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.roles import Deed
+from action_assistant.web.http.page import Page
+from action_assistant.web.http.problems import problem_handlers
+from action_assistant.web.network.addresses import Addresses, host_name
+from action_assistant.web.server.proxy import MOUNT, Mounted, misrouted
 
 log: Final = logging.getLogger(__name__)
 

@@ -19,7 +19,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.web.roles import OWNER, Role
+from action_assistant.web.auth.roles import OWNER, Role
 
 TOKEN_FILE: Final = "token"
 SESSION_SECONDS: Final = 30 * 24 * 3600
