@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.plain import PlainLog, one_line, plain
+from action_assistant.safe_text import PlainLog, one_line, plain
 from action_assistant.web.auth.keys import Keys
 from journal import servers
 from support.product import COMMAND, TOKEN, Product, free_ports

@@ -16,7 +16,7 @@ import pytest
 
 from action_assistant.errors import CannotStart
 from action_assistant.journal.lock import own
-from action_assistant.private import holds_nothing_else, open_to_others, own_folder
+from action_assistant.private_files import holds_nothing_else, open_to_others, own_folder
 from support.product import COMMAND, running
 
 _NOBODY: Final = 65534

@@ -5,7 +5,7 @@ import ipaddress
 import pytest
 
 from action_assistant.errors import CannotStart
-from action_assistant.public import LOOPBACK_PROXIES, Public, proxies, public_url
+from action_assistant.public_url import LOOPBACK_PROXIES, Public, proxies, public_url
 from action_assistant.settings import EVERYWHERE, check_host, reached
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 import pytest
 
-from action_assistant.serve import Enough
+from action_assistant.supervisor import Enough
 from support.product import Product, running
 
 

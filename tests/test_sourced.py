@@ -10,7 +10,7 @@ import pytest
 
 from action_assistant import interpreter
 from action_assistant.interpreter import for_runner, rclpy_fits
-from action_assistant.sourced import Workspace
+from action_assistant.ros_workspace import Workspace
 
 HERE = f"python{sys.version_info.major}.{sys.version_info.minor}"
 ENDING = importlib.machinery.EXTENSION_SUFFIXES[0]
@@ -133,7 +133,7 @@ def test_a_workspace_comes_before_the_environment_of_make_ros(
     from test_interpreter import wheels_of
 
     wheels = wheels_of(tmp_path, b"rclpy==1\n")
-    monkeypatch.setattr(interpreter.places, "wheels", lambda: wheels)
+    monkeypatch.setattr(interpreter.paths, "wheels", lambda: wheels)
     asked = environ(prefix(tmp_path / "ros", "rclpy"))
     assert for_runner(asked).origin == "this"
     assert for_runner({}).origin == "wheels"
@@ -143,7 +143,7 @@ def test_a_workspace_comes_before_the_environment_of_make_ros(
 def test_a_workspace_for_another_python_is_named_with_the_way_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(interpreter.places, "wheels", lambda: None)
+    monkeypatch.setattr(interpreter.paths, "wheels", lambda: None)
     asked = environ(prefix(tmp_path / "ros", "rclpy", python="python3.99"), python="python3.99")
     found = for_runner(asked)
     assert found.origin == "this"

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from action_assistant.errors import CannotStart
-from action_assistant.plain import make_streams_plain
+from action_assistant.safe_text import make_streams_plain
 from action_assistant.settings import check_environment, hide_password
 from action_assistant.version import VERSION
 
@@ -19,9 +19,9 @@ _MODULES: Final = (
     "files",
     "remote",
     "people",
-    "practice",
+    "simulate_robot",
     "maintenance",
-    "backup",
+    "backups.backup",
     "doctor",
 )
 #: Commands that are started often, and need nothing of the other modules.
@@ -32,7 +32,7 @@ _ALONE: Final[Mapping[str, str]] = {
     "check": "files",
     "convert": "files",
     "simulate": "files",
-    "simulate-robot": "practice",
+    "simulate-robot": "simulate_robot",
 }
 
 

@@ -10,8 +10,8 @@ from urllib.parse import urlsplit
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.private import own_folder
-from action_assistant.public import LOOPBACK_PROXIES, Network, Public, proxies, public_url
+from action_assistant.private_files import own_folder
+from action_assistant.public_url import LOOPBACK_PROXIES, Network, Public, proxies, public_url
 
 #: Every variable that this program reads, and what it is for.
 VARIABLES: Final[Mapping[str, str]] = {

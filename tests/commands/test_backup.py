@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.commands import backup
+from action_assistant.commands.backups import backup
 from action_assistant.editor import happenings as h
 from action_assistant.editor.app import open_house
 from action_assistant.errors import CannotStart

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from action_assistant import cli
-from action_assistant.commands.practice import _index, _texts
+from action_assistant.commands.simulate_robot import _index, _texts
 from action_assistant.runner.links import why_not
 from action_assistant.umrf.files import codec
 from runner.world import sequence

@@ -17,10 +17,10 @@ from typing import Any, Final
 import pytest
 
 from action_assistant import settings
-from action_assistant.commands import backup, restore
-from action_assistant.commands.backup_file import Package
-from action_assistant.commands.data_folder import checked
-from action_assistant.commands.progress import Progress
+from action_assistant.commands.backups import backup, restore
+from action_assistant.commands.backups.backup_file import Package
+from action_assistant.commands.backups.data_folder import checked
+from action_assistant.commands.backups.progress import Progress
 from action_assistant.editor import happenings as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch

@@ -15,7 +15,7 @@ from typing import Any
 import anyio
 import msgspec
 
-from action_assistant.places import examples
+from action_assistant.paths import examples
 from action_assistant.runner import recorded_runs
 from action_assistant.runner.control import Control
 from action_assistant.runner.events import Author, Override

@@ -10,7 +10,7 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from action_assistant.public import proxies
+from action_assistant.public_url import proxies
 from action_assistant.web.server.proxy import Forwarded
 from support.product import TOKEN, Product, running
 

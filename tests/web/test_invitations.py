@@ -18,7 +18,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from action_assistant.sharing import invitations_as_text
+from action_assistant.share_links import invitations_as_text
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.revocations import Revoked
 from action_assistant.web.network.connection_limits import Pace

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from action_assistant import places, settings
+from action_assistant import paths, settings
 from action_assistant.commands.client import No, Server, command, refused, running
 from action_assistant.errors import CannotStart, Refused
 
@@ -32,7 +32,7 @@ def add_to(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     )
     restore.add_argument("files", type=Path, nargs="+", metavar="FILE")
     restore.add_argument(
-        "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
+        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
     )
     restore.set_defaults(deed=_restore)
 

@@ -19,7 +19,8 @@ import msgspec
 from sqlalchemy import create_engine
 from sqlalchemy.exc import DBAPIError
 
-from action_assistant import places, settings
+from action_assistant import paths as places
+from action_assistant import settings
 from action_assistant.commands.processes import port_number
 from action_assistant.editor import location
 from action_assistant.errors import CannotStart
@@ -27,12 +28,12 @@ from action_assistant.interpreter import for_runner
 from action_assistant.journal.database import cause_of
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.migrate import recognize
-from action_assistant.plain import one_line
-from action_assistant.private import holds_nothing_else, open_to_others, prove_writable
+from action_assistant.private_files import holds_nothing_else, open_to_others, prove_writable
 from action_assistant.runner import archive
 from action_assistant.runner.links.findings import Finding, Verdict
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2_checkup import look
+from action_assistant.safe_text import one_line
 from action_assistant.settings import reached
 from action_assistant.version import VERSION
 from action_assistant.web.auth.access import REFUSED_SOCKET

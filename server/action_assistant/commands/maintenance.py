@@ -5,7 +5,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
-from action_assistant import places, settings
+from action_assistant import paths, settings
 from action_assistant.errors import CannotStart, Unavailable
 from action_assistant.journal.chain import Damage
 from action_assistant.journal.database import Branch
@@ -35,7 +35,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
 
 def _where(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
+        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
     )
     parser.add_argument(
         "--database",

@@ -5,8 +5,8 @@ from typing import Any
 
 from action_assistant.commands.client import No, Server, command, print_json, refused, running
 from action_assistant.errors import CannotStart, Refused
-from action_assistant.plain import one_line
-from action_assistant.private import own_folder
+from action_assistant.private_files import own_folder
+from action_assistant.safe_text import one_line
 from action_assistant.web.auth.revocations import Revoked
 
 

@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from action_assistant import places, settings
+from action_assistant import paths, settings
 from action_assistant.errors import CannotStart
-from action_assistant.plain import PlainLog
+from action_assistant.safe_text import PlainLog
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     from action_assistant.web.server.listen import Identity
@@ -57,7 +57,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         help="bring the databases of a data folder to this version",
         epilog="example: action-assistant migrate --data ./data",
     )
-    migrate.add_argument("--data", type=Path, default=places.data(), metavar="DIR")
+    migrate.add_argument("--data", type=Path, default=paths.data(), metavar="DIR")
     _database(migrate)
     migrate.set_defaults(deed=_migrate)
 
@@ -71,7 +71,7 @@ def port_number(text: str) -> int:
 
 def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
     parser.add_argument(
-        "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
+        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
     )
     parser.add_argument(
         "--host",
@@ -176,7 +176,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
 
 
 def _serve(options: argparse.Namespace) -> int:
-    from action_assistant.serve import Plan, serve
+    from action_assistant.supervisor import Plan, serve
 
     if options.port == 65535:
         raise CannotStart("The runner needs the port after --port; 65535 has none.")

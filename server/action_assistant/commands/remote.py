@@ -12,7 +12,7 @@ import msgspec
 from action_assistant.commands import archives
 from action_assistant.commands.client import No, Server, command, print_json, refused, running
 from action_assistant.errors import CannotStart
-from action_assistant.plain import one_line
+from action_assistant.safe_text import one_line
 
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _POLL: Final = 0.2  # seconds
@@ -140,7 +140,7 @@ def _graphs(options: argparse.Namespace) -> int:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    from action_assistant.commands.expected import verify
+    from action_assistant.commands.verify_runs import verify
 
     return verify(options)
 

@@ -10,7 +10,7 @@ import anyio
 from litestar import Litestar
 from litestar.types import ASGIApp
 
-from action_assistant import places
+from action_assistant import paths
 from action_assistant.editor import epochs, location
 from action_assistant.editor import happenings as h
 from action_assistant.editor.api import about, drawing, graphs, invitations, room, versions
@@ -52,7 +52,7 @@ async def open_house(
             try:
                 async with house.invitations.opened():
                     if new:
-                        await _greet(house, places.examples())
+                        await _greet(house, paths.examples())
                     yield house
             finally:
                 await house.rooms.close()
@@ -114,7 +114,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         lifespan=[lifespan],
         ready=ready,
         measures=lambda: _measures(door.house),
-        page=places.page(),
+        page=paths.page(),
         runner_port=settings.runner_port,
         mount=settings.reached.public.path if settings.reached.public is not None else "",
         body_limit=SMALL,

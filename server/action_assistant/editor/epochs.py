@@ -19,7 +19,7 @@ from sqlalchemy import select
 from action_assistant.editor import happenings as h
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.private import opener
+from action_assistant.private_files import opener
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, MetaData, inspect
 
-from action_assistant import places
+from action_assistant import paths
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch as Branch
 from action_assistant.journal.events import Event
@@ -30,7 +30,7 @@ logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in o
 
 def config_for(connection: Connection, branch: Branch) -> Config:
     """Alembic's configuration, pointed at our scripts and at a connection that is open."""
-    folder = places.migrations()
+    folder = paths.migrations()
     config = Config(attributes={"connection": connection, "metadata": BRANCHES[branch]})
     config.set_main_option("script_location", str(folder).replace("%", "%%"))
     config.set_main_option("version_path_separator", "newline")

@@ -13,7 +13,7 @@ from litestar.types import ASGIApp
 
 from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
-from action_assistant.public import RUNNER
+from action_assistant.public_url import RUNNER
 from action_assistant.runner import archive
 from action_assistant.runner.api import House, routes
 from action_assistant.runner.asking import SMALL

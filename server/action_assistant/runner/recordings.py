@@ -18,7 +18,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import NotFound
-from action_assistant.private import make_folder, opener
+from action_assistant.private_files import make_folder, opener
 from action_assistant.runner.history import Aside
 from action_assistant.runner.links.port import Answer, Feedback
 from action_assistant.runner.seen import Snapshot

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from action_assistant.journal.events import Draft
-from action_assistant.places import examples
+from action_assistant.paths import examples
 from action_assistant.runner import recorded_runs
 from action_assistant.runner.events import (
     AlarmRaised,

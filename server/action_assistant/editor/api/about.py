@@ -11,7 +11,7 @@ from litestar import Request, get
 from litestar.response import ServerSentEvent, ServerSentEventMessage
 from litestar.types import ControllerRouterHandler
 
-from action_assistant import places
+from action_assistant import paths
 from action_assistant.editor import happenings as h
 from action_assistant.editor.house import Door
 from action_assistant.editor.presence import colour_of
@@ -82,7 +82,7 @@ def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         operation_id="listExamples",
     )
     async def list_examples() -> list[Example]:
-        files = [path async for path in anyio.Path(places.examples()).glob("*.umrf.graph.json")]
+        files = [path async for path in anyio.Path(paths.examples()).glob("*.umrf.graph.json")]
         return [
             Example(
                 path.name.removesuffix(".umrf.graph.json"), msgspec.Raw(await path.read_bytes())

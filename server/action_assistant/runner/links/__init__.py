@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from action_assistant import sourced
+from action_assistant import ros_workspace
 from action_assistant.runner.links.port import Reach
 
 #: The fields of a start, in the order engines read them.
@@ -36,10 +36,10 @@ def ros2_reach(wall: Callable[[], int], environ: Mapping[str, str] = os.environ)
 def why_not(environ: Mapping[str, str] = os.environ) -> str:
     """Why this interpreter cannot speak ROS 2; empty when it can."""
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    sourced.offer(environ)
+    ros_workspace.offer(environ)
     if importlib.util.find_spec("rclpy") is None:
         return (
-            sourced.Workspace.of(environ).other_python()
+            ros_workspace.Workspace.of(environ).other_python()
             or f"rclpy is not there for this Python ({version}, {sys.executable}): {_MAKE}."
         )
     rmw = environ.get("RMW_IMPLEMENTATION", "")

@@ -11,7 +11,7 @@ from typing import Final
 
 import anyio
 
-from action_assistant import sourced
+from action_assistant import ros_workspace
 from action_assistant.runner.links import ros2_reach
 from action_assistant.runner.links.findings import Finding, Verdict
 from action_assistant.runner.links.port import (
@@ -170,7 +170,7 @@ def _name(uid: int) -> str:
 def _origin(module: str) -> str:
     """Where a package of ROS 2 comes from, for people."""
     place = getattr(importlib.import_module(module), "__file__", None)
-    return sourced.prefix_of(place) if place else "an unknown place"
+    return ros_workspace.prefix_of(place) if place else "an unknown place"
 
 
 async def _robots(reach: Reach, robots: Sequence[Registration]) -> list[Finding]:

@@ -19,7 +19,7 @@ import msgspec
 from action_assistant.errors import Refused
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.events import Event
-from action_assistant.private import make_folder, opener
+from action_assistant.private_files import make_folder, opener
 from action_assistant.version import VERSION
 
 _FORMAT: Final = 1

@@ -11,7 +11,7 @@ from litestar.params import Parameter
 from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 
-from action_assistant import places
+from action_assistant import paths
 from action_assistant.errors import BadInput
 from action_assistant.runner import recorded_runs
 from action_assistant.runner.admission import decoded
@@ -180,7 +180,7 @@ def _of_many(house: Has) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def take_in_examples(request: _Asking) -> list[str]:
-        texts = await to_thread.run_sync(recorded_runs.shipped, places.examples())
+        texts = await to_thread.run_sync(recorded_runs.shipped, paths.examples())
         return await house.desk.take_in(texts, author_of(request))
 
     return [comparison, statistics, take_in_examples]

@@ -15,7 +15,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.errors import NotFound
-from action_assistant.private import opener
+from action_assistant.private_files import opener
 from action_assistant.web.auth.keys import SESSION_SECONDS, Person, Session
 from action_assistant.web.auth.revocations import Revoked
 

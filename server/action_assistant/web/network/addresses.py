@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 import ifaddr
 
-from action_assistant.public import Public
+from action_assistant.public_url import Public
 from action_assistant.settings import EVERYWHERE, LOOPBACK
 
 _ANYWHERE: Final = frozenset({"0.0.0.0", "::", EVERYWHERE})

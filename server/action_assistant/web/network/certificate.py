@@ -21,7 +21,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from action_assistant.errors import CannotStart
-from action_assistant.private import opener
+from action_assistant.private_files import opener
 
 FOLDER: Final = "tls"
 _AUTHORITY_DAYS: Final = 3650

@@ -20,7 +20,7 @@ from litestar.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from action_assistant.errors import BadInput, CannotStart
-from action_assistant.public import Network
+from action_assistant.public_url import Network
 from action_assistant.settings import EVERYWHERE
 from action_assistant.web.auth.access import KNOWN
 from action_assistant.web.network.certificate import Certificate

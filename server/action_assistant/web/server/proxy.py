@@ -18,7 +18,7 @@ from litestar.types import (
 )
 
 from action_assistant.errors import Misrouted
-from action_assistant.public import RUNNER, Network
+from action_assistant.public_url import RUNNER, Network
 from action_assistant.web.auth.access import Needs
 
 #: Under this name the state of a request has the path at which the page lies for whoever asks.

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from action_assistant.errors import TooLarge
-from action_assistant.plain import make_streams_plain
+from action_assistant.safe_text import make_streams_plain
 
 _MEMORY: Final = 768 << 20  # bytes that a worker may take beyond what it begins with
 _TIRED: Final = 256 << 20  # bytes in use after which a worker makes room for a fresh one

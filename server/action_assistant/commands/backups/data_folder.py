@@ -11,7 +11,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row, Select, select
 
-from action_assistant.commands.progress import Progress
+from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copying import sentence
 from action_assistant.journal.database import Branch

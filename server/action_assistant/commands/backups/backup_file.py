@@ -16,7 +16,7 @@ from typing import IO, Final
 
 import msgspec
 
-from action_assistant.commands.progress import Progress
+from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.version import VERSION

@@ -10,10 +10,10 @@ from typing import Final
 
 from sqlalchemy import make_url, select
 
-from action_assistant import places, settings
-from action_assistant.commands import restore
-from action_assistant.commands.backup_file import ARCHIVE, FILES, Copied, Packer, about_now
-from action_assistant.commands.data_folder import (
+from action_assistant import paths, settings
+from action_assistant.commands.backups import restore
+from action_assistant.commands.backups.backup_file import ARCHIVE, FILES, Copied, Packer, about_now
+from action_assistant.commands.backups.data_folder import (
     archived,
     belongings,
     checked,
@@ -24,7 +24,7 @@ from action_assistant.commands.data_folder import (
     tables_copied,
     workshop,
 )
-from action_assistant.commands.progress import Progress
+from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import database_of
@@ -53,7 +53,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     for command in (backup, back):
         command.add_argument("file", type=Path, metavar="FILE")
         command.add_argument(
-            "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
+            "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
         )
     backup.add_argument(
         "--database",

@@ -12,9 +12,9 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.plain import one_line
 from action_assistant.runner.standin_engine import StandIn
 from action_assistant.runner.standin_wire import Gone, Index, Line, Quirks, Said, index_of
+from action_assistant.safe_text import one_line
 from action_assistant.umrf.facts import PINNED, facts_for
 from action_assistant.umrf.semantics import Script, script_from
 

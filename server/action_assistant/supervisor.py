@@ -15,9 +15,9 @@ from typing import Final
 import msgspec
 
 from action_assistant.interpreter import Interpreter, for_runner
-from action_assistant.private import opener
+from action_assistant.private_files import opener
 from action_assistant.settings import EVERYWHERE, Reached, more_hosts
-from action_assistant.sharing import invitations_as_text, is_ours
+from action_assistant.share_links import invitations_as_text, is_ours
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.network.certificate import Certificate

@@ -4,7 +4,7 @@ import sys
 import time
 from typing import Final
 
-from action_assistant.plain import plain
+from action_assistant.safe_text import plain
 
 _EVERY: Final = 1.0  # seconds
 

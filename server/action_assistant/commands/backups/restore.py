@@ -19,8 +19,8 @@ import msgspec
 from sqlalchemy import Connection, inspect, select
 
 from action_assistant import settings
-from action_assistant.commands.backup_file import FILES, About, Package, sha256_of, sync
-from action_assistant.commands.data_folder import (
+from action_assistant.commands.backups.backup_file import FILES, About, Package, sha256_of, sync
+from action_assistant.commands.backups.data_folder import (
     ASIDE,
     BRANCHES,
     MERGED,
@@ -31,7 +31,7 @@ from action_assistant.commands.data_folder import (
     rows_of,
     workshop,
 )
-from action_assistant.commands.progress import Progress
+from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.databases import database_of
