@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pycrdt import Doc, Map
 
-from action_assistant.editor import document
+from action_assistant.editor.documents import document
 from action_assistant.umrf.check import check
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from action_assistant.commands.backups import backup
-from action_assistant.editor import happenings as h
 from action_assistant.editor.app import open_house
+from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings

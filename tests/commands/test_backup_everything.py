@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.editor import happenings as h
+from action_assistant.editor.log import graph_events as h
 from action_assistant.journal.events import Event
 from action_assistant.journal.journal import Journal
 from action_assistant.runner.archive import fold as runner_fold

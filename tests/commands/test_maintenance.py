@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from action_assistant.commands import maintenance
-from action_assistant.editor import happenings as h
+from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.journal import Journal
 

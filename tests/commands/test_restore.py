@@ -21,7 +21,7 @@ from action_assistant.commands.backups import backup, restore
 from action_assistant.commands.backups.backup_file import Package
 from action_assistant.commands.backups.data_folder import checked
 from action_assistant.commands.backups.progress import Progress
-from action_assistant.editor import happenings as h
+from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Draft, Fold

@@ -10,9 +10,9 @@ import time
 
 from pycrdt import Map
 
-from action_assistant.editor import document
-from action_assistant.editor.replica import Panicked, Replica
-from action_assistant.editor.wire import Malformed
+from action_assistant.editor.crdt.messages import Malformed
+from action_assistant.editor.crdt.replica import Panicked, Replica
+from action_assistant.editor.documents import document
 
 
 def fate(base: bytes, update: bytes) -> str:

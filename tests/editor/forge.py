@@ -1,6 +1,6 @@
 """Yjs updates that no client makes."""
 
-from action_assistant.editor.wire import number, text
+from action_assistant.editor.crdt.messages import number, text
 
 
 def entry(client: int, clock: int, key: str, value: str, *, root: str = "things") -> bytes:

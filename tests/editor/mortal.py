@@ -14,10 +14,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from action_assistant.editor import wire
-from action_assistant.editor.member import Member
-from action_assistant.editor.room import Room
-from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.rooms.member import Member
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.room import Room
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.sqlite import SqliteSession
@@ -122,7 +122,7 @@ async def serve(folder: Path, stream: str, trap: Trap) -> None:
             room.join(member)
             speaking = asyncio.create_task(_speak(pipe, member, trap))
             with contextlib.suppress(asyncio.IncompleteReadError, ConnectionError):
-                while message := wire.parse(await pipe.receive_bytes()):
+                while message := messages.parse(await pipe.receive_bytes()):
                     room.hear(member, message)
                     await member.until_heard()
             room.leave(member)
@@ -138,7 +138,7 @@ async def _speak(pipe: Pipe, member: Member, trap: Trap) -> None:
     while True:
         for frame in await member.take():
             await pipe.send_bytes(frame)
-            if frame[0] == wire.ACKS:
+            if frame[0] == messages.ACKS:
                 trap.passes("after the acknowledgement")
 
 

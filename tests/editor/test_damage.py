@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import wire
-from action_assistant.editor.loading import load
-from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.loading import load
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Conflict
 from action_assistant.journal.events import Draft, nothing
 from action_assistant.journal.journal import Journal
@@ -119,7 +119,7 @@ async def test_the_room_of_a_damaged_graph_can_only_be_read(folder: Path) -> Non
         eve.map["k"] = "new"
         await settle(ada, eve)
         assert eve.member is not None
-        assert await eve.member.ended() == wire.FORBIDDEN
+        assert await eve.member.ended() == messages.FORBIDDEN
         with pytest.raises(Conflict, match="can only be read"):
             await room.submit(forge.entry(9, 0, "a", "b"), "ada")
         bob = Client("bob")

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 from pycrdt import Array, Doc, Map
 
-from action_assistant.editor import wire
-from action_assistant.editor.loading import load
-from action_assistant.editor.nesting import DEEPEST_TYPES
-from action_assistant.editor.replica import WAITING_UPDATES, Foreign, Replica
-from action_assistant.editor.rooms import Rooms
-from action_assistant.editor.scan import outline
-from action_assistant.editor.wire import Malformed
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.loading import load
+from action_assistant.editor.crdt.messages import Malformed
+from action_assistant.editor.crdt.nesting import DEEPEST_TYPES
+from action_assistant.editor.crdt.replica import WAITING_UPDATES, Foreign, Replica
+from action_assistant.editor.crdt.update_scan import outline
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.web.network.connection_limits import (
@@ -46,9 +46,9 @@ async def test_a_forged_client_id_changes_nothing_and_the_victims_edit_survives(
         await settle(ada, eve)
         ada.map["place"] = "mine too"  # made, not sent yet
         clock = 1
-        eve.deliver(wire.change(forge.entry(1, clock, "place", "stolen")))
+        eve.deliver(messages.change(forge.entry(1, clock, "place", "stolen")))
         await room.quiet()
-        assert await ended(eve) == wire.FORBIDDEN
+        assert await ended(eve) == messages.FORBIDDEN
         await settle(ada)
         assert ada.member is not None
         assert not ada.member.closed
@@ -75,9 +75,9 @@ async def test_ids_are_learned_from_the_log(journal: Journal) -> None:
         async with rooms.enter(STREAM) as room:
             eve.join(room)
             await settle(eve)
-            eve.deliver(wire.change(forge.entry(1, 1 + kept, "stolen", "x")))
+            eve.deliver(messages.change(forge.entry(1, 1 + kept, "stolen", "x")))
             await room.quiet()
-            assert await ended(eve) == wire.FORBIDDEN
+            assert await ended(eve) == messages.FORBIDDEN
             eve.leave()
         await rooms.close()
 
@@ -93,7 +93,7 @@ async def test_who_echoes_what_others_wrote_is_not_blamed(rooms: Rooms) -> None:
             await settle(ada, bob)
         bob.map["own"] = "bob's"
         bob.out = []  # lost on its way: it comes with everything else
-        bob.deliver(wire.answer(bob.doc.get_update()))
+        bob.deliver(messages.answer(bob.doc.get_update()))
         await settle(ada, bob)
         assert bob.member is not None
         assert not bob.member.closed
@@ -106,10 +106,10 @@ async def test_an_id_that_somebody_shows_is_theirs_before_they_write(rooms: Room
     async with rooms.enter(STREAM) as room:
         for client in (ada, eve):
             client.join(room)
-        ada.deliver(wire.presence([wire.Entry(1, 1, b"{}")]))
-        eve.deliver(wire.change(forge.entry(1, 0, "stolen", "x")))
+        ada.deliver(messages.presence([messages.Entry(1, 1, b"{}")]))
+        eve.deliver(messages.change(forge.entry(1, 0, "stolen", "x")))
         await room.quiet()
-        assert await ended(eve) == wire.FORBIDDEN
+        assert await ended(eve) == messages.FORBIDDEN
         ada.map["k"] = "mine"
         await settle(ada)
         assert room.seq == 1
@@ -140,14 +140,14 @@ async def test_viewers_change_nothing_and_are_not_asked(rooms: Rooms) -> None:
         vic.join(room, edits=False)
         await settle(ada, vic)
         assert vic.things == {"k": "v"}
-        vic.deliver(wire.answer(b"\x00\x00"))
-        vic.deliver(wire.answer(vic.doc.get_update()))  # what all know
+        vic.deliver(messages.answer(b"\x00\x00"))
+        vic.deliver(messages.answer(vic.doc.get_update()))  # what all know
         await settle(ada, vic)
         assert vic.member is not None
         assert not vic.member.closed
-        vic.deliver(wire.change(forge.entry(99, 0, "k", "vic's")))
+        vic.deliver(messages.change(forge.entry(99, 0, "k", "vic's")))
         await room.quiet()
-        assert await ended(vic) == wire.FORBIDDEN
+        assert await ended(vic) == messages.FORBIDDEN
         assert room.seq == 1
 
 
@@ -163,7 +163,7 @@ async def test_whatever_two_bytes_a_viewer_begins_with_nothing_changes(rooms: Ro
                 vic = Client("vic")
                 vic.join(room, edits=False)
                 try:
-                    message = wire.parse(bytes((first, second)) + wire.text(update))
+                    message = messages.parse(bytes((first, second)) + messages.text(update))
                 except Malformed:
                     continue
                 if message is not None and vic.member is not None:
@@ -230,11 +230,11 @@ async def test_what_never_comes_is_not_waited_for_without_end(rooms: Rooms) -> N
         eve.join(room)
         ada.join(room)
         for n in range(WAITING_UPDATES + 1):
-            eve.deliver(wire.change(forge.entry(66, 10 + 2 * n, "k", "x")))
+            eve.deliver(messages.change(forge.entry(66, 10 + 2 * n, "k", "x")))
         await room.quiet()
-        assert await ended(eve) == wire.TOO_BIG
+        assert await ended(eve) == messages.TOO_BIG
         assert room.seq == WAITING_UPDATES
-        ada.deliver(wire.change(forge.entry(67, 10, "k", "x")))
+        ada.deliver(messages.change(forge.entry(67, 10, "k", "x")))
         ada.map["k"] = "v"
         await settle(ada)
         assert ada.things == {"k": "v"}
@@ -247,7 +247,7 @@ async def test_what_never_comes_is_not_waited_for_without_end(rooms: Rooms) -> N
         forge.entry(7, 2**31 - 1, "k", "x"),
         forge.entry(7, 2**63, "k", "x"),
         b"\x02" + forge.entry(7, 0, "k", "x")[1:-1] + forge.entry(7, 1, "k", "x")[1:],
-        b"\x00\x01\x07\x01" + wire.number(2**40) + b"\x01",
+        b"\x00\x01\x07\x01" + messages.number(2**40) + b"\x01",
     ],
 )
 def test_numbers_that_a_page_cannot_read_are_refused(update: bytes) -> None:

@@ -7,8 +7,8 @@ import msgspec
 import pytest
 
 from action_assistant.editor.app import open_house
-from action_assistant.editor.house import House
-from action_assistant.editor.uses import Known
+from action_assistant.editor.interchange.action_uses import Known
+from action_assistant.editor.services import House
 from action_assistant.settings import EditorSettings
 
 

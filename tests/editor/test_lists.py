@@ -9,10 +9,10 @@ import httpx
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.editor import wire
 from action_assistant.editor.app import open_house
-from action_assistant.editor.contents import labels_of
-from action_assistant.editor.happenings import graph_stream
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.documents.contents import labels_of
+from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.settings import EditorSettings
 from action_assistant.umrf.model import Graph
 from action_assistant.web.workers.lanes import GaveUp
@@ -52,7 +52,7 @@ async def test_the_list_says_who_is_in_a_graph_now(tmp_path: Path) -> None:
             here = [Client("mari"), Client("ada"), Client("ada")]
             for number, client in enumerate(here, start=1):
                 client.join(room)
-                client.deliver(wire.presence([wire.Entry(number, 1, b"{}")]))
+                client.deliver(messages.presence([messages.Entry(number, 1, b"{}")]))
             await asyncio.sleep(0)
             view = await house.catalogue.get(made.id)
             assert [person.name for person in view.people] == ["Ada", "Mari"]

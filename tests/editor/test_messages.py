@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pycrdt import Decoder, YMessageType, YSyncMessageType, create_update_message
 
-from action_assistant.editor import wire
-from action_assistant.editor.wire import Edit, Entry, Malformed, Presence, Question, Reader
+from action_assistant.editor.crdt import messages as wire
+from action_assistant.editor.crdt.messages import Edit, Entry, Malformed, Presence, Question, Reader
 
 data = st.binary(max_size=300)
 entries = st.lists(

@@ -6,10 +6,10 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.editor import wire
-from action_assistant.editor.presence import STATE_LIMIT, Attendance, Seat, colour_of
-from action_assistant.editor.rooms import Rooms
-from action_assistant.editor.wire import Entry
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.messages import Entry
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.presence import STATE_LIMIT, Attendance, Seat, colour_of
 from action_assistant.web.auth.keys import Person
 from editor.client import Client, settle
 
@@ -37,9 +37,9 @@ def test_names_of_any_script_arrive_whole() -> None:
     room = Attendance()
     person = Person("x", "Ülle 🤖 اسم 名前")
     told = room.hear(Seat(person), (entry(1, editing="ключ"),))
-    frame = wire.presence(told)
-    parsed = wire.parse(frame)
-    assert isinstance(parsed, wire.Presence)
+    frame = messages.presence(told)
+    parsed = messages.parse(frame)
+    assert isinstance(parsed, messages.Presence)
     assert json.loads(parsed.entries[0].state)["user"]["name"] == person.name
     assert json.loads(parsed.entries[0].state)["editing"] == "ключ"
 
@@ -115,17 +115,17 @@ async def test_a_newcomer_sees_who_is_there_and_all_see_who_leaves(rooms: Rooms)
     ada, bob = Client("ada"), Client("bob")
     async with rooms.enter("graph/g") as room:
         ada.join(room)
-        ada.deliver(wire.presence([entry(1, selection=["x"])]))
+        ada.deliver(messages.presence([entry(1, selection=["x"])]))
         bob.join(room)
         await settle(ada, bob)
         assert json.loads(bob.others[1])["selection"] == ["x"]
-        bob.deliver(wire.presence([entry(2)]))
+        bob.deliver(messages.presence([entry(2)]))
         await settle(ada, bob)
         assert set(ada.others) == {2}
         ada.leave()
         await settle(bob)
         assert bob.others == {}
-        bob.deliver(bytes((wire.QUERY_AWARENESS,)))
+        bob.deliver(bytes((messages.QUERY_AWARENESS,)))
         await settle(bob)
         assert set(bob.others) == {2}
 
@@ -137,7 +137,7 @@ async def test_of_many_words_of_one_person_only_the_last_waits(rooms: Rooms) -> 
         slow.join(room)
         await settle(ada, slow)
         for n in range(2000):
-            ada.deliver(wire.presence([entry(1, n, cursor=[n, n])]))
+            ada.deliver(messages.presence([entry(1, n, cursor=[n, n])]))
         assert slow.member is not None
         assert not slow.member.closed
         (frame,) = await slow.member.take()

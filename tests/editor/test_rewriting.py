@@ -9,10 +9,10 @@ from hypothesis import given
 from msgspec import UNSET
 from pycrdt import Doc
 
-from action_assistant.editor import document
-from action_assistant.editor.contents import Moment
-from action_assistant.editor.document import Maps
-from action_assistant.editor.rewriting import Rewriting, rewriting
+from action_assistant.editor.documents import document
+from action_assistant.editor.documents.contents import Moment
+from action_assistant.editor.documents.document import Maps
+from action_assistant.editor.interchange.edited_text import Rewriting, rewriting
 from action_assistant.errors import BadInput, NotUmrf
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph

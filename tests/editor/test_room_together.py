@@ -7,10 +7,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pycrdt import Doc, Map
 
-from action_assistant.editor.happenings import DEFERRED, UPDATED
-from action_assistant.editor.loading import load
-from action_assistant.editor.replica import Brought, Replica, clocks
-from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.crdt.loading import load
+from action_assistant.editor.crdt.replica import Brought, Replica, clocks
+from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.journal.journal import Journal
 from editor.client import Client, settle
 

@@ -5,9 +5,10 @@ from typing import Any
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import document, wire
-from action_assistant.editor.rooms import Rooms
-from action_assistant.editor.sameness import Fingerprint, fingerprint
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.documents import document
+from action_assistant.editor.documents.fingerprint import Fingerprint, fingerprint
+from action_assistant.editor.rooms.open_rooms import Rooms
 from editor import forge
 from editor.client import Client, settle
 
@@ -43,7 +44,7 @@ def test_what_differs_has_another_fingerprint(other: dict[str, dict[str, object]
 
 def compare(client: Client, doc: Doc[Any]) -> None:
     found = fingerprint(document.maps_of(doc))
-    client.deliver(wire.compared(client.seq, found.entries, found.total))
+    client.deliver(messages.compared(client.seq, found.entries, found.total))
 
 
 async def test_a_page_that_shows_something_else_is_told_and_it_is_reported(rooms: Rooms) -> None:

@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text, get_update, merge_updates
 
-from action_assistant.editor import changes, document
-from action_assistant.editor.scan import DEEPEST, outline
-from action_assistant.editor.wire import Malformed, Reader, number
+from action_assistant.editor.crdt.messages import Malformed, Reader, number
+from action_assistant.editor.crdt.update_scan import DEEPEST, outline
+from action_assistant.editor.documents import document
+from action_assistant.editor.interchange import changes
 from action_assistant.umrf.model import Action, Graph
 from action_assistant.umrf.model import Parameter as UmrfParameter
 

@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text, merge_updates
 
-from action_assistant.editor.scan import outline
-from action_assistant.editor.wire import Malformed, number
+from action_assistant.editor.crdt.messages import Malformed, number
+from action_assistant.editor.crdt.update_scan import outline
 from editor import forge
 from editor.test_scan import made, values
 

@@ -11,7 +11,7 @@ import httpx_ws
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import wire
+from action_assistant.editor.crdt import messages as wire
 from editor.process import BEARER, Editor
 
 

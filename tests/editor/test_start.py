@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from action_assistant.editor import edits
 from action_assistant.editor.app import open_house
+from action_assistant.editor.catalogue import server_edits
 from action_assistant.schema import editor_tables
 from action_assistant.settings import EditorSettings
 from action_assistant.web.auth.keys import Person
@@ -115,7 +115,7 @@ async def test_a_name_that_changed_just_before_the_end_is_noticed_later(
     async with open_house(settings) as house:
         made, _ = await house.catalogue.create(b'{"name": "old"}', "ada")
         async with house.rooms.enter(f"graph/{made.id}") as room:
-            await edits.rename(room, "ada", name="new", description=None)
+            await server_edits.rename(room, "ada", name="new", description=None)
     async with open_house(settings) as house:
         assert (await house.catalogue.get(made.id)).name == "new"
         rows = await house.journal.query(

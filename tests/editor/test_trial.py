@@ -7,10 +7,10 @@ from typing import Any, TypeVar
 import pytest
 from anyio import CapacityLimiter
 
-from action_assistant.editor import trial, wire
-from action_assistant.editor.member import Member
-from action_assistant.editor.rooms import Rooms
-from action_assistant.editor.trial import tried
+from action_assistant.editor.crdt import messages, trial
+from action_assistant.editor.crdt.trial import tried
+from action_assistant.editor.rooms.member import Member
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.web.workers.lanes import Crashed, GaveUp, Lane
@@ -43,7 +43,7 @@ async def edited(journal: Journal, aside: Troubled | Lane, update: bytes) -> Asy
         ada.join(room)
         eve.join(room)
         await settle(ada, eve)
-        eve.deliver(wire.change(update))
+        eve.deliver(messages.change(update))
         await room.quiet()
         assert eve.member is not None
         yield eve.member
@@ -64,7 +64,7 @@ async def test_whose_edit_finds_the_machine_busy_may_send_it_again(
 ) -> None:
     aside = Troubled(trouble)
     async with edited(journal, aside, large) as member:
-        assert await member.ended() == wire.TOO_SLOW
+        assert await member.ended() == messages.TOO_SLOW
         assert "busy" in (member.said or "")
     assert aside.asked == 1
 
@@ -81,14 +81,14 @@ async def test_one_process_that_dies_is_not_taken_for_the_edits_fault(
 async def test_an_edit_that_ends_two_processes_is_refused(journal: Journal, large: bytes) -> None:
     aside = Troubled(Crashed("killed"), Crashed("killed"))
     async with edited(journal, aside, large) as member:
-        assert await member.ended() == wire.MALFORMED
+        assert await member.ended() == messages.MALFORMED
     assert aside.asked == 2
 
 
 async def test_an_edit_that_would_take_minutes_costs_seconds(journal: Journal) -> None:
     lane = Lane("edits", 1, 120.0, 0, CapacityLimiter(2), [trial.__name__])
     async with edited(journal, lane, at_once(120_000)) as member:
-        assert await member.ended() == wire.MALFORMED
+        assert await member.ended() == messages.MALFORMED
     lane.close()
 
 

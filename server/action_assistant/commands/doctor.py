@@ -22,7 +22,7 @@ from sqlalchemy.exc import DBAPIError
 from action_assistant import paths as places
 from action_assistant import settings
 from action_assistant.commands.processes import port_number
-from action_assistant.editor import location
+from action_assistant.editor.log import database_location
 from action_assistant.errors import CannotStart
 from action_assistant.interpreter import for_runner
 from action_assistant.journal.database import cause_of
@@ -159,7 +159,7 @@ def _listed(data: Path, paths: list[Path]) -> str:
 
 def _graphs(options: argparse.Namespace) -> Finding:
     try:
-        return _database("database", options.database or location.of(options.data))
+        return _database("database", options.database or database_location.of(options.data))
     except CannotStart as error:
         return _wrong("database", str(error))
 

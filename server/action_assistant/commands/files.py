@@ -225,7 +225,7 @@ def _with_examples(path: Path, graph: Graph) -> Graph:
 def _through_document(graph: Graph) -> Graph:
     from pycrdt import Doc
 
-    from action_assistant.editor import document
+    from action_assistant.editor.documents import document
 
     first: Doc[Any] = Doc()
     document.fill(first, graph)

@@ -70,14 +70,14 @@ def _for_each(
     options: argparse.Namespace, deed: Callable[[Branch, Journal], Awaitable[bool]]
 ) -> int:
     """Do it to every journal that there is; 1 unless all went well. Raises CannotStart."""
-    from action_assistant.editor import location
-    from action_assistant.editor.happenings import fold as editor_fold
+    from action_assistant.editor.log import database_location
+    from action_assistant.editor.log.graph_events import fold as editor_fold
     from action_assistant.runner.archive import fold as runner_fold
 
     data = options.data.resolve()
     settled(data)
     found: list[tuple[Branch, str, Fold]] = []
-    url = location.journal_of(data, options.database)
+    url = database_location.journal_of(data, options.database)
     if url is not None:
         found.append(("editor", url, editor_fold))
     if (data / "runner.db").is_file():

@@ -243,12 +243,12 @@ def _runner(options: argparse.Namespace) -> int:
 
 
 def _migrate(options: argparse.Namespace) -> int:
-    from action_assistant.editor import location
+    from action_assistant.editor.log import database_location
     from action_assistant.journal.databases import database_of, migrate
     from action_assistant.journal.migrate import Branch
 
     data = settings.data_folder(options.data.resolve())
-    database = options.database or location.of(data)
+    database = options.database or database_location.of(data)
     urls: dict[Branch, str] = {"editor": database, "runner": f"sqlite:///{data / 'runner.db'}"}
     for branch, url in urls.items():
         revision = migrate(url, branch)

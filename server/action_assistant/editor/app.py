@@ -11,11 +11,11 @@ from litestar import Litestar
 from litestar.types import ASGIApp
 
 from action_assistant import paths
-from action_assistant.editor import epochs, location
-from action_assistant.editor import happenings as h
-from action_assistant.editor.api import about, drawing, graphs, invitations, room, versions
-from action_assistant.editor.house import Door, House
-from action_assistant.editor.people import People
+from action_assistant.editor.api import drawing, editor, graphs, invitations, room, versions
+from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.log import database_location, epochs
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.services import Door, House
 from action_assistant.editor.workers import Workers
 from action_assistant.errors import BadInput
 from action_assistant.journal.journal import Journal
@@ -62,9 +62,9 @@ async def open_house(
 
 def create_app(settings: EditorSettings) -> ASGIApp:
     """The whole editor process. Raises CannotStart."""
-    location.check(settings.data, settings.database, switch=settings.switch_database)
+    database_location.check(settings.data, settings.database, switch=settings.switch_database)
     Journal.prepare(settings.database, "editor")
-    location.remember(settings.data, settings.database)
+    database_location.remember(settings.data, settings.database)
     keys = Keys.of(settings.data)
     door = Door()
     revoked = Revoked(settings.data)
@@ -100,7 +100,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
                 browsers=browsers,
             ),
             *invitations.routes(door, addresses, browsers),
-            *about.routes(door, addresses),
+            *editor.routes(door, addresses),
             *graphs.routes(door),
             *versions.routes(door),
             *drawing.routes(door),

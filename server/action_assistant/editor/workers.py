@@ -13,12 +13,12 @@ from action_assistant.web.workers.lanes import Lane, kept_warm
 #: What the server process has imported before it forks anybody.
 _PRELOADED: Final = (
     "action_assistant.web.workers.child_process",
-    "action_assistant.editor.folding",
-    "action_assistant.editor.importing",
-    "action_assistant.editor.rehearsal",
-    "action_assistant.editor.rewriting",
-    "action_assistant.editor.trial",
-    "action_assistant.editor.uses",
+    "action_assistant.editor.crdt.folding",
+    "action_assistant.editor.interchange.importing",
+    "action_assistant.editor.interchange.rehearsal",
+    "action_assistant.editor.interchange.edited_text",
+    "action_assistant.editor.crdt.trial",
+    "action_assistant.editor.interchange.action_uses",
 )
 _NICE: Final = 5
 

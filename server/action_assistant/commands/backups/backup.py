@@ -72,12 +72,12 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
 
 
 def _backup(options: argparse.Namespace) -> int:
-    from action_assistant.editor import location
+    from action_assistant.editor.log import database_location
 
     data, target = options.data.resolve(), options.file.resolve()
     settings.settled(data)
     progress = Progress()
-    url = location.journal_of(data, options.database)
+    url = database_location.journal_of(data, options.database)
     sources: dict[Branch, str] = {} if url is None else {"editor": url}
     if (data / "runner.db").is_file():
         sources["runner"] = f"sqlite:///{data / 'runner.db'}"
@@ -99,7 +99,9 @@ def _backup(options: argparse.Namespace) -> int:
                 made_at=time.time(),
                 journals=journals,
                 files=packer.files,
-                database=None if url is None or location.is_own(data, url) else location.shown(url),
+                database=None
+                if url is None or database_location.is_own(data, url)
+                else database_location.shown(url),
                 settings=_settings(),
                 missing=missing,
             )

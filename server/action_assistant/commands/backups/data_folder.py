@@ -94,7 +94,7 @@ def tables_copied(source: Path, target: Path, name: str, progress: Progress) -> 
 def fold_of(branch: Branch) -> Fold:
     """How a journal becomes its tables."""
     if branch == "editor":
-        from action_assistant.editor.happenings import fold as editor_fold
+        from action_assistant.editor.log.graph_events import fold as editor_fold
 
         return editor_fold
     from action_assistant.runner.archive import fold as runner_fold
@@ -105,7 +105,7 @@ def fold_of(branch: Branch) -> Fold:
 def checked(path: Path, branch: Branch, progress: Progress, *, anew: bool = False) -> int:
     """The number of events of a copy, each of which is sound; its tables are those of this version.
     `anew`: it begins another epoch. Raises CannotStart."""
-    from action_assistant.editor import epochs
+    from action_assistant.editor.log import epochs
 
     async def look() -> int:
         url = f"sqlite:///{path}"

@@ -56,7 +56,7 @@ class Under(msgspec.Struct, frozen=True):
 
 def restore(options: argparse.Namespace) -> int:
     """The command. Raises CannotStart."""
-    from action_assistant.editor import location
+    from action_assistant.editor.log import database_location
 
     data, source = options.data.resolve(), options.file.resolve()
     progress = Progress()
@@ -65,7 +65,11 @@ def restore(options: argparse.Namespace) -> int:
         about = package.about
         _check_names(about, source)
         _check_folder(data, source)
-        url = options.database or location.remembered(data) or f"sqlite:///{data / 'editor.db'}"
+        url = (
+            options.database
+            or database_location.remembered(data)
+            or f"sqlite:///{data / 'editor.db'}"
+        )
         _make(data)
         with workshop(data, _WORK) as folder, ExitStack() as locks:
             for branch in about.journals:
@@ -118,9 +122,9 @@ def _put(
     folder: Path, data: Path, url: str, about: About, progress: Progress
 ) -> tuple[Path | None, list[str]]:
     """Everything into its place; where what was there has gone, and what stayed as it was."""
-    from action_assistant.editor import epochs, location
+    from action_assistant.editor.log import database_location, epochs
 
-    mark, is_own = data / settings.RESTORING, location.is_own(data, url)
+    mark, is_own = data / settings.RESTORING, database_location.is_own(data, url)
     has_graphs = "editor" in about.journals
     _begin(mark, folder, url, about, progress, elsewhere=has_graphs and not is_own)
     old = [f"{branch}.db" for branch in about.journals if branch == "runner" or is_own]
@@ -132,7 +136,7 @@ def _put(
         _exchange(folder / name, data / name, aside)
     if has_graphs:
         (data / epochs.MARK).unlink(missing_ok=True)
-        location.remember(data, url)
+        database_location.remember(data, url)
     mark.unlink()
     sync(data)
     return aside, kept
@@ -284,13 +288,17 @@ def _write(path: Path, content: msgspec.Struct) -> None:
 
 
 def _tell(about: About, url: str, data: Path, aside: Path | None, kept: list[str]) -> None:
-    from action_assistant.editor import location
+    from action_assistant.editor.log import database_location
 
     for branch, copied in about.journals.items():
         print(f"{branch}: as it was after {copied.events} events")
-    if "editor" in about.journals and (about.database or not location.is_own(data, url)):
+    if "editor" in about.journals and (about.database or not database_location.is_own(data, url)):
         before = about.database or "the data folder"
-        here = str(data / "editor.db") if location.is_own(data, url) else location.shown(url)
+        here = (
+            str(data / "editor.db")
+            if database_location.is_own(data, url)
+            else database_location.shown(url)
+        )
         print(f"the graphs, which were in {before}, are in {here} now")
     if aside is not None:
         print(f"what was there before is in {aside}")

@@ -5,10 +5,10 @@ from typing import Any, Final
 from litestar import Request, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor import importing
-from action_assistant.editor.house import Door
-from action_assistant.editor.importing import Pieces
-from action_assistant.editor.rehearsal import Rehearsal, Rehearsing, rehearsed
+from action_assistant.editor.interchange import importing
+from action_assistant.editor.interchange.importing import Pieces
+from action_assistant.editor.interchange.rehearsal import Rehearsal, Rehearsing, rehearsed
+from action_assistant.editor.services import Door
 from action_assistant.editor.workers import encoded
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.server.application import BODY_LIMIT

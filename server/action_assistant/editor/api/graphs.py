@@ -7,13 +7,15 @@ from litestar import Request, Response, delete, get, patch, post
 from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor import contents, edits, importing
-from action_assistant.editor import happenings as h
-from action_assistant.editor.catalogue import GraphView
-from action_assistant.editor.history import Entry
-from action_assistant.editor.house import Door
-from action_assistant.editor.importing import Preview, Reading
-from action_assistant.editor.rewriting import Rewriting, rewritten
+from action_assistant.editor.catalogue import server_edits
+from action_assistant.editor.catalogue.catalogue import GraphView
+from action_assistant.editor.catalogue.history import Entry
+from action_assistant.editor.documents import contents
+from action_assistant.editor.interchange import importing
+from action_assistant.editor.interchange.edited_text import Rewriting, rewritten
+from action_assistant.editor.interchange.importing import Preview, Reading
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.services import Door
 from action_assistant.editor.workers import encoded
 from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.model import Problem
@@ -213,7 +215,9 @@ def _past(door: Door) -> list[ControllerRouterHandler]:
         then = await house.sights.at(graph_id, data.seq)
         async with house.rooms.enter(h.graph_stream(graph_id)) as room:
             before = room.seq
-            seq = await edits.restore(room, person.id, then.state, aside=house.workers.graphs)
+            seq = await server_edits.restore(
+                room, person.id, then.state, aside=house.workers.graphs
+            )
         if seq > before:
             deed = h.draft(h.RESTORED, person.id, h.Restored(data.seq, seq))
             await house.journal.append(h.about_stream(graph_id), [deed])

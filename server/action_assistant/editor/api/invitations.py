@@ -9,8 +9,8 @@ from anyio import to_thread
 from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.house import Door
-from action_assistant.editor.invitations import Invitation
+from action_assistant.editor.catalogue.invitations import Invitation
+from action_assistant.editor.services import Door
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.auth.keys import Author

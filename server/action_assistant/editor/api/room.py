@@ -8,12 +8,12 @@ import anyio
 from litestar import WebSocket, websocket
 from litestar.types import ControllerRouterHandler, Receive, Send
 
-from action_assistant.editor import happenings as h
-from action_assistant.editor import wire
-from action_assistant.editor.budget import Budget
-from action_assistant.editor.house import Door
-from action_assistant.editor.member import Member
-from action_assistant.editor.room import Room
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.rooms.member import Member
+from action_assistant.editor.rooms.rate_limits import Budget
+from action_assistant.editor.rooms.room import Room
+from action_assistant.editor.services import Door
 from action_assistant.errors import Refused
 from action_assistant.web.auth.access import person_of, plain, refuse
 from action_assistant.web.auth.roles import allowed
@@ -70,8 +70,8 @@ async def _part(socket: Socket, epoch: str) -> None:
     """Send away who knows another history, with the name of this one."""
     with anyio.move_on_after(_GOODBYE):
         if _wants_acks(socket):
-            await socket.send_bytes(wire.epoch(epoch))
-        await socket.close(wire.OTHER_EPOCH, wire.REASONS[wire.OTHER_EPOCH])
+            await socket.send_bytes(messages.epoch(epoch))
+        await socket.close(messages.OTHER_EPOCH, messages.REASONS[messages.OTHER_EPOCH])
 
 
 async def _converse(socket: Socket, room: Room, member: Member, budget: Budget) -> None:
@@ -97,7 +97,7 @@ async def _converse(socket: Socket, room: Room, member: Member, budget: Budget) 
             task.result()  # raises what went wrong
     if code != _NORMAL:
         with anyio.move_on_after(_GOODBYE):
-            await socket.close(code, member.said or wire.REASONS.get(code))
+            await socket.close(code, member.said or messages.REASONS.get(code))
 
 
 async def _listen(receive: Receive, room: Room, member: Member, budget: Budget) -> None:
@@ -109,19 +109,19 @@ async def _listen(receive: Receive, room: Room, member: Member, budget: Budget) 
             return
         data = event.get("bytes")
         if data is None:
-            member.refuse(wire.UNREADABLE)
+            member.refuse(messages.UNREADABLE)
             return
         try:
-            message = wire.parse(data)
-        except wire.Malformed as error:
+            message = messages.parse(data)
+        except messages.Malformed as error:
             log.info("%s sent %s", member.person.id, error)
-            member.refuse(wire.MALFORMED)
+            member.refuse(messages.MALFORMED)
             return
         if message is not None:
             room.hear(member, message)
             if member.far_ahead:
                 await member.until_heard()
-            spend = budget.spend if isinstance(message, wire.Edit) else budget.speak
+            spend = budget.spend if isinstance(message, messages.Edit) else budget.speak
             wait = spend(member.person.id, len(data)) + member.toll()
             if wait > 0:
                 await anyio.sleep(wait)
@@ -140,6 +140,6 @@ async def _speak(send: Send, member: Member) -> None:
 async def _refuse(socket: Socket, refused: Refused) -> None:
     """Answer the request for an upgrade with a plain refusal."""
     if socket.connection_state != "init":
-        await socket.close(wire.RESTARTING, wire.REASONS[wire.RESTARTING])
+        await socket.close(messages.RESTARTING, messages.REASONS[messages.RESTARTING])
         return
     await refuse(socket.scope, socket.receive, socket.send, refused)

@@ -6,8 +6,8 @@ import msgspec
 from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.house import Door
-from action_assistant.editor.versions import VersionView
+from action_assistant.editor.catalogue.versions import VersionView
+from action_assistant.editor.services import Door
 from action_assistant.web.auth.access import Needs, person_of
 
 

@@ -1,0 +1,63 @@
+"""What one editor process is made of."""
+
+from action_assistant.editor.catalogue.catalogue import Catalogue
+from action_assistant.editor.catalogue.graph_reader import Sights
+from action_assistant.editor.catalogue.history import History
+from action_assistant.editor.catalogue.invitations import Invitations
+from action_assistant.editor.catalogue.library import Library
+from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.catalogue.versions import Versions
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.rate_limits import Budget
+from action_assistant.editor.workers import Workers
+from action_assistant.journal.journal import Journal
+from action_assistant.settings import EditorSettings
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.network.connection_limits import Crowd
+
+
+class House:
+    """The parts, put together around a journal that is open."""
+
+    def __init__(
+        self,
+        settings: EditorSettings,
+        journal: Journal,
+        people: People,
+        epoch: str,
+        revoked: Revoked,
+        workers: Workers,
+    ) -> None:
+        self.settings = settings
+        self.journal = journal
+        self.epoch = epoch
+        self.people = people
+        self.workers = workers
+        self.rooms = Rooms(journal, aside=workers.graphs, tried=workers.edits)
+        self.crowd = Crowd(limits=settings.limits)
+        self.budget = Budget(limits=settings.limits)
+        self.sights = Sights(journal, self.rooms, workers.graphs)
+        self.catalogue = Catalogue(journal, self.rooms, self.sights, workers.files)
+        self.versions = Versions(journal, self.sights)
+        self.library = Library(journal, self.sights)
+        self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)
+        self.history = History(journal, people, self.versions)
+
+
+class Door:
+    """Leads to the house once it is open: routes are made before the journal is."""
+
+    def __init__(self) -> None:
+        self._house: House | None = None
+
+    def open(self, house: House) -> None:
+        """From here on requests can be answered."""
+        self._house = house
+
+    @property
+    def house(self) -> House:
+        """The house. Only requests ask for it, and there are none before it is open."""
+        if self._house is None:
+            raise RuntimeError("the editor is not open yet")
+        return self._house
