@@ -12,9 +12,9 @@ from typing import Any
 
 import msgspec
 
-from action_assistant.runner.standin import StandInNode
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Quirks, Said
+from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.messages import Quirks, Said
+from action_assistant.runner.emulator.node import StandInNode
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.semantics import script_from
 

@@ -30,13 +30,13 @@ from temoto_msgs.msg import UmrfGraphFeedback, UmrfGraphStart, UmrfGraphStop
 from action_assistant.errors import Refused
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.emulator.messages import Quirks
+from action_assistant.runner.emulator.node import StandInNode
 from action_assistant.runner.events import Override
 from action_assistant.runner.links import ros2_reach
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import ENDED
-from action_assistant.runner.standin import StandInNode
-from action_assistant.runner.standin_wire import Quirks
 from action_assistant.runner.steering import RestRequest, confirm_rest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import Execution

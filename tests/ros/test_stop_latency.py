@@ -24,7 +24,7 @@ pytest.importorskip(
 
 from websockets.sync.client import connect
 
-from action_assistant.runner.standin_wire import Line, Said
+from action_assistant.runner.emulator.messages import Line, Said
 from ros.robots import robot
 from runner.process import body
 from runner.world import order, sequence

@@ -10,13 +10,8 @@ from typing import Any
 
 import anyio
 
-from action_assistant.runner.links.ears import Ears
-from action_assistant.runner.links.engine_text import name_of, snapshot
-from action_assistant.runner.links.heard import Endpoint, Got, Heard, LogLine, Sound
-from action_assistant.runner.links.port import Command
-from action_assistant.runner.links.port import Feedback as Shown
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import (
+from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.messages import (
     NODE,
     Answer,
     Feedback,
@@ -29,6 +24,11 @@ from action_assistant.runner.standin_wire import (
     Start,
     Stop,
 )
+from action_assistant.runner.links.ears import Ears
+from action_assistant.runner.links.engine_text import name_of, snapshot
+from action_assistant.runner.links.heard import Endpoint, Got, Heard, LogLine, Sound
+from action_assistant.runner.links.port import Command
+from action_assistant.runner.links.port import Feedback as Shown
 from runner.world import wall
 
 LEASE_S = 10.0  # until discovery knows of a death that nobody announced

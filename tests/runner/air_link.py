@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager
 
 import anyio
 
+from action_assistant.runner.emulator.messages import Modify, Pause, Resume, Start
 from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.heard import Heard, LogLine
 from action_assistant.runner.links.port import (
@@ -19,7 +20,6 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
-from action_assistant.runner.standin_wire import Modify, Pause, Resume, Start
 from runner.air import HASH, Air
 from runner.world import wall
 

@@ -21,10 +21,10 @@ import msgspec
 from action_assistant.journal.events import Event
 from action_assistant.runner import shapes
 from action_assistant.runner.control import Control
+from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.messages import Quirks, Start, index_of
 from action_assistant.runner.events import decode
 from action_assistant.runner.runs import Run, replay
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Quirks, Start, index_of
 from action_assistant.runner.starting import GroupRequest
 from action_assistant.runner.steering import RestRequest
 from action_assistant.umrf.files import codec

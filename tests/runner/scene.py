@@ -9,8 +9,8 @@ import anyio
 
 from action_assistant.runner import shapes
 from action_assistant.runner.control import Control
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Quirks, Start
+from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.messages import Quirks, Start
 from action_assistant.umrf.semantics import script_from
 from runner.air import Air, Node, now, now_ms
 from runner.air_link import AirLink

@@ -8,11 +8,11 @@ import msgspec
 import pytest
 
 from action_assistant.runner.control import Control
+from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.messages import Index, Quirks, Start
 from action_assistant.runner.events import Override
 from action_assistant.runner.refusals import StartLog, why_refused
 from action_assistant.runner.runs import Run
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Index, Quirks, Start
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter, Signature
 from action_assistant.umrf.semantics import script_from

@@ -114,7 +114,7 @@ async def test_a_run_in_which_something_moves_raises_no_such_alarm() -> None:
 
 @virtual
 async def test_a_pause_between_two_actions_is_no_standstill() -> None:
-    from action_assistant.runner.standin_wire import Quirks
+    from action_assistant.runner.emulator.messages import Quirks
 
     scene = Scene(4, quirks=Quirks(loading_ms=3_000.0), script=QUICK)
     async with scene.played() as control:

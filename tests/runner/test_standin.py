@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import (
+from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.messages import (
     Answer,
     Feedback,
     Gone,

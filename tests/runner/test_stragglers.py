@@ -11,8 +11,8 @@ import anyio
 
 from action_assistant.runner import archive
 from action_assistant.runner.control import Control
+from action_assistant.runner.emulator.messages import Quirks
 from action_assistant.runner.events import Ended, MovesAgain, Proof, StopSent
-from action_assistant.runner.standin_wire import Quirks
 from runner.air import now_ms
 from runner.scene import Scene, asked, shown
 from runner.world import ANN, BEN, until, virtual

@@ -4,8 +4,8 @@ that it concerns. In virtual time."""
 import anyio
 import msgspec
 
+from action_assistant.runner.emulator.messages import Quirks, Start
 from action_assistant.runner.links.port import Answer, Feedback, Order
-from action_assistant.runner.standin_wire import Quirks, Start
 from action_assistant.umrf.files import codec
 from runner.fleet import Open
 from runner.scene import OTHER, PATROL, Scene, asked, shown

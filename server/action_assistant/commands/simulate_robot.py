@@ -12,8 +12,8 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Gone, Index, Line, Quirks, Said, index_of
+from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.messages import Gone, Index, Line, Quirks, Said, index_of
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.facts import PINNED, facts_for
 from action_assistant.umrf.semantics import Script, script_from
@@ -81,7 +81,7 @@ def _simulate_robot(options: argparse.Namespace) -> int:
 
     if missing := why_not():
         raise CannotStart(missing)
-    from action_assistant.runner.standin import StandInNode
+    from action_assistant.runner.emulator.node import StandInNode
 
     facts = facts_for(options.facts) if options.facts else PINNED
     quirks = msgspec.convert(dict(options.quirk), Quirks)

@@ -7,6 +7,8 @@ from typing import Any
 import anyio
 import pytest
 
+from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.messages import Stop
 from action_assistant.runner.links.absent import AbsentLink
 from action_assistant.runner.links.port import (
     EngineRefused,
@@ -19,8 +21,6 @@ from action_assistant.runner.links.port import (
     Transitions,
 )
 from action_assistant.runner.seen import NodeState, Snapshot
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Stop
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
 from runner.air import Air, now_ms

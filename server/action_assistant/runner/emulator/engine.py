@@ -15,8 +15,7 @@ from itertools import count
 from math import inf
 from typing import Final, TypeAlias, assert_never
 
-from action_assistant.runner.standin_view import View
-from action_assistant.runner.standin_wire import (
+from action_assistant.runner.emulator.messages import (
     TOPICS,
     Answer,
     Feedback,
@@ -38,6 +37,7 @@ from action_assistant.runner.standin_wire import (
     refusal,
     unknown,
 )
+from action_assistant.runner.emulator.view import View
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.semantics import Engine, EngineRefused, Execution, Script, Trace
 

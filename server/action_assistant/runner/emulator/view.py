@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from action_assistant.runner.standin_wire import Index, Plan, Quirks
+from action_assistant.runner.emulator.messages import Index, Plan, Quirks
 from action_assistant.umrf.semantics import Engine, GraphState, NodeResult, NodeState, Trace
 from action_assistant.umrf.semantics.parts import Running, build
 from action_assistant.umrf.semantics.printing import Sheet

@@ -25,8 +25,8 @@ from temoto_msgs.msg import (
 )
 from temoto_msgs.srv import UmrfGraphGet
 
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import (
+from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.messages import (
     NODE,
     Answer,
     Feedback,
