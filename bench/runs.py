@@ -21,6 +21,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive, shapes
 from action_assistant.runner.events import Author, Ended, Observed, Published, Requested, encode
 from action_assistant.runner.history import Aside
+from action_assistant.runner.links.observations import NodeResult, NodeState
 from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review import bundle
@@ -28,7 +29,6 @@ from action_assistant.runner.review import statistics as sums
 from action_assistant.runner.review.film import film
 from action_assistant.runner.review.reel import APART, Reels
 from action_assistant.runner.runs import replay
-from action_assistant.runner.seen import NodeResult, NodeState
 from action_assistant.schema.runner_tables import action_sum, review, run_label
 from action_assistant.schema.runner_tables import run as runs
 

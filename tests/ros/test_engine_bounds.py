@@ -26,8 +26,8 @@ pytest.importorskip(
 
 from action_assistant.errors import Refused
 from action_assistant.runner.control import Control
-from action_assistant.runner.links import ros2_reach
 from action_assistant.runner.links.port import Registration
+from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run
 from action_assistant.runner.visits import Visit

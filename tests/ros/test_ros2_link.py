@@ -16,8 +16,6 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from action_assistant.runner.links import ros2_reach
-from action_assistant.runner.links.absent import AbsentLink
 from action_assistant.runner.links.port import (
     EngineChanged,
     EngineLog,
@@ -30,7 +28,9 @@ from action_assistant.runner.links.port import (
     Registration,
     Report,
 )
-from action_assistant.runner.links.ros2 import Ros2
+from action_assistant.runner.links.ros2.availability import ros2_reach
+from action_assistant.runner.links.ros2.reach import Ros2
+from action_assistant.runner.links.unreachable import AbsentLink
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from ros.echo_engine import EchoEngine, graph_text

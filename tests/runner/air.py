@@ -24,11 +24,11 @@ from action_assistant.runner.emulator.messages import (
     Start,
     Stop,
 )
-from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.engine_text import name_of, snapshot
-from action_assistant.runner.links.heard import Endpoint, Got, Heard, LogLine, Sound
+from action_assistant.runner.links.listeners import Ears
 from action_assistant.runner.links.port import Command
 from action_assistant.runner.links.port import Feedback as Shown
+from action_assistant.runner.links.ros2.ros_values import Endpoint, Got, Heard, LogLine, Sound
 from runner.world import wall
 
 LEASE_S = 10.0  # until discovery knows of a death that nobody announced

@@ -6,8 +6,7 @@ from contextlib import AbstractContextManager
 import anyio
 
 from action_assistant.runner.emulator.messages import Modify, Pause, Resume, Start
-from action_assistant.runner.links.ears import Ears
-from action_assistant.runner.links.heard import Heard, LogLine
+from action_assistant.runner.links.listeners import Ears
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -20,6 +19,7 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
+from action_assistant.runner.links.ros2.ros_values import Heard, LogLine
 from runner.air import HASH, Air
 from runner.world import wall
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from action_assistant.runner.links.ears import Ears
+from action_assistant.runner.links.listeners import Ears
 from action_assistant.runner.links.port import (
     Answer,
     Candidate,

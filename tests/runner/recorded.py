@@ -16,8 +16,9 @@ import anyio
 
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.events import Requested
-from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.engine_text import snapshot
+from action_assistant.runner.links.listeners import Ears
+from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
     EngineLog,
@@ -28,7 +29,6 @@ from action_assistant.runner.links.port import (
     Standing,
 )
 from action_assistant.runner.runs import Run, begin
-from action_assistant.runner.seen import Snapshot
 from action_assistant.umrf.files import codec
 from runner.world import ANN, BEN, EPOCH, MemoryLedger, at_once, live_through, wall
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from action_assistant.runner.events import Author, Observed, Published, Requested
 from action_assistant.runner.lateness import fresh
+from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.runs import Run, begin, follow
-from action_assistant.runner.seen import Snapshot
 
 NODES = ("A_0", "B_0", "C_0")
 

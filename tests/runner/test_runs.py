@@ -24,8 +24,7 @@ from action_assistant.runner.events import (
     decode,
     encode,
 )
-from action_assistant.runner.runs import Run, begin, follow, replay
-from action_assistant.runner.seen import (
+from action_assistant.runner.links.observations import (
     GraphResult,
     GraphState,
     Hazard,
@@ -34,6 +33,7 @@ from action_assistant.runner.seen import (
     Seen,
     Snapshot,
 )
+from action_assistant.runner.runs import Run, begin, follow, replay
 from action_assistant.runner.visits import KEPT, MOMENT_US
 from action_assistant.umrf.laps import Laps
 

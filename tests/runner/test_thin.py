@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from action_assistant.runner import shapes
 from action_assistant.runner.events import Observed, encode
+from action_assistant.runner.links.observations import NodeState, Seen, Snapshot
 from action_assistant.runner.runs import Run, follow, replay, thin
-from action_assistant.runner.seen import NodeState, Seen, Snapshot
 from runner.test_runs import REQUESTED, STARTED, run_of
 
 STATES = ("UNINITIALIZED", "RUNNING", "STOPPING", "FINISHED", "ERROR", "PAUSED")

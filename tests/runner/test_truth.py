@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from action_assistant.runner import shapes
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, index_of
+from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import Feedback, Report
 from action_assistant.runner.runs import ENDED, replay
-from action_assistant.runner.seen import ACTIVE, Snapshot
 from runner import world
 from runner.air import now_ms
 from runner.record_streams import Place

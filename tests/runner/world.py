@@ -24,6 +24,7 @@ from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.events import Author, RunEvent, decode
+from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
     EngineRefused,
@@ -36,7 +37,6 @@ from action_assistant.runner.links.port import (
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run, replay
-from action_assistant.runner.seen import Snapshot
 from action_assistant.schema.runner_tables import RUNNER
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import SIMULATED

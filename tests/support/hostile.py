@@ -18,9 +18,9 @@ import msgspec
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive
 from action_assistant.runner.events import Ended, Observed, Published, Requested, encode
+from action_assistant.runner.links.observations import GraphState, NodeState
 from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.runs import RunEvent
-from action_assistant.runner.seen import GraphState, NodeState
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.web.auth.keys import Keys

@@ -30,9 +30,9 @@ from action_assistant.journal.databases import database_of
 from action_assistant.journal.migrate import recognize
 from action_assistant.private_files import holds_nothing_else, open_to_others, prove_writable
 from action_assistant.runner import archive
-from action_assistant.runner.links.findings import Finding, Verdict
+from action_assistant.runner.links.diagnostics import Finding, Verdict
 from action_assistant.runner.links.port import Registration
-from action_assistant.runner.links.ros2_checkup import look
+from action_assistant.runner.links.ros2.checkup import look
 from action_assistant.safe_text import one_line
 from action_assistant.settings import reached
 from action_assistant.version import VERSION

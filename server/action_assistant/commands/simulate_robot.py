@@ -77,7 +77,7 @@ def _quirk(text: str) -> tuple[str, Any]:
 
 
 def _simulate_robot(options: argparse.Namespace) -> int:
-    from action_assistant.runner.links import why_not
+    from action_assistant.runner.links.ros2.availability import why_not
 
     if missing := why_not():
         raise CannotStart(missing)

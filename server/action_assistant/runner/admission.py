@@ -8,6 +8,8 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
 from action_assistant.runner.events import Override
+from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.runner.links.simulator import slowed
 from action_assistant.umrf.check import STRUCTURAL, blocking, check
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import EngineFacts
@@ -18,14 +20,10 @@ from action_assistant.umrf.semantics import Script, script_from
 
 T = TypeVar("T")
 
-#: The engine that is always there.
-SIMULATOR: Final = "simulator"
 #: What robots may read: the engine puts names into format strings and file names.
 _WIRE_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 #: What the simulator may read: anything that can be printed, but no format directives.
 _PLAIN_NAME: Final = re.compile(r"[^%\x00-\x1f\x7f\u2028\u2029]{1,200}")
-#: No simulated action is quicker: a loop of instant actions would never let go of the processor.
-_QUICKEST_S: Final = 0.01
 _SHOWN: Final = 20  # problems in an answer
 _ACTIONS: Final = 5_000  # as in the editor
 _KEPT: Final = 40  # problems of a kind that somebody could be shown
@@ -197,17 +195,6 @@ def _script(asked: StartRequest) -> tuple[Script, str]:
     except ValueError as error:
         raise BadInput(f"The script: {error}", where={"path": "/script"}) from error
     return slowed(script), raw.decode()
-
-
-def slowed(script: Script) -> Script:
-    """The script without what is quicker than any simulated action may be."""
-    behaviours = {
-        key: tuple(
-            msgspec.structs.replace(each, after_s=max(each.after_s, _QUICKEST_S)) for each in calls
-        )
-        for key, calls in script.behaviours.items()
-    }
-    return Script(behaviours)
 
 
 def _placed(text: str) -> tuple[str, dict[str, object] | None]:

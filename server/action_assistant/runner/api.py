@@ -16,7 +16,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import BadInput, NotFound, TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive, robots_api, shapes
-from action_assistant.runner.admission import SIMULATOR, decoded, read_request
+from action_assistant.runner.admission import decoded, read_request
 from action_assistant.runner.asking import LARGE, author_of, body_of, start_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import (
@@ -27,6 +27,7 @@ from action_assistant.runner.described import (
 )
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.history import Aside
+from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.live import Hub, Stopping, attend, work_out
 from action_assistant.runner.review import listing
 from action_assistant.runner.review import routes as review

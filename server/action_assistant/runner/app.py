@@ -18,8 +18,8 @@ from action_assistant.runner import archive
 from action_assistant.runner.api import House, routes
 from action_assistant.runner.asking import SMALL
 from action_assistant.runner.control import Control
-from action_assistant.runner.links import ros2_reach
 from action_assistant.runner.links.port import Reach
+from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
 from action_assistant.runner.live import Hub
 from action_assistant.runner.recordings import Recordings

@@ -15,16 +15,16 @@ from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
 from action_assistant.runner import archive, steering
-from action_assistant.runner.admission import SIMULATOR, StartRequest
+from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.booking import Book, Stops, booked
 from action_assistant.runner.driving import Clock, OpenRun
 from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.events import Author, Ended, MovesAgain
 from action_assistant.runner.flight import Commanded
 from action_assistant.runner.history import Aside, History, Ledger, Past
-from action_assistant.runner.links.absent import AbsentLink
-from action_assistant.runner.links.port import ForeignCommand, Link, Order, Registration
+from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, Order, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
+from action_assistant.runner.links.unreachable import AbsentLink
 from action_assistant.runner.preflight import Preflight, Settled, check_items, of_taken
 from action_assistant.runner.registered import Robot
 from action_assistant.runner.robots import Ground, Robots

@@ -9,7 +9,7 @@ a stop or a pause could have reached it before.
 from collections.abc import Sequence
 from typing import Final
 
-from action_assistant.runner.seen import Snapshot
+from action_assistant.runner.links.observations import Snapshot
 
 _NAMED: Final = 3
 

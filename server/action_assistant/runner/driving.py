@@ -33,6 +33,7 @@ from action_assistant.runner.events import (
 )
 from action_assistant.runner.flight import alarm_of
 from action_assistant.runner.history import Aside, sent_of
+from action_assistant.runner.links.observations import Hazard, Seen
 from action_assistant.runner.links.port import (
     EngineChanged,
     EngineLog,
@@ -50,7 +51,6 @@ from action_assistant.runner.links.port import (
 from action_assistant.runner.proof import SET_GOING
 from action_assistant.runner.recorder import Recorder, Store
 from action_assistant.runner.runs import Run, follow, thin
-from action_assistant.runner.seen import Hazard, Seen
 from action_assistant.runner.stop_loop import StopLoop
 from action_assistant.runner.watching import Watch
 

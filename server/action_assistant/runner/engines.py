@@ -12,6 +12,7 @@ from typing import Final, TypeVar
 import anyio
 import msgspec
 
+from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -26,7 +27,6 @@ from action_assistant.runner.links.port import (
     Standing,
 )
 from action_assistant.runner.recordings import Recordings
-from action_assistant.runner.seen import Snapshot
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Signature

@@ -10,8 +10,8 @@ from typing import ClassVar, Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.runner.engine_process import EngineProcess
-from action_assistant.runner.seen import Seen
+from action_assistant.runner.links.engine_process import EngineProcess
+from action_assistant.runner.links.observations import Seen
 from action_assistant.umrf.laps import Laps
 
 End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "lost"]

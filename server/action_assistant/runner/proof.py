@@ -8,8 +8,8 @@ from typing import Final
 import anyio
 import msgspec
 
+from action_assistant.runner.links.observations import TERMINAL, Snapshot
 from action_assistant.runner.links.port import Answer, Link, NotSent
-from action_assistant.runner.seen import TERMINAL, Snapshot
 
 log: Final = logging.getLogger(__name__)
 

@@ -20,8 +20,8 @@ import msgspec
 from action_assistant.errors import NotFound
 from action_assistant.private_files import make_folder, opener
 from action_assistant.runner.history import Aside
+from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, Feedback
-from action_assistant.runner.seen import Snapshot
 
 log: Final = logging.getLogger(__name__)
 

@@ -9,9 +9,8 @@ import msgspec
 from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, Conflict
-from action_assistant.runner.admission import SIMULATOR
 from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.links.port import EngineState, Generation, Registration
+from action_assistant.runner.links.port import SIMULATOR, EngineState, Generation, Registration
 from action_assistant.runner.shapes import time
 from action_assistant.umrf.facts import BadProfile, facts_of
 

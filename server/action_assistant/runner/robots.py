@@ -10,13 +10,20 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft
-from action_assistant.runner.admission import SIMULATOR
 from action_assistant.runner.driving import Clock
 from action_assistant.runner.engines import Index, KnownEngine
 from action_assistant.runner.events import Author
 from action_assistant.runner.flight import Commanded, EngineBecame, FlightRecorder
 from action_assistant.runner.history import Aside, Ledger
-from action_assistant.runner.links.port import Candidate, ForeignCommand, Link, Reach, Registration
+from action_assistant.runner.links.observations import Snapshot
+from action_assistant.runner.links.port import (
+    SIMULATOR,
+    Candidate,
+    ForeignCommand,
+    Link,
+    Reach,
+    Registration,
+)
 from action_assistant.runner.proof import strangers
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.registered import (
@@ -27,7 +34,6 @@ from action_assistant.runner.registered import (
     check_registration,
     seen,
 )
-from action_assistant.runner.seen import Snapshot
 from action_assistant.runner.silencing import Silencing
 from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
 

@@ -9,7 +9,6 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound
 from action_assistant.runner import shapes
-from action_assistant.runner.admission import SIMULATOR
 from action_assistant.runner.asking import LARGE, author_of, body_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import GroupOperation, LookOperation
@@ -22,7 +21,7 @@ from action_assistant.runner.flight import (
     StopWasProven,
 )
 from action_assistant.runner.history import Aside
-from action_assistant.runner.links.port import Candidate, Registration
+from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
 from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.recordings import Recording
 from action_assistant.runner.registered import Robot

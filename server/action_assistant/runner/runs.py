@@ -10,7 +10,6 @@ from typing import Final, Literal, TypeAlias, assert_never
 import msgspec
 from msgspec.structs import replace
 
-from action_assistant.runner.engine_process import EngineProcess
 from action_assistant.runner.events import (
     AlarmRaised,
     Answered,
@@ -37,7 +36,8 @@ from action_assistant.runner.events import (
     Unconfirmed,
     Unknown,
 )
-from action_assistant.runner.seen import ACTIVE, TERMINAL, Seen, Snapshot
+from action_assistant.runner.links.engine_process import EngineProcess
+from action_assistant.runner.links.observations import ACTIVE, TERMINAL, Seen, Snapshot
 from action_assistant.runner.sights import key_of as key_of
 from action_assistant.runner.sights import names_all, observe
 from action_assistant.runner.visits import KEPT, ActionRun, Message, awaits_answer, is_heard, paused

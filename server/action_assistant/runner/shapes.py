@@ -10,7 +10,7 @@ from sqlalchemy import Row
 
 from action_assistant.runner.durations import Took, of_run
 from action_assistant.runner.events import AtRest, Author, Overridden, Override
-from action_assistant.runner.parameters import sent
+from action_assistant.runner.links.parameter_texts import sent
 from action_assistant.runner.runs import Desired, Run, State
 from action_assistant.runner.visits import ActionRun, How, Outcome, Visit
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Final, assert_never
 
 from msgspec.structs import replace
 
-from action_assistant.runner.seen import (
+from action_assistant.runner.links.observations import (
     TERMINAL,
     GraphResult,
     GraphState,

@@ -11,8 +11,8 @@ from typing import Final, TypeAlias, assert_never
 import msgspec
 from msgspec.structs import replace
 
+from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.runs import Run
-from action_assistant.runner.seen import ACTIVE, Snapshot
 from action_assistant.runner.visits import ActionRun
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import (

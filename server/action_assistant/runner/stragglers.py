@@ -20,10 +20,10 @@ from action_assistant.runner.events import MovesAgain
 from action_assistant.runner.flight import Commanded
 from action_assistant.runner.history import History
 from action_assistant.runner.links.engine_text import run_in
+from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import ForeignCommand, NoAnswer
 from action_assistant.runner.robots import Robots
 from action_assistant.runner.runs import Run
-from action_assistant.runner.seen import ACTIVE, Snapshot
 
 log: Final = logging.getLogger(__name__)
 

@@ -30,7 +30,7 @@ from typing import Final, Literal, TypeAlias
 import msgspec
 from msgspec.structs import replace
 
-from action_assistant.runner.seen import ACTIVE, FAR, NodeResult
+from action_assistant.runner.links.observations import ACTIVE, FAR, NodeResult
 
 Outcome: TypeAlias = Literal["true", "false", "error", "stopped"]
 How: TypeAlias = Literal["observed", "inferred"]

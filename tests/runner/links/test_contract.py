@@ -9,7 +9,7 @@ import pytest
 
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Stop
-from action_assistant.runner.links.absent import AbsentLink
+from action_assistant.runner.links.observations import NodeState, Snapshot
 from action_assistant.runner.links.port import (
     EngineRefused,
     ForeignCommand,
@@ -20,7 +20,7 @@ from action_assistant.runner.links.port import (
     Report,
     Transitions,
 )
-from action_assistant.runner.seen import NodeState, Snapshot
+from action_assistant.runner.links.unreachable import AbsentLink
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
 from runner.air import Air, now_ms

@@ -19,13 +19,13 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import archive
 from action_assistant.runner.events import Ended, Observed, Published, encode
+from action_assistant.runner.links.observations import NodeState
 from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review import about, bundle
 from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.review.shelf import Shelf
 from action_assistant.runner.runs import replay
-from action_assistant.runner.seen import NodeState
 from action_assistant.settings import Keep
 from runner.test_runs import REQUESTED
 

@@ -20,10 +20,10 @@ from action_assistant.runner.events import (
     StopRequested,
     decode,
 )
+from action_assistant.runner.links.observations import GraphState, NodeResult, NodeState
 from action_assistant.runner.review.cause import Cause, causes
 from action_assistant.runner.review.cause_words import words
 from action_assistant.runner.runs import Run, replay
-from action_assistant.runner.seen import GraphState, NodeResult, NodeState
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.process import RunnerProcess

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from action_assistant.journal.events import Draft
 from action_assistant.runner import shapes
 from action_assistant.runner.events import Author, Ended, Observed, RunEvent, StopRequested, encode
+from action_assistant.runner.links.observations import NodeResult, NodeState, Seen, Snapshot
 from action_assistant.runner.review.film import Film, Frame, film
 from action_assistant.runner.review.reel import APART, Reels
 from action_assistant.runner.runs import replay
-from action_assistant.runner.seen import NodeResult, NodeState, Seen, Snapshot
 from runner.test_runs import STARTED
 from runner.world import MemoryLedger, at_once, virtual
 

@@ -9,8 +9,8 @@ from typing import Final, Literal
 
 import msgspec
 
-from action_assistant.runner.parameters import Values, reported
-from action_assistant.runner.seen import ACTIVE, Snapshot
+from action_assistant.runner.links.observations import ACTIVE, Snapshot
+from action_assistant.runner.links.parameter_texts import Values, reported
 
 #: Responses of a relation that end or hold an action which runs.
 _HALTING: Final = frozenset({"stop", "pause"})

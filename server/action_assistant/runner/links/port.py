@@ -9,14 +9,18 @@ Whoever implements this keeps messages on one topic apart as the engine needs (t
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Annotated, Literal, Protocol, TypeAlias
+from typing import Annotated, Final, Literal, Protocol, TypeAlias
 
 import msgspec
 
-from action_assistant.runner.engine_process import EngineProcess
-from action_assistant.runner.seen import Exact, Snapshot
+from action_assistant.runner.links.engine_process import EngineProcess
+from action_assistant.runner.links.observations import Exact, Snapshot
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph
+
+#: The engine that is always there.
+SIMULATOR: Final = "simulator"
+
 
 EngineState: TypeAlias = Literal["answering", "busy", "gone", "restarted"]
 Command: TypeAlias = Literal["start", "stop", "pause", "resume", "modify"]

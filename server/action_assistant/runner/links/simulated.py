@@ -22,7 +22,7 @@ import msgspec
 from anyio import to_thread
 
 from action_assistant.errors import TooMany
-from action_assistant.runner.links.ears import Ears
+from action_assistant.runner.links.listeners import Ears
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,

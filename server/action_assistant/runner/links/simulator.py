@@ -13,8 +13,17 @@ from typing import Final, TypeAlias, assert_never
 import anyio
 import msgspec
 
-from action_assistant.runner.admission import slowed
-from action_assistant.runner.links.ears import Ears
+from action_assistant.runner.links.listeners import Ears
+from action_assistant.runner.links.observations import (
+    Exact,
+    GraphResult,
+    GraphState,
+    Hazard,
+    NodeResult,
+    NodeState,
+    Snapshot,
+)
+from action_assistant.runner.links.parameter_texts import Values, values_of
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -28,20 +37,15 @@ from action_assistant.runner.links.port import (
     Standing,
     Transitions,
 )
-from action_assistant.runner.parameters import Values, values_of
-from action_assistant.runner.seen import (
-    Exact,
-    GraphResult,
-    GraphState,
-    Hazard,
-    NodeResult,
-    NodeState,
-    Snapshot,
-)
 from action_assistant.umrf import semantics
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics import Script
+
+#: No simulated action is quicker: a loop of instant actions would never let go of the processor.
+_QUICKEST_S: Final = 0.01
+
 
 _GRAIN_MS: Final = 0.01  # clocks are not finer: what is due so soon is due now
 _SLICE: Final = 50  # engine steps between two turns of the event loop
@@ -264,3 +268,14 @@ def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact
             return None
         case _:
             assert_never(trace)
+
+
+def slowed(script: Script) -> Script:
+    """The script without what is quicker than any simulated action may be."""
+    behaviours = {
+        key: tuple(
+            msgspec.structs.replace(each, after_s=max(each.after_s, _QUICKEST_S)) for each in calls
+        )
+        for key, calls in script.behaviours.items()
+    }
+    return Script(behaviours)

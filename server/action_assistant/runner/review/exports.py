@@ -12,9 +12,9 @@ from action_assistant.journal.events import Event
 from action_assistant.runner import shapes
 from action_assistant.runner.durations import of_visit
 from action_assistant.runner.events import Observed
+from action_assistant.runner.links.observations import NodeResult, NodeState, Snapshot
 from action_assistant.runner.review.reel import fold
 from action_assistant.runner.runs import Run
-from action_assistant.runner.seen import NodeResult, NodeState, Snapshot
 from action_assistant.version import VERSION
 
 #: A cell that begins so would be a formula to a spreadsheet.

@@ -11,12 +11,12 @@ import anyio
 import anyio.to_thread
 import rclpy
 
-from action_assistant.runner.links.absent import AbsentLink
 from action_assistant.runner.links.port import Candidate, Link, Registration
-from action_assistant.runner.links.ros2_domain import Domain
-from action_assistant.runner.links.ros2_link import Ros2Link
-from action_assistant.runner.links.ros2_outlets import Topics
-from action_assistant.runner.links.ros2_peers import OLDER, generation_of, topics_of, two_servers
+from action_assistant.runner.links.ros2.domain import Domain
+from action_assistant.runner.links.ros2.link import Ros2Link
+from action_assistant.runner.links.ros2.outlets import Topics
+from action_assistant.runner.links.ros2.peers import OLDER, generation_of, topics_of, two_servers
+from action_assistant.runner.links.unreachable import AbsentLink
 from action_assistant.umrf.facts import PINNED, EngineFacts
 
 

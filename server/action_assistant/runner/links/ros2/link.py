@@ -14,10 +14,9 @@ from typing import Final, TypeAlias, assert_never
 import anyio
 from temoto_msgs.msg import UmrfGraphModify, UmrfGraphPause, UmrfGraphResume, UmrfGraphStart
 
-from action_assistant.runner.engine_process import engine_process
-from action_assistant.runner.links.ears import Ears
+from action_assistant.runner.links.engine_process import engine_process
 from action_assistant.runner.links.engine_text import NotAGraph
-from action_assistant.runner.links.heard import Endpoint, Heard, LogLine, Sound
+from action_assistant.runner.links.listeners import Ears
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -32,9 +31,9 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
-from action_assistant.runner.links.ros2_domain import Domain
-from action_assistant.runner.links.ros2_outlets import Topics
-from action_assistant.runner.links.ros2_peers import (
+from action_assistant.runner.links.ros2.domain import Domain
+from action_assistant.runner.links.ros2.outlets import Topics
+from action_assistant.runner.links.ros2.peers import (
     OLDER,
     belonging,
     foreign_middleware,
@@ -42,6 +41,7 @@ from action_assistant.runner.links.ros2_peers import (
     topics_of,
     two_servers,
 )
+from action_assistant.runner.links.ros2.ros_values import Endpoint, Heard, LogLine, Sound
 from action_assistant.umrf.facts import EngineFacts
 
 _LOOK_S: Final = 1.0

@@ -32,11 +32,11 @@ from temoto_msgs.msg import (
 )
 from temoto_msgs.srv import UmrfGraphGet
 
-from action_assistant.runner.links.ears import Ears
 from action_assistant.runner.links.engine_text import NotAGraph, name_of, snapshot
-from action_assistant.runner.links.heard import Endpoint, Got, Heard, LogLine, Sound
+from action_assistant.runner.links.listeners import Ears
 from action_assistant.runner.links.port import Command, Feedback
-from action_assistant.runner.links.ros2_outlets import Message, Outlet, Outlets, Topics, qos
+from action_assistant.runner.links.ros2.outlets import Message, Outlet, Outlets, Topics, qos
+from action_assistant.runner.links.ros2.ros_values import Endpoint, Got, Heard, LogLine, Sound
 
 log: Final = logging.getLogger(__name__)
 

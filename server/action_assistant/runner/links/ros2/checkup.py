@@ -12,8 +12,7 @@ from typing import Final
 import anyio
 
 from action_assistant import ros_workspace
-from action_assistant.runner.links import ros2_reach
-from action_assistant.runner.links.findings import Finding, Verdict
+from action_assistant.runner.links.diagnostics import Finding, Verdict
 from action_assistant.runner.links.port import (
     Candidate,
     EngineChanged,
@@ -23,6 +22,7 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
+from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.umrf.facts import BadProfile, facts_of
 
 _PATIENCE_S: Final = 6.0

@@ -2,10 +2,10 @@
 
 from typing import Final
 
-from action_assistant.runner.links.heard import Endpoint
 from action_assistant.runner.links.port import Generation
-from action_assistant.runner.links.ros2_domain import Domain
-from action_assistant.runner.links.ros2_outlets import Topics
+from action_assistant.runner.links.ros2.domain import Domain
+from action_assistant.runner.links.ros2.outlets import Topics
+from action_assistant.runner.links.ros2.ros_values import Endpoint
 from action_assistant.umrf.facts import EngineFacts
 
 OLDER: Final = (

@@ -7,8 +7,8 @@ from typing import TypeAlias
 
 import msgspec
 
+from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Command, Feedback
-from action_assistant.runner.seen import Snapshot
 
 
 class Endpoint(msgspec.Struct, frozen=True):
