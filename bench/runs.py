@@ -18,22 +18,30 @@ from table import Table, seconds
 
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
-from action_assistant.runner import archive, shapes
-from action_assistant.runner.events import Author, Ended, Observed, Published, Requested, encode
-from action_assistant.runner.history import Aside
 from action_assistant.runner.links.observations import NodeResult, NodeState
-from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review import bundle
 from action_assistant.runner.review import statistics as sums
 from action_assistant.runner.review.film import film
 from action_assistant.runner.review.reel import APART, Reels
-from action_assistant.runner.runs import replay
+from action_assistant.runner.runs import queries, views
+from action_assistant.runner.runs.events import (
+    Author,
+    Ended,
+    Observed,
+    Published,
+    Requested,
+    encode,
+)
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.schema.runner_tables import action_sum, review, run_label
 from action_assistant.schema.runner_tables import run as runs
+from action_assistant.web.workers.lanes import Aside
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+from action_assistant.runner import projection
 from runner.record_streams import Place
 from runner.world import at_once, live_through, sequence
 
@@ -74,9 +82,9 @@ async def _lists(folder: Path) -> Table:
 def _questions(journal: Journal, middle: str) -> list[Callable[[], Awaitable[Any]]]:
     def page(**wanted: Any) -> Callable[[], Awaitable[Any]]:
         async def ask() -> None:
-            rows = await journal.query(archive.listed(archive.Filter(**wanted), 200))
-            await journal.query(archive.labels_of([row.id for row in rows]))
-            msgspec.json.encode([shapes.listed(shapes.summary_of_row(r), r, []) for r in rows])
+            rows = await journal.query(queries.listed(queries.Filter(**wanted), 200))
+            await journal.query(queries.labels_of([row.id for row in rows]))
+            msgspec.json.encode([views.listed(views.summary_of_row(r), r, []) for r in rows])
 
         return ask
 
@@ -189,7 +197,7 @@ async def _opening(journal: Journal, run: str, size: int) -> list[str]:
 
     async def opened(reels: Reels) -> None:
         key = (await reels.reel(run)).keys[-1]
-        msgspec.json.encode(shapes.whole(key.run, "{}"))
+        msgspec.json.encode(views.whole(key.run, "{}"))
 
     started = time.perf_counter()
     await opened(Reels(journal, _ASIDE))
@@ -312,7 +320,7 @@ def _size(number: int) -> str:
 
 async def _opened(folder: Path) -> Journal:
     return await Journal.open(
-        f"sqlite:///{folder / 'runner.db'}", branch="runner", fold=archive.fold
+        f"sqlite:///{folder / 'runner.db'}", branch="runner", fold=projection.fold
     )
 
 

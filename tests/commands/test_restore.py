@@ -26,7 +26,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Draft, Fold
 from action_assistant.journal.journal import Journal
-from action_assistant.runner.archive import fold as runner_fold
+from action_assistant.runner.projection import fold as runner_fold
 from journal.servers import Server
 
 LARGE: Final = 10 << 20

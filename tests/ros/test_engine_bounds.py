@@ -29,8 +29,8 @@ from action_assistant.runner.control import Control
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots import Robots
-from action_assistant.runner.runs import Run
-from action_assistant.runner.visits import Visit
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.model import Action, Graph, Parameter
 from runner.bounds import GRAPHS, Real, fits
 from runner.world import ANN, BEN, MemoryLedger, at_once, order

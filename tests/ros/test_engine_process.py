@@ -12,10 +12,10 @@ pytest.importorskip(
 )
 
 from action_assistant.runner.control import Control
-from action_assistant.runner.events import Ended
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots import Robots
+from action_assistant.runner.runs.events import Ended
 from ros.robots import RobotProcess, robot
 from ros.test_false_confirmations import wall
 from runner.world import ANN, BEN, MemoryLedger, at_once, order, sequence

@@ -7,8 +7,8 @@ import msgspec
 
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, index_of
-from action_assistant.runner.runs import Run
-from action_assistant.runner.visits import Visit
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, EXIT, Conditions, Graph, Relation
 from action_assistant.umrf.semantics import NodeState, script_from
 from runner import world

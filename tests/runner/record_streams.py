@@ -19,12 +19,13 @@ import anyio
 import msgspec
 
 from action_assistant.journal.events import Event
-from action_assistant.runner import shapes
 from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, Start, index_of
-from action_assistant.runner.events import decode
-from action_assistant.runner.runs import Run, replay
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import decode
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.run import Run
 from action_assistant.runner.starting import GroupRequest
 from action_assistant.runner.steering import RestRequest
 from action_assistant.umrf.files import codec
@@ -222,7 +223,7 @@ def expected(events: list[Event]) -> Any:
 
 def as_told(run: Run) -> Any:
     """A run as people and programs see it, and the lines of its engine."""
-    return msgspec.to_builtins(shapes.shown(run))
+    return msgspec.to_builtins(views.shown(run))
 
 
 def recorded() -> Iterator[tuple[str, list[Event]]]:

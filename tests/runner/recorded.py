@@ -15,7 +15,6 @@ from typing import Any, Literal, NamedTuple
 import anyio
 
 from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.events import Requested
 from action_assistant.runner.links.engine_text import snapshot
 from action_assistant.runner.links.listeners import Ears
 from action_assistant.runner.links.observations import Snapshot
@@ -28,7 +27,9 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
-from action_assistant.runner.runs import Run, begin
+from action_assistant.runner.runs.events import Requested
+from action_assistant.runner.runs.fold import begin
+from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
 from runner.world import ANN, BEN, EPOCH, MemoryLedger, at_once, live_through, wall
 

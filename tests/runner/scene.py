@@ -7,10 +7,10 @@ from typing import Any
 
 import anyio
 
-from action_assistant.runner import shapes
 from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, Start
+from action_assistant.runner.runs import views
 from action_assistant.umrf.semantics import script_from
 from runner.air import Air, Node, now, now_ms
 from runner.air_link import AirLink
@@ -83,4 +83,4 @@ def asked(name: str = "David", **more: Any) -> Any:
 
 def shown(control: Control, run: str) -> Any:
     """A run as the API and the page show it."""
-    return shapes.shown(control.open[run].run)
+    return views.shown(control.open[run].run)

@@ -7,11 +7,12 @@ from msgspec.structs import replace
 from sqlalchemy import select
 
 from action_assistant.journal.journal import Journal
-from action_assistant.runner import archive, shapes
-from action_assistant.runner.app import wall_clock
+from action_assistant.runner import projection
+from action_assistant.runner.clock import wall_clock
 from action_assistant.runner.control import Control
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots import Robots
+from action_assistant.runner.runs import queries, views
 from action_assistant.schema.runner_tables import robot, run
 from runner.world import ANN, BEN, order, sequence, until
 
@@ -23,7 +24,7 @@ async def _all(journal: Journal) -> list[Any]:
 
 async def test_rebuilt_tables_are_the_same(tmp_path: Path) -> None:
     url = f"sqlite:///{tmp_path / 'runner.db'}"
-    journal = await Journal.open(url, branch="runner", fold=archive.fold)
+    journal = await Journal.open(url, branch="runner", fold=projection.fold)
     async with Control.opened(journal, Robots(), wall=wall_clock) as control:
         await control.register(Registration(name="David", profile={"commit": "1"}), ANN)
         await control.register(Registration(name="David", domain=4), ANN)
@@ -41,16 +42,16 @@ async def test_rebuilt_tables_are_the_same(tmp_path: Path) -> None:
 
 async def test_the_row_of_a_run_that_is_over_tells_what_the_run_tells(tmp_path: Path) -> None:
     url = f"sqlite:///{tmp_path / 'runner.db'}"
-    journal = await Journal.open(url, branch="runner", fold=archive.fold)
+    journal = await Journal.open(url, branch="runner", fold=projection.fold)
     async with Control.opened(journal, Robots(), wall=wall_clock) as control:
         script = {"*": [{"after_s": 60, "stop_s": 2.5}]}
         started = await control.start(order(sequence(), script=script), ANN)
         await control.stop(started.run.id, BEN)  # takes so long that there is an alarm
         await until(lambda: not control.open)
         told = await control.find(started.run.id)
-        query = archive.listed(archive.Filter(), 9)
+        query = queries.listed(queries.Filter(), 9)
         (row,) = await control.history.rows(query)
     assert told.alarms
     # How long it took is summed up later, by the review.
-    assert shapes.summary_of_row(row) == replace(shapes.summary(told), took=None)
+    assert views.summary_of_row(row) == replace(views.summary(told), took=None)
     await journal.close()

@@ -4,10 +4,10 @@ import anyio
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
-from action_assistant.runner import shapes
-from action_assistant.runner.events import Published, Requested
 from action_assistant.runner.links.port import Order
-from action_assistant.runner.runs import ENDED
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import Published, Requested
+from action_assistant.runner.runs.run import ENDED
 from runner.world import (
     ANN,
     BEN,
@@ -353,6 +353,6 @@ async def test_where_the_simulator_plays_a_robot_it_pauses_only_as_safely_as_tha
         await anyio.sleep(1)
         with pytest.raises(Conflict, match="not safe"):
             await control.pause(run, ANN)
-        assert shapes.shown(control.open[run].run).like == "David"
+        assert views.shown(control.open[run].run).like == "David"
         control.stop_all(BEN)
         assert await ended(control, run) == "stopped"

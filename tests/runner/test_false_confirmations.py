@@ -22,9 +22,9 @@ from action_assistant.runner.control import Control
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Pause, Quirks, Start, Stop
-from action_assistant.runner.events import Override
 from action_assistant.runner.links.port import Link
-from action_assistant.runner.runs import ENDED, State
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.run import ENDED, State
 from action_assistant.runner.steering import RestRequest, confirm_rest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph

@@ -5,10 +5,11 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.runner.events import Author, Observed, Published, Requested
 from action_assistant.runner.lateness import fresh
 from action_assistant.runner.links.observations import Snapshot
-from action_assistant.runner.runs import Run, begin, follow
+from action_assistant.runner.runs.events import Author, Observed, Published, Requested
+from action_assistant.runner.runs.fold import begin, follow
+from action_assistant.runner.runs.run import Run
 
 NODES = ("A_0", "B_0", "C_0")
 

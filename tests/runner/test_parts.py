@@ -8,10 +8,10 @@ import pytest
 
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import index_of
-from action_assistant.runner.events import Override
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.parts import Parts
+from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph

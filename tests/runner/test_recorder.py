@@ -2,8 +2,8 @@
 
 import anyio
 
-from action_assistant.runner.events import AlarmRaised
-from action_assistant.runner.recorder import Recorder, stream_of
+from action_assistant.runner.runs.events import AlarmRaised
+from action_assistant.runner.runs.recorder import Recorder, stream_of
 from runner.world import MemoryLedger, until, virtual
 
 

@@ -10,9 +10,9 @@ import pytest
 from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Index, Quirks, Start
-from action_assistant.runner.events import Override
-from action_assistant.runner.refusals import StartLog, why_refused
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.refusals import StartLog, why_refused
+from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter, Signature
 from action_assistant.umrf.semantics import script_from

@@ -9,9 +9,7 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
-from action_assistant.runner import archive
 from action_assistant.runner.control import Control
-from action_assistant.runner.events import EngineSaid, Override
 from action_assistant.runner.flight import Commanded, EngineBecame, StopWasProven
 from action_assistant.runner.links.port import (
     Candidate,
@@ -23,6 +21,8 @@ from action_assistant.runner.links.port import (
 from action_assistant.runner.live import Hub
 from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.robots import Robots
+from action_assistant.runner.runs import queries
+from action_assistant.runner.runs.events import EngineSaid, Override
 from action_assistant.runner.starting import GroupRequest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
@@ -418,7 +418,7 @@ async def test_a_start_that_is_under_way_says_so_until_its_runs_are_there() -> N
         world.ledger.slow = 1.0
 
         async def found() -> list[str]:
-            rows = await control.history.rows(archive.of_start(asked.request_id))
+            rows = await control.history.rows(queries.of_start(asked.request_id))
             return sorted([(await control.find(row.id)).engine for row in rows])
 
         async with anyio.create_task_group() as tasks:

@@ -8,10 +8,10 @@ import msgspec
 import pytest
 
 from action_assistant.runner.control import Control
-from action_assistant.runner.events import Override
 from action_assistant.runner.review.cause import causes
 from action_assistant.runner.review.cause_words import words
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.model import ENTRY, Conditions, Graph, Parameter, Relation
 from runner.scene import Scene
 from runner.test_parts import WithSub, named
@@ -164,7 +164,7 @@ async def test_a_sub_graph_in_which_nothing_moves_is_named_and_stays_the_cause_a
 
 
 def test_an_entry_that_lacks_a_value_is_named_before_anything_ran() -> None:
-    from action_assistant.runner.stall import in_words, unbegun
+    from action_assistant.runner.runs.stall import in_words, unbegun
 
     (wait,) = unbegun(with_input(sequence("patrol", 2), 0))
     assert in_words(wait) == "Work_0 waits for its input “speed”, which has no value and gets none."

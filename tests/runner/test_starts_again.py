@@ -12,8 +12,8 @@ import pytest
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.emulator.messages import Quirks, Start, index_of
-from action_assistant.runner.events import Override
 from action_assistant.runner.links.port import Order
+from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from action_assistant.errors import NotFound
-from action_assistant.runner.events import Proof, StopSent
+from action_assistant.runner.runs.events import Proof, StopSent
 from action_assistant.umrf.model import Conditions
 from runner.world import (
     ANN,

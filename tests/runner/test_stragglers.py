@@ -9,10 +9,10 @@ from typing import Any
 
 import anyio
 
-from action_assistant.runner import archive
 from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.messages import Quirks
-from action_assistant.runner.events import Ended, MovesAgain, Proof, StopSent
+from action_assistant.runner.runs import queries
+from action_assistant.runner.runs.events import Ended, MovesAgain, Proof, StopSent
 from runner.air import now_ms
 from runner.scene import Scene, asked, shown
 from runner.world import ANN, BEN, until, virtual
@@ -48,7 +48,7 @@ async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
         assert (told.state, told.proof_at, told.ended_at) == ("stopping", None, None)
         assert told.moves_again_at is not None
         assert any("MOVES AGAIN: David shows Work_0" in each.text for each in told.alarms)
-        assert [row.id for row in await here.world.ledger.query(archive.open_runs())] == [run]
+        assert [row.id for row in await here.world.ledger.query(queries.open_runs())] == [run]
         await until(lambda: run not in control.open)
         assert here.nodes["David"].robot.moving == ()
         told = await control.find(run)
@@ -62,7 +62,7 @@ async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
     assert [kinds.count(each) for each in (MovesAgain, Proof, Ended)] == [1, 2, 2]
     assert StopSent in kinds[again:]
     assert here.world.ledger.history(run) == told
-    (row,) = await here.world.ledger.query(archive.listed(archive.Filter(), 5))
+    (row,) = await here.world.ledger.query(queries.listed(queries.Filter(), 5))
     assert (row.state, row.summary["proof_at"]) == ("stopped", told.proof_at)
     assert [each["code"] for each in row.summary["alarms"]].count("moves_again") == 1
 

@@ -6,12 +6,13 @@ import anyio
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from action_assistant.runner import shapes
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, index_of
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import Feedback, Report
-from action_assistant.runner.runs import ENDED, replay
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.run import ENDED
 from runner import world
 from runner.air import now_ms
 from runner.record_streams import Place
@@ -108,12 +109,10 @@ def test_nothing_is_shown_that_was_not_seen_and_live_is_as_it_is_told_later(
             assert visit.inputs is None or f"Work_{number}" in witness.active
             failed = call["result"] == "on_error"
             assert visit.result in {None, "stopped", *(["error"] if failed else [])}
-    live = [shapes.shown(shown) for _, shown in witness.place.world.shown]
-    later = [
-        shapes.shown(found) for n in range(1, len(events) + 1) if (found := replay(events[:n]))
-    ]
+    live = [views.shown(shown) for _, shown in witness.place.world.shown]
+    later = [views.shown(found) for n in range(1, len(events) + 1) if (found := replay(events[:n]))]
     assert list(_changes(live)) == list(_changes(later))
 
 
-def _changes(shown: list[shapes.RunShown]) -> list[shapes.RunShown]:
+def _changes(shown: list[views.RunShown]) -> list[views.RunShown]:
     return [each for n, each in enumerate(shown) if n == 0 or each != shown[n - 1]]

@@ -15,11 +15,11 @@ from action_assistant.runner.control import Control
 from action_assistant.runner.doubts import Doubts
 from action_assistant.runner.emulator.messages import Quirks, Start, Stop
 from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.events import Override
 from action_assistant.runner.links.engine_process import EngineProcess, has_ended, process
 from action_assistant.runner.links.engine_text import snapshot
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.robots import Robots
+from action_assistant.runner.runs.events import Override
 from action_assistant.runner.steering import RestRequest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Conditions
@@ -102,9 +102,9 @@ async def test_a_person_who_has_seen_it_at_rest_ends_it_and_that_is_no_proof() -
 
 
 def _listed() -> Any:
-    from action_assistant.runner import archive
+    from action_assistant.runner.runs import queries
 
-    return archive.listed(archive.Filter(), 100)
+    return queries.listed(queries.Filter(), 100)
 
 
 @virtual

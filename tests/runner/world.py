@@ -19,11 +19,10 @@ from sqlalchemy import Row, Select, StaticPool, create_engine
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.events import Snapshot as Kept
-from action_assistant.runner import archive
+from action_assistant.runner import projection
 from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.events import Author, RunEvent, decode
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
@@ -36,7 +35,9 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.robots import Robots
-from action_assistant.runner.runs import Run, replay
+from action_assistant.runner.runs.events import Author, RunEvent, decode
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.run import Run
 from action_assistant.schema.runner_tables import RUNNER
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import SIMULATED
@@ -149,7 +150,7 @@ class MemoryLedger:
                     draft.body,
                     self.position,
                 )
-                for statement in archive.fold(event):
+                for statement in projection.fold(event):
                     connection.execute(statement)
                 events.append(event)
         if self.forgetful:

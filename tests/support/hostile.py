@@ -16,11 +16,11 @@ from pathlib import Path
 import msgspec
 
 from action_assistant.journal.journal import Journal
-from action_assistant.runner import archive
-from action_assistant.runner.events import Ended, Observed, Published, Requested, encode
+from action_assistant.runner import projection
 from action_assistant.runner.links.observations import GraphState, NodeState
-from action_assistant.runner.recorder import stream_of
-from action_assistant.runner.runs import RunEvent
+from action_assistant.runner.runs.events import Ended, Observed, Published, Requested, encode
+from action_assistant.runner.runs.fold import RunEvent
+from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.web.auth.keys import Keys
@@ -42,7 +42,7 @@ async def _stored(data: Path, count: int) -> None:
 
     url = f"sqlite:///{data / 'runner.db'}"
     Journal.prepare(url, "runner")
-    journal = await Journal.open(url, branch="runner", fold=archive.fold)
+    journal = await Journal.open(url, branch="runner", fold=projection.fold)
     graph = sequence("hostile", 200)
     names = {each.full_name: each.key for each in graph.actions}
     begun = Requested(

@@ -29,10 +29,10 @@ from action_assistant.journal.database import cause_of
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.migrate import recognize
 from action_assistant.private_files import holds_nothing_else, open_to_others, prove_writable
-from action_assistant.runner import archive
 from action_assistant.runner.links.diagnostics import Finding, Verdict
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.checkup import look
+from action_assistant.runner.runs import queries
 from action_assistant.safe_text import one_line
 from action_assistant.settings import reached
 from action_assistant.version import VERSION
@@ -320,7 +320,7 @@ def _registered(data: Path) -> list[Registration]:
     engine = create_engine("sqlite://", creator=reader)
     try:
         with engine.connect() as connection:
-            rows = connection.execute(archive.all_robots()).all()
+            rows = connection.execute(queries.all_robots()).all()
     except (sqlite3.Error, DBAPIError):
         return []  # what is wrong with the file is said elsewhere
     finally:

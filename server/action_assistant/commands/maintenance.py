@@ -72,7 +72,7 @@ def _for_each(
     """Do it to every journal that there is; 1 unless all went well. Raises CannotStart."""
     from action_assistant.editor.log import database_location
     from action_assistant.editor.log.graph_events import fold as editor_fold
-    from action_assistant.runner.archive import fold as runner_fold
+    from action_assistant.runner.projection import fold as runner_fold
 
     data = options.data.resolve()
     settled(data)

@@ -7,9 +7,9 @@ from typing import Annotated, Final, TypeVar
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
-from action_assistant.runner.events import Override
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.links.simulator import slowed
+from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.check import STRUCTURAL, blocking, check
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import EngineFacts

@@ -15,7 +15,7 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound, TooMany
 from action_assistant.journal.journal import Journal
-from action_assistant.runner import archive, robots_api, shapes
+from action_assistant.runner import robots_api
 from action_assistant.runner.admission import decoded, read_request
 from action_assistant.runner.asking import LARGE, author_of, body_of, start_of
 from action_assistant.runner.control import Control
@@ -26,7 +26,6 @@ from action_assistant.runner.described import (
     StopOperation,
 )
 from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.history import Aside
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.live import Hub, Stopping, attend, work_out
 from action_assistant.runner.review import listing
@@ -34,10 +33,12 @@ from action_assistant.runner.review import routes as review
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.review.stored import Asked, json_of
-from action_assistant.runner.runs import Run, State
+from action_assistant.runner.runs import queries, views
+from action_assistant.runner.runs.run import Run, State
 from action_assistant.runner.steering import RestRequest
 from action_assistant.web.auth.access import Needs, person_of, refuse, require
 from action_assistant.web.network.connection_limits import Crowd, Turns
+from action_assistant.web.workers.lanes import Aside
 
 _PAGE: Final = 500  # events read at once
 _BODIES: Final = 4  # large ones of a person at a time
@@ -59,7 +60,7 @@ class House:
     retention: Retention
     turns: Turns
     aside: Aside
-    sent: WeakKeyDictionary[OpenRun, shapes.Sent]
+    sent: WeakKeyDictionary[OpenRun, views.Sent]
 
     def __init__(self) -> None:
         self.sent = WeakKeyDictionary()
@@ -92,7 +93,7 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
         guards=[Needs("simulate")],
         request_max_body_size=LARGE,
     )
-    async def start(request: _Asking) -> Response[shapes.RunShown]:
+    async def start(request: _Asking) -> Response[views.RunShown]:
         async with body_of(request, house.turns) as body:
             asked = read_request(body)
             if asked.engine != SIMULATOR:
@@ -105,12 +106,12 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
         )
 
     @get("/api/starts/{request_id:str}", summary="What has become of a start, by its request_id")
-    async def started(request_id: str) -> shapes.StartShown:
+    async def started(request_id: str) -> views.StartShown:
         under_way = house.control.under_way(request_id)  # before: what it becomes is stored by then
-        rows = await house.control.history.rows(archive.of_start(request_id))
+        rows = await house.control.history.rows(queries.of_start(request_id))
         runs = [await house.control.find(row.id) for row in rows]
         found = [await _shown(house, run) for run in runs]
-        return shapes.StartShown(request_id=request_id, under_way=under_way, runs=found)
+        return views.StartShown(request_id=request_id, under_way=under_way, runs=found)
 
     return [start, started]
 
@@ -144,9 +145,9 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
         summary="Pause a run",
         guards=[Needs("simulate")],
     )
-    async def pause(run: str, request: _Asking) -> shapes.RunShown:
+    async def pause(run: str, request: _Asking) -> views.RunShown:
         await _require_hand_on(house, run, request)
-        return shapes.shown(await house.control.pause(run, author_of(request)))
+        return views.shown(await house.control.pause(run, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/resume",
@@ -154,9 +155,9 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
         summary="Let a paused run go on",
         guards=[Needs("simulate")],
     )
-    async def resume(run: str, request: _Asking) -> shapes.RunShown:
+    async def resume(run: str, request: _Asking) -> views.RunShown:
         await _require_hand_on(house, run, request)
-        return shapes.shown(await house.control.resume(run, author_of(request)))
+        return views.shown(await house.control.resume(run, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/modify",
@@ -166,10 +167,10 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
         guards=[Needs("simulate")],
         request_max_body_size=LARGE,
     )
-    async def modify(run: str, request: _Asking) -> shapes.RunShown:
+    async def modify(run: str, request: _Asking) -> views.RunShown:
         await _require_hand_on(house, run, request)
         async with body_of(request, house.turns) as body:
-            return shapes.shown(await house.control.modify(run, body, author_of(request)))
+            return views.shown(await house.control.modify(run, body, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/at_rest",
@@ -178,9 +179,9 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
         operation_class=RestOperation,
         guards=[Needs("operate")],
     )
-    async def at_rest(run: str, request: _Asking) -> shapes.RunShown:
+    async def at_rest(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), RestRequest)
-        return shapes.shown(await house.control.confirm_rest(run, asked, author_of(request)))
+        return views.shown(await house.control.confirm_rest(run, asked, author_of(request)))
 
     return [stop_all, stop, pause, resume, modify, at_rest]
 
@@ -201,9 +202,9 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
         until: datetime | None = None,
         before: str | None = None,
         limit: Annotated[int, Parameter(ge=1, le=1000)] = 200,
-    ) -> Response[list[shapes.Listed]]:
+    ) -> Response[list[views.Listed]]:
         states = _states(run_state)
-        wanted = archive.Filter(
+        wanted = queries.Filter(
             graph=graph,
             engine=robot,
             states=states,
@@ -218,33 +219,33 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
             before=before,
         )
         going = {
-            run: shapes.summary(opened.run, recorded=opened.recorder.recorded)
+            run: views.summary(opened.run, recorded=opened.recorder.recorded)
             for run, opened in house.control.open.items()
         }
         found = await house.asked.text(listing.listed, wanted, limit, going)
-        return json_of(found, list[shapes.Listed])
+        return json_of(found, list[views.Listed])
 
     @get("/api/labels", summary="Labels of runs, the most used first")
     async def every_label() -> list[str]:
-        rows = await house.control.history.rows(archive.all_labels())
+        rows = await house.control.history.rows(queries.all_labels())
         return [row.label for row in rows]
 
     @get("/api/runs/{run:str}", summary="A run, and the graph as it was sent")
-    async def one(run: str) -> Response[shapes.RunWhole]:
+    async def one(run: str) -> Response[views.RunWhole]:
         opened = house.control.open.get(run)
         if opened is None:
-            return json_of(await house.asked.text(Desk.whole, run), shapes.RunWhole)
+            return json_of(await house.asked.text(Desk.whole, run), views.RunWhole)
         if opened not in house.sent:
             house.sent[opened] = await house.asked.value(Desk.sent, run)
         opened = house.control.open.get(run, opened)
         await house.hub.work_out(opened)
-        whole = shapes.whole(
+        whole = views.whole(
             opened.run,
             house.sent[opened],
             recorded=opened.recorder.recorded,
             memo=house.hub.memo(opened),
         )
-        return json_of(msgspec.json.encode(whole), shapes.RunWhole)
+        return json_of(msgspec.json.encode(whole), views.RunWhole)
 
     @get("/api/runs/{run:str}/events", summary="A run's events as they are stored (SSE)")
     async def events(run: str, request: _Asking) -> Stream | Response[None]:
@@ -292,15 +293,15 @@ async def _stop_id(request: _Asking) -> str:
         return ""
 
 
-async def _shown(house: House, run: Run) -> shapes.RunShown:
+async def _shown(house: House, run: Run) -> views.RunShown:
     """As it is now, put together without holding up others."""
     opened = house.control.open.get(run.id)
     if opened is not None:
         await house.hub.work_out(opened)
         return house.hub.shown(opened)
-    memo = shapes.Memo()
+    memo = views.Memo()
     await work_out(run, memo)
-    return shapes.shown(run, memo=memo)
+    return views.shown(run, memo=memo)
 
 
 def _states(asked: str | None) -> tuple[str, ...]:

@@ -1,7 +1,6 @@
 """The runner process: its journal, its service, its routes."""
 
 import sys
-import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -14,9 +13,10 @@ from litestar.types import ASGIApp
 from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
 from action_assistant.public_url import RUNNER
-from action_assistant.runner import archive
+from action_assistant.runner import projection
 from action_assistant.runner.api import House, routes
 from action_assistant.runner.asking import SMALL
+from action_assistant.runner.clock import wall_clock
 from action_assistant.runner.control import Control
 from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
@@ -41,17 +41,12 @@ from action_assistant.web.server.application import Readiness, application
 _SWITCH_S: Final = 0.0005
 
 
-def wall_clock() -> int:
-    """Microseconds UTC."""
-    return time.time_ns() // 1000
-
-
 @asynccontextmanager
 async def open_house(settings: RunnerSettings, house: House | None = None) -> AsyncIterator[House]:
     """Everything the routes need, working. Raises CannotStart."""
     house = house or House()
     sys.setswitchinterval(_SWITCH_S)
-    journal = await Journal.open(_database(settings), branch="runner", fold=archive.fold)
+    journal = await Journal.open(_database(settings), branch="runner", fold=projection.fold)
     try:
         keep = settings.keep or Keep(folder=settings.data / ARCHIVE)
         on_disk = anyio.to_thread.run_sync  # threads wait for disks; what computes goes to workers

@@ -10,7 +10,7 @@ from litestar import Request
 from litestar.connection import ASGIConnection
 
 from action_assistant.errors import Unavailable
-from action_assistant.runner.events import Author
+from action_assistant.runner.runs.events import Author
 from action_assistant.web.auth.access import person_of, session_of
 from action_assistant.web.network.connection_limits import Turns
 

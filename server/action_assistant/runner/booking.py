@@ -9,14 +9,15 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
-from action_assistant.runner import archive
 from action_assistant.runner.admission import StartRequest
-from action_assistant.runner.driving import Clock
-from action_assistant.runner.events import Author, Ended, Requested, encode
-from action_assistant.runner.history import Ledger
+from action_assistant.runner.clock import Clock
 from action_assistant.runner.links.port import Order, Outline
-from action_assistant.runner.recorder import stream_of
-from action_assistant.runner.runs import Run, begin
+from action_assistant.runner.runs import queries
+from action_assistant.runner.runs.events import Author, Ended, Requested, encode
+from action_assistant.runner.runs.fold import begin
+from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.runs.run import Run
 from action_assistant.runner.starting import Cleared
 
 
@@ -101,7 +102,7 @@ class Book:
 
     async def run_of(self, asked: StartRequest) -> str | None:
         """The run that a request has become. Raises Conflict when it was another start."""
-        rows = await self._ledger.query(archive.by_request(asked.request_id))
+        rows = await self._ledger.query(queries.by_request(asked.request_id))
         if not rows:
             return None
         row = rows[0]

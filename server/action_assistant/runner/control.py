@@ -14,24 +14,27 @@ from anyio.abc import TaskGroup
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
-from action_assistant.runner import archive, steering
+from action_assistant.runner import steering
 from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.booking import Book, Stops, booked
-from action_assistant.runner.driving import Clock, OpenRun
+from action_assistant.runner.clock import Clock
+from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.events import Author, Ended, MovesAgain
 from action_assistant.runner.flight import Commanded
-from action_assistant.runner.history import Aside, History, Ledger, Past
 from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, Order, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.links.unreachable import AbsentLink
 from action_assistant.runner.preflight import Preflight, Settled, check_items, of_taken
 from action_assistant.runner.registered import Robot
 from action_assistant.runner.robots import Ground, Robots
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs import queries
+from action_assistant.runner.runs.events import Author, Ended, MovesAgain
+from action_assistant.runner.runs.history import History, Ledger, Past
+from action_assistant.runner.runs.run import Run
 from action_assistant.runner.starting import Cleared, Grouped, GroupRequest, Started, Starting
 from action_assistant.runner.stragglers import Stragglers
 from action_assistant.web.auth.access import done_for_nobody
+from action_assistant.web.workers.lanes import Aside
 
 log: Final = logging.getLogger(__name__)
 
@@ -355,7 +358,7 @@ class Control:
 
     async def _over(self, run: str) -> Row[Any]:
         """What the table tells of a run: that takes no time. Raises NotFound, Unavailable."""
-        rows = await self._ledger.query(archive.of_run(run))
+        rows = await self._ledger.query(queries.of_run(run))
         if not rows:
             raise NotFound("There is no such run.")
         return rows[0]
@@ -406,7 +409,7 @@ class Control:
 
     async def _take_up(self) -> None:
         """Adopt what an earlier process left: pending stops first of all; nothing is started."""
-        self._number = (await self._ledger.query(archive.last_number()))[0][0]
+        self._number = (await self._ledger.query(queries.last_number()))[0][0]
         ground = Ground(
             self._ledger,
             self._tasks,
@@ -418,7 +421,7 @@ class Control:
         )
         self._tasks.start_soon(self._stragglers.run)
         self.robots.open(ground)
-        for row in await self._ledger.query(archive.all_robots()):
+        for row in await self._ledger.query(queries.all_robots()):
             self.robots.add(
                 Registration(
                     name=row.name,
@@ -428,7 +431,7 @@ class Control:
                     profile=row.profile,
                 )
             )
-        for row in await self._ledger.query(archive.open_runs()):
+        for row in await self._ledger.query(queries.open_runs()):
             run, seq, is_whole = await self.history.left(row.id)
             if run is None or run.end is not None:
                 log.error("run %s: table and events differ; `rebuild` mends the table", row.id)

@@ -7,11 +7,8 @@ a stop or a pause could have reached it before.
 """
 
 from collections.abc import Sequence
-from typing import Final
 
-from action_assistant.runner.links.observations import Snapshot
-
-_NAMED: Final = 3
+from action_assistant.runner.links.observations import Snapshot, did_not_obey, failed_in
 
 
 class Doubts:
@@ -59,17 +56,3 @@ class Doubts:
             self._open[place] = None
         else:
             self._thrown.add(place)
-
-
-def failed_in(shown: Snapshot) -> list[str]:
-    """The actions that an engine calls ERROR."""
-    return [node for node, state in shown.nodes.items() if state == "ERROR"]
-
-
-def did_not_obey(names: Sequence[str]) -> str:
-    """The sentence for actions that an engine has given up."""
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return (
-        f"{', '.join(names[:_NAMED])}{more} did not obey within 5 s, or failed while it was told to "
-        "stop: the engine says ERROR, but the code may still run"
-    )

@@ -12,8 +12,26 @@ import anyio
 import msgspec
 
 from action_assistant.errors import Refused
+from action_assistant.runner.clock import Clock
 from action_assistant.runner.doubts import Doubts
-from action_assistant.runner.events import (
+from action_assistant.runner.flight import alarm_of
+from action_assistant.runner.links.observations import Hazard, Seen
+from action_assistant.runner.links.port import (
+    EngineChanged,
+    EngineLog,
+    EngineRefused,
+    Feedback,
+    ForeignCommand,
+    Link,
+    NoAnswer,
+    NotSent,
+    Order,
+    Report,
+    Transitions,
+    outline,
+)
+from action_assistant.runner.proof import SET_GOING
+from action_assistant.runner.runs.events import (
     AlarmRaised,
     AtRest,
     Author,
@@ -31,28 +49,13 @@ from action_assistant.runner.events import (
     Silent,
     Unconfirmed,
 )
-from action_assistant.runner.flight import alarm_of
-from action_assistant.runner.history import Aside, sent_of
-from action_assistant.runner.links.observations import Hazard, Seen
-from action_assistant.runner.links.port import (
-    EngineChanged,
-    EngineLog,
-    EngineRefused,
-    Feedback,
-    ForeignCommand,
-    Link,
-    NoAnswer,
-    NotSent,
-    Order,
-    Report,
-    Transitions,
-    outline,
-)
-from action_assistant.runner.proof import SET_GOING
-from action_assistant.runner.recorder import Recorder, Store
-from action_assistant.runner.runs import Run, follow, thin
+from action_assistant.runner.runs.fold import follow, thin
+from action_assistant.runner.runs.history import sent_of
+from action_assistant.runner.runs.recorder import Recorder, Store
+from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop_loop import StopLoop
 from action_assistant.runner.watching import Watch
+from action_assistant.web.workers.lanes import Aside
 
 log: Final = logging.getLogger(__name__)
 
@@ -63,8 +66,6 @@ _LINES: Final = 2_000  # of the engine's log, kept with one run
 _LONGEST_LINE: Final = 2_000  # characters
 
 _RESULTS: Final = {"HALTED": "on_halted", "STOPPED": "on_stopped", "ERROR": "on_error"}
-
-Clock = Callable[[], int]
 
 
 class OpenRun:

@@ -12,10 +12,10 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import NotFound
 from action_assistant.journal.events import Draft, Event
-from action_assistant.runner.events import Author
-from action_assistant.runner.history import Ledger
 from action_assistant.runner.links.port import Command, EngineState, ForeignCommand
-from action_assistant.runner.recorder import Pen
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.runs.recorder import Pen
 
 
 def stream_of_robot(name: str) -> str:

@@ -7,7 +7,8 @@ of that already. Applied after it, the older states would look like further visi
 from collections.abc import Sequence
 
 from action_assistant.runner.links.observations import FAR, Snapshot
-from action_assistant.runner.runs import Run, is_news, key_of
+from action_assistant.runner.runs.fold import is_news, key_of
+from action_assistant.runner.runs.run import Run
 
 
 def fresh(run: Run, snapshots: Sequence[Snapshot]) -> tuple[Snapshot, ...]:

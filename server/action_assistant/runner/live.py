@@ -19,13 +19,14 @@ from litestar import WebSocket
 from litestar.exceptions import WebSocketDisconnect, WebSocketException
 
 from action_assistant.errors import Refused
-from action_assistant.runner import shapes
 from action_assistant.runner.asking import author_of
+from action_assistant.runner.clock import Clock
 from action_assistant.runner.control import Control
-from action_assistant.runner.driving import Clock, OpenRun
-from action_assistant.runner.events import Author
+from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.registered import Robot
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.run import Run
 from action_assistant.web.auth.access import session_of
 
 log: Final = logging.getLogger(__name__)
@@ -66,13 +67,13 @@ class Hello(msgspec.Struct, frozen=True, tag="hello", tag_field="type"):
     """The first message."""
 
     engines: list[Robot]
-    runs: list[shapes.RunShown]
+    runs: list[views.RunShown]
 
 
 class RunMessage(msgspec.Struct, frozen=True, tag="run", tag_field="type"):
     """A run as it is now."""
 
-    run: shapes.RunShown
+    run: views.RunShown
 
 
 class EnginesMessage(msgspec.Struct, frozen=True, tag="engines", tag_field="type"):
@@ -107,7 +108,7 @@ class Hub:
         self.wall = wall
         self.boxes: set[Outbox] = set()
         self._frames: WeakKeyDictionary[OpenRun, Frame] = WeakKeyDictionary()
-        self._memos: WeakKeyDictionary[OpenRun, shapes.Memo] = WeakKeyDictionary()
+        self._memos: WeakKeyDictionary[OpenRun, views.Memo] = WeakKeyDictionary()
         self._engines: str | None = None
         control.watch(self._changed)
         control.watch_robots(self._robots_changed)
@@ -127,12 +128,12 @@ class Hub:
     def beat(self) -> str:
         """A sign of life."""
         seen = {
-            run: shapes.time(opened.watch.seen_at)
+            run: views.time(opened.watch.seen_at)
             for run, opened in self.control.open.items()
             if opened.watch.seen_at is not None
         }
-        heard = {name: shapes.time(at) for name, at in self.control.robots.heard().items()}
-        return _text(Beat(shapes.time(self.wall()), seen, heard))
+        heard = {name: views.time(at) for name, at in self.control.robots.heard().items()}
+        return _text(Beat(views.time(self.wall()), seen, heard))
 
     def _changed(self, opened: OpenRun) -> None:
         for box in self.boxes:
@@ -165,14 +166,14 @@ class Hub:
         """Make sure that showing a run takes little time now."""
         await work_out(opened.run, self.memo(opened))
 
-    def memo(self, opened: OpenRun) -> shapes.Memo:
+    def memo(self, opened: OpenRun) -> views.Memo:
         """What was shown of a run so far."""
-        return self._memos.setdefault(opened, shapes.Memo())
+        return self._memos.setdefault(opened, views.Memo())
 
-    def shown(self, opened: OpenRun) -> shapes.RunShown:
+    def shown(self, opened: OpenRun) -> views.RunShown:
         """A run as it is now."""
         recorded = opened.recorder.recorded
-        return shapes.shown(opened.run, recorded=recorded, memo=self.memo(opened))
+        return views.shown(opened.run, recorded=recorded, memo=self.memo(opened))
 
     async def follow(self, text: str, author: Author) -> str:
         """Do what a page says; the answer."""
@@ -193,7 +194,7 @@ class Hub:
         return _text(Stopping(stop_id, runs))
 
 
-async def work_out(run: Run, memo: shapes.Memo) -> None:
+async def work_out(run: Run, memo: views.Memo) -> None:
     """Know how a run is shown, without doing nothing else meanwhile."""
     for _ in memo.work_out(run, _AT_ONCE):
         await anyio.lowlevel.checkpoint()

@@ -11,12 +11,11 @@ import msgspec
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.admission import Admitted, Prepared
-from action_assistant.runner.doubts import failed_in
 from action_assistant.runner.engines import Index
-from action_assistant.runner.links.observations import Snapshot
+from action_assistant.runner.foreign_graphs import strangers
+from action_assistant.runner.links.observations import Snapshot, failed_in
 from action_assistant.runner.links.port import Answer, Standing
-from action_assistant.runner.proof import strangers
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.check import STRUCTURAL, check
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec

@@ -2,14 +2,14 @@
 
 import hashlib
 import logging
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import anyio
 import msgspec
 
 from action_assistant.runner.links.observations import TERMINAL, Snapshot
-from action_assistant.runner.links.port import Answer, Link, NotSent
+from action_assistant.runner.links.port import Link, NotSent
 
 log: Final = logging.getLogger(__name__)
 
@@ -41,24 +41,6 @@ async def send_stop(link: Link, graph: str) -> str:
 def hash_of(shown: Sequence[Snapshot]) -> str:
     """SHA-256 over what an answer showed, for the record of a proof."""
     return hashlib.sha256(msgspec.json.encode(list(shown))).hexdigest()
-
-
-def strangers(answer: Answer, going: Collection[str]) -> list[str]:
-    """The graphs that an engine runs and that are no runs of ours `going` on there: also those of
-    which no action has begun yet, or none moves right now. Sub-graphs are named by their graph."""
-    held = {each.graph for each in answer.graphs}
-    tops = {
-        each.graph
-        for each in answer.graphs
-        if (each.active or (each.state == "RUNNING" and not _within(each.graph, held)))
-        and (each.run is None or each.run not in going)
-    }
-    return sorted(name for name in tops if not _within(name, tops))
-
-
-def _within(name: str, graphs: Collection[str]) -> bool:
-    """Whether it is a sub-graph of one of them."""
-    return any(name.startswith(f"{each}__") for each in graphs)
 
 
 class Rest:

@@ -12,7 +12,7 @@ import msgspec
 
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Draft, Event
-from action_assistant.runner.events import Requested, decode, encode
+from action_assistant.runner.runs.events import Requested, decode, encode
 
 ENDING: Final = ".run.jsonl"
 #: The label that examples carry.

@@ -19,9 +19,9 @@ import msgspec
 
 from action_assistant.errors import NotFound
 from action_assistant.private_files import make_folder, opener
-from action_assistant.runner.history import Aside
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, Feedback
+from action_assistant.web.workers.lanes import Aside
 
 log: Final = logging.getLogger(__name__)
 

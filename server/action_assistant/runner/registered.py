@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.links.port import SIMULATOR, EngineState, Generation, Registration
-from action_assistant.runner.shapes import time
+from action_assistant.runner.runs.views import time
 from action_assistant.umrf.facts import BadProfile, facts_of
 
 #: The stream of all registrations.

@@ -10,11 +10,10 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft
-from action_assistant.runner.driving import Clock
+from action_assistant.runner.clock import Clock
 from action_assistant.runner.engines import Index, KnownEngine
-from action_assistant.runner.events import Author
 from action_assistant.runner.flight import Commanded, EngineBecame, FlightRecorder
-from action_assistant.runner.history import Aside, Ledger
+from action_assistant.runner.foreign_graphs import strangers
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     SIMULATOR,
@@ -24,7 +23,6 @@ from action_assistant.runner.links.port import (
     Reach,
     Registration,
 )
-from action_assistant.runner.proof import strangers
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.registered import (
     STREAM,
@@ -34,8 +32,11 @@ from action_assistant.runner.registered import (
     check_registration,
     seen,
 )
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.history import Ledger
 from action_assistant.runner.silencing import Silencing
 from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
+from action_assistant.web.workers.lanes import Aside
 
 log: Final = logging.getLogger(__name__)
 

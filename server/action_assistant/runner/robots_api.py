@@ -8,7 +8,6 @@ from litestar import Request, Response, delete, get, patch, post
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound
-from action_assistant.runner import shapes
 from action_assistant.runner.asking import LARGE, author_of, body_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import GroupOperation, LookOperation
@@ -20,16 +19,17 @@ from action_assistant.runner.flight import (
     StopUnproven,
     StopWasProven,
 )
-from action_assistant.runner.history import Aside
 from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
 from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.recordings import Recording
 from action_assistant.runner.registered import Robot
+from action_assistant.runner.runs import views
 from action_assistant.runner.starting import read_group
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Signature
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.network.connection_limits import Turns
+from action_assistant.web.workers.lanes import Aside
 
 _EVENTS: Final = 200
 _Asking = Request[Any, Any, Any]
@@ -102,7 +102,7 @@ class GroupShown(msgspec.Struct, frozen=True, kw_only=True):
     """Runs that were started together. `failed`: robots that nothing was sent to, and why."""
 
     id: str
-    runs: list[shapes.RunShown]
+    runs: list[views.RunShown]
     failed: dict[str, str]
 
 
@@ -225,7 +225,7 @@ def _starts(house: Has) -> list[ControllerRouterHandler]:
     async def start(request: _Asking) -> Response[GroupShown]:
         async with body_of(request, house.turns) as body:
             grouped = await house.control.start_group(read_group(body), author_of(request))
-        runs = [shapes.shown(run) for run in grouped.runs]
+        runs = [views.shown(run) for run in grouped.runs]
         shown = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
         return Response(shown, status_code=201 if grouped.fresh else 200)
 
@@ -237,7 +237,7 @@ def _action(name: str, signature: Signature) -> KnownAction:
 
 
 def _told(seq: int, event: RobotEvent) -> Told:
-    at = shapes.time(event.at)
+    at = views.time(event.at)
     match event:
         case Commanded():
             return Told(

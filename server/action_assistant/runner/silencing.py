@@ -11,14 +11,14 @@ from typing import Final
 import anyio
 from anyio.abc import TaskGroup
 
+from action_assistant.runner.clock import Clock
 from action_assistant.runner.doubts import Doubts
-from action_assistant.runner.driving import Clock
 from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.events import Author
 from action_assistant.runner.flight import RobotEvent, StopAsked, StopUnproven, StopWasProven
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, ForeignCommand, NoAnswer
 from action_assistant.runner.proof import SET_GOING, Rest, send_stop
+from action_assistant.runner.runs.events import Author
 
 _GAP_S: Final = 0.1
 _SLOWEST_S: Final = 1.0

@@ -9,10 +9,10 @@ from typing import Final, Protocol
 
 import anyio
 
-from action_assistant.runner.events import Author, End, RunEvent, StopRequested, StopSent
 from action_assistant.runner.links.port import Link
 from action_assistant.runner.proof import send_stop
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs.events import Author, End, RunEvent, StopRequested, StopSent
+from action_assistant.runner.runs.run import Run
 from action_assistant.runner.watching import Watch
 
 _FIRST_GAP_S: Final = 0.1

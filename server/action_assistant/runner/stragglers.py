@@ -14,16 +14,17 @@ import msgspec
 from anyio.abc import TaskGroup
 
 from action_assistant.errors import NotFound, Refused
-from action_assistant.runner.driving import Clock, OpenRun
+from action_assistant.runner.clock import Clock
+from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.events import MovesAgain
 from action_assistant.runner.flight import Commanded
-from action_assistant.runner.history import History
 from action_assistant.runner.links.engine_text import run_in
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import ForeignCommand, NoAnswer
 from action_assistant.runner.robots import Robots
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs.events import MovesAgain
+from action_assistant.runner.runs.history import History
+from action_assistant.runner.runs.run import Run
 
 log: Final = logging.getLogger(__name__)
 

@@ -17,15 +17,15 @@ import msgspec
 from action_assistant.journal import sqlite as sqlite_journal
 from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.journal import Journal
-from action_assistant.runner import archive
-from action_assistant.runner.events import Ended, Observed, Published, encode
+from action_assistant.runner import projection
 from action_assistant.runner.links.observations import NodeState
-from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review import about, bundle
 from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.review.shelf import Shelf
-from action_assistant.runner.runs import replay
+from action_assistant.runner.runs.events import Ended, Observed, Published, encode
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.settings import Keep
 from runner.test_runs import REQUESTED
 
@@ -38,7 +38,7 @@ _HOURS: Final = ("1970-03-01T07", "1970-03-01T08", "1970-04-10T23")
 
 def opened(data: Path) -> "asyncio.Future[Journal]":
     url = f"sqlite:///{data / 'runner.db'}"
-    return asyncio.ensure_future(Journal.open(url, branch="runner", fold=archive.fold))
+    return asyncio.ensure_future(Journal.open(url, branch="runner", fold=projection.fold))
 
 
 async def filled(data: Path) -> None:

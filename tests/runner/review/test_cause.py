@@ -8,7 +8,10 @@ import pytest
 from action_assistant.journal.events import Draft
 from action_assistant.paths import examples
 from action_assistant.runner import recorded_runs
-from action_assistant.runner.events import (
+from action_assistant.runner.links.observations import GraphState, NodeResult, NodeState
+from action_assistant.runner.review.cause import Cause, causes
+from action_assistant.runner.review.cause_words import words
+from action_assistant.runner.runs.events import (
     AlarmRaised,
     Author,
     Ended,
@@ -20,10 +23,8 @@ from action_assistant.runner.events import (
     StopRequested,
     decode,
 )
-from action_assistant.runner.links.observations import GraphState, NodeResult, NodeState
-from action_assistant.runner.review.cause import Cause, causes
-from action_assistant.runner.review.cause_words import words
-from action_assistant.runner.runs import Run, replay
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.process import RunnerProcess

@@ -13,12 +13,12 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from action_assistant.runner import shapes
-from action_assistant.runner.durations import Took, at_rank, took_us
-from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.review import about, again, compare, exports, statistics
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.review.shelf import Shelf
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.durations import Took, at_rank, took_us
+from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.bounds import Air, Lived, lived
@@ -90,7 +90,7 @@ def test_the_truth_lies_inside_of_every_figure(
             assert (
                 not row["seconds"] or abs(float(row["seconds"]) - real[row["action"]] / 1e6) < 0.002
             )
-    for name, shown in shapes.shown(run).actions.items():
+    for name, shown in views.shown(run).actions.items():
         for visit in shown.visits:
             if visit.until is None or visit.not_after is None or name not in real:
                 continue

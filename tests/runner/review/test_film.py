@@ -9,12 +9,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from action_assistant.journal.events import Draft
-from action_assistant.runner import shapes
-from action_assistant.runner.events import Author, Ended, Observed, RunEvent, StopRequested, encode
 from action_assistant.runner.links.observations import NodeResult, NodeState, Seen, Snapshot
 from action_assistant.runner.review.film import Film, Frame, film
 from action_assistant.runner.review.reel import APART, Reels
-from action_assistant.runner.runs import replay
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import (
+    Author,
+    Ended,
+    Observed,
+    RunEvent,
+    StopRequested,
+    encode,
+)
+from action_assistant.runner.runs.fold import replay
 from runner.test_runs import STARTED
 from runner.world import MemoryLedger, at_once, virtual
 
@@ -99,7 +106,7 @@ def test_replay_at_any_event_equals_the_fold_of_the_events_up_to_it(drawn: Any) 
         for upto in range(1, len(events) + 1):
             run = replay(events[:upto])
             assert run is not None
-            whole = msgspec.to_builtins(shapes.shown(run))
+            whole = msgspec.to_builtins(views.shown(run))
             shown = played(reel, upto)
             assert shown["head"]["state"] == whole["state"]
             assert shown["head"].get("unknown_since") == whole["unknown_since"]
@@ -133,7 +140,7 @@ async def test_the_pages_of_a_long_film_join_without_a_gap() -> None:
     assert seqs == list(range(1, len(events) + 1))
     run = replay(events[:APART])
     assert run is not None
-    assert second.base == shapes.shown(run)
+    assert second.base == views.shown(run)
 
 
 @virtual

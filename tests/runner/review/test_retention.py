@@ -12,12 +12,12 @@ import pytest
 from sqlalchemy import select
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.events import Author
-from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.review import about, bundle
 from action_assistant.runner.review.film import film
 from action_assistant.runner.review.reel import Reels
 from action_assistant.runner.review.shelf import Archived
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.schema.runner_tables import run
 from runner.review.old_runs import (
     LENGTHS,

@@ -97,7 +97,7 @@ def fold_of(branch: Branch) -> Fold:
         from action_assistant.editor.log.graph_events import fold as editor_fold
 
         return editor_fold
-    from action_assistant.runner.archive import fold as runner_fold
+    from action_assistant.runner.projection import fold as runner_fold
 
     return runner_fold
 

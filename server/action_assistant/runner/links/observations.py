@@ -5,9 +5,13 @@ running name, a node's full name (`NAME_ID`). These values are journaled as they
 only ever added, with a default.
 """
 
+from collections.abc import Sequence
 from typing import Final, Literal, TypeAlias
 
 import msgspec
+
+_NAMED: Final = 3
+
 
 #: States in which a node moves, or may move again without a new start.
 ACTIVE: Final = frozenset({"RUNNING", "STOPPING", "PAUSE_REQUESTED", "PAUSED"})
@@ -118,3 +122,17 @@ class Snapshot(msgspec.Struct, frozen=True, omit_defaults=True, tag="snapshot", 
 
 Exact: TypeAlias = NodeState | NodeResult | GraphState | GraphResult | Hazard
 Seen: TypeAlias = Exact | Snapshot
+
+
+def failed_in(shown: Snapshot) -> list[str]:
+    """The actions that an engine calls ERROR."""
+    return [node for node, state in shown.nodes.items() if state == "ERROR"]
+
+
+def did_not_obey(names: Sequence[str]) -> str:
+    """The sentence for actions that an engine has given up."""
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return (
+        f"{', '.join(names[:_NAMED])}{more} did not obey within 5 s, or failed while it was told to "
+        "stop: the engine says ERROR, but the code may still run"
+    )

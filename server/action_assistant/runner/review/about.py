@@ -13,12 +13,12 @@ from sqlalchemy import Executable, delete, func, insert, update
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Draft, Event
-from action_assistant.runner.durations import Took, of_run, of_visit, took_us
-from action_assistant.runner.events import Author
 from action_assistant.runner.review.cause import causes
 from action_assistant.runner.review.cause_words import words
-from action_assistant.runner.runs import Run
-from action_assistant.runner.visits import ActionRun
+from action_assistant.runner.runs.durations import Took, of_run, of_visit, took_us
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun
 from action_assistant.schema.runner_tables import action_sum, review, run_label
 from action_assistant.schema.runner_tables import run as runs
 from action_assistant.umrf.model import Graph

@@ -13,10 +13,10 @@ from sqlalchemy import Executable
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.durations import of_visit
-from action_assistant.runner.events import Author
-from action_assistant.runner.runs import Run
-from action_assistant.runner.visits import ActionRun, Visit
+from action_assistant.runner.runs.durations import of_visit
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun, Visit
 from action_assistant.schema.runner_tables import expectation
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import Graph

@@ -10,10 +10,10 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.runner import refusals, stall
-from action_assistant.runner.events import Overridden
-from action_assistant.runner.runs import Alarm, Run
-from action_assistant.runner.visits import ActionRun, Message, Visit
+from action_assistant.runner.runs import refusals, stall
+from action_assistant.runner.runs.events import Overridden
+from action_assistant.runner.runs.run import Alarm, Run
+from action_assistant.runner.runs.visits import ActionRun, Message, Visit
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import EXIT, Action, Graph, Precondition, Relation
 

@@ -16,7 +16,7 @@ from action_assistant.runner.review.cause import (
     Warned,
     WrongParameter,
 )
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs.run import Run
 
 
 def words(cause: Cause, run: Run) -> str:

@@ -5,9 +5,9 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.runner import shapes
-from action_assistant.runner.runs import Run
-from action_assistant.runner.visits import ActionRun, Visit
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun, Visit
 from action_assistant.umrf.difference import ActionChange, Difference, difference
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
@@ -28,8 +28,8 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
     action: str
     aid: str | None
     visit: int
-    a: shapes.VisitShown | None
-    b: shapes.VisitShown | None
+    a: views.VisitShown | None
+    b: views.VisitShown | None
     relation: Relation
     slower: Literal["a", "b"] | None = None
 
@@ -47,8 +47,8 @@ class Comparison(msgspec.Struct, frozen=True, kw_only=True):
     """Run `a` against run `b`. `graph` is the difference of what was sent; `parameters` those of its
     changes that touch the values of actions."""
 
-    a: shapes.Summary
-    b: shapes.Summary
+    a: views.Summary
+    b: views.Summary
     same_graph: bool
     same_engine: bool
     graph: Difference
@@ -65,8 +65,8 @@ def compare(a: Run, b: Run, umrf_a: str, umrf_b: str) -> Comparison:
     steps = sorted(_steps(a, b), key=lambda step: _begun(step, a, b))
     parting = next((_parting(step, a, b) for step in steps if _parts(step)), None)
     return Comparison(
-        a=shapes.summary(a),
-        b=shapes.summary(b),
+        a=views.summary(a),
+        b=views.summary(b),
         same_graph=a.digest == b.digest,
         same_engine=a.engine == b.engine,
         graph=graph,
@@ -97,8 +97,8 @@ def _steps(a: Run, b: Run) -> Iterator[Step]:
                 action=name,
                 aid=(right or left or ActionRun()).aid,
                 visit=number,
-                a=shapes.visit(one) if one else None,
-                b=shapes.visit(other) if other else None,
+                a=views.visit(one) if one else None,
+                b=views.visit(other) if other else None,
                 relation=_relation(one, other),
                 slower=_slower(one, other),
             )
@@ -152,7 +152,7 @@ def _longer(one: Visit, other: Visit) -> bool:
 def _begun(step: Step, a: Run, b: Run) -> tuple[float, str, int]:
     """When a step had begun, counted from the start of its run; the earlier of the two."""
     moments = [
-        (shown.start - shapes.time(run.started_at or run.requested_at)).total_seconds()
+        (shown.start - views.time(run.started_at or run.requested_at)).total_seconds()
         for shown, run in ((step.a, a), (step.b, b))
         if shown is not None
     ]
@@ -173,7 +173,7 @@ def _named(step: Step) -> str:
     return step.action if step.visit == 1 else f"visit {step.visit} of {step.action}"
 
 
-def _did(shown: shapes.VisitShown | None, run: Run) -> str:
+def _did(shown: views.VisitShown | None, run: Run) -> str:
     where = f"in run {run.number}"
     if shown is None:
         return f"never run {where}"
@@ -191,7 +191,7 @@ def _did(shown: shapes.VisitShown | None, run: Run) -> str:
             return f"{shown.result} {where}"
 
 
-def _said(step: Step, shown: shapes.VisitShown | None, run: Run) -> list[str]:
+def _said(step: Step, shown: views.VisitShown | None, run: Run) -> list[str]:
     """What the action said during that visit, or right after it."""
     action = run.actions.get(step.action)
     if action is None or shown is None:
@@ -200,8 +200,8 @@ def _said(step: Step, shown: shapes.VisitShown | None, run: Run) -> list[str]:
     return [
         each.text
         for each in action.messages
-        if shapes.time(each.at) >= shown.not_before
-        and (until is None or shapes.time(each.at) <= until)
+        if views.time(each.at) >= shown.not_before
+        and (until is None or views.time(each.at) <= until)
     ]
 
 

@@ -12,12 +12,10 @@ from sqlalchemy import Row, Select, func, select
 
 from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refused, TooLarge
 from action_assistant.journal.events import Draft, Event
-from action_assistant.runner import recorded_runs, shapes
+from action_assistant.runner import recorded_runs
+from action_assistant.runner.clock import Clock
 from action_assistant.runner.control import Control
-from action_assistant.runner.driving import Clock, OpenRun
-from action_assistant.runner.events import Author
-from action_assistant.runner.history import Aside, History
-from action_assistant.runner.recorder import stream_of
+from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.recordings import Recording, hours
 from action_assistant.runner.review import about, again, exports, statistics
 from action_assistant.runner.review.cause import causes
@@ -27,12 +25,17 @@ from action_assistant.runner.review.film import Film, film
 from action_assistant.runner.review.raw import Raw, RawPut, raw_of, stream_of_raw
 from action_assistant.runner.review.reel import Reels
 from action_assistant.runner.review.shelf import Archived, Shelf
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.history import History
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.runs.run import Run
 from action_assistant.runner.workers import Crashed
 from action_assistant.schema.runner_tables import expectation, review, run, run_label
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
+from action_assistant.web.workers.lanes import Aside
 
 log: Final = logging.getLogger(__name__)
 
@@ -199,17 +202,17 @@ class Desk:
         graph = None if good else await self._graph(run_id)  # only failures have causes
         return await self._aside(lambda: about.sum_of(found, graph, now))
 
-    async def whole(self, run_id: str) -> shapes.RunWhole:
+    async def whole(self, run_id: str) -> views.RunWhole:
         """A run that is over, and the graph as it was sent. Raises NotFound."""
         umrf = await self._control.history.umrf(run_id)
         found, place = await self.known(run_id), await self.place(run_id)
-        return shapes.whole(found, shapes.sent_of(umrf), place=place)
+        return views.whole(found, views.sent_of(umrf), place=place)
 
     async def followed(self, run_id: str, robots_too: bool) -> tuple[Run, int]:
         """A run and the seq of its last event; with few visits unless it has to go on exactly.
         Raises NotFound."""
         key = (await self.reels.reel(run_id)).keys[-1]
-        return (key.run if robots_too else shapes.thinned(key.run)), key.seq
+        return (key.run if robots_too else views.thinned(key.run)), key.seq
 
     async def known(self, run_id: str) -> Run:
         """A run, open or over. Raises NotFound."""
@@ -229,7 +232,7 @@ class Desk:
                 CauseShown(
                     kind=str(each.__struct_config__.tag),
                     text=words(each, found),
-                    at=shapes.time(each.at),
+                    at=views.time(each.at),
                     seq=await self.reels.seq_at(run_id, each.at),
                     action=each.action,
                     aid=action.aid if action is not None else None,
@@ -246,9 +249,9 @@ class Desk:
         """Stored events of a run. Raises Unavailable."""
         return await self._control.history.events(run_id, after, limit)
 
-    async def sent(self, run_id: str) -> shapes.Sent:
+    async def sent(self, run_id: str) -> views.Sent:
         """The graph as it was sent, and the values of its actions. Raises NotFound."""
-        return shapes.sent_of(await self._control.history.umrf(run_id))
+        return views.sent_of(await self._control.history.umrf(run_id))
 
     async def place(self, run_id: str) -> Row[Any] | None:
         """Where the events of a run are, when they are in an archive."""

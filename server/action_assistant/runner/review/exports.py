@@ -9,12 +9,12 @@ import msgspec
 from mcap.writer import CompressionType, Writer
 
 from action_assistant.journal.events import Event
-from action_assistant.runner import shapes
-from action_assistant.runner.durations import of_visit
-from action_assistant.runner.events import Observed
 from action_assistant.runner.links.observations import NodeResult, NodeState, Snapshot
 from action_assistant.runner.review.reel import fold
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.durations import of_visit
+from action_assistant.runner.runs.events import Observed
+from action_assistant.runner.runs.run import Run
 from action_assistant.version import VERSION
 
 #: A cell that begins so would be a formula to a spreadsheet.
@@ -65,7 +65,7 @@ class Line(msgspec.Struct, frozen=True):
 def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
     """JSON lines: every event as it is stored."""
     for each in events:
-        at = shapes.time(each.at).isoformat().replace("+00:00", "Z")
+        at = views.time(each.at).isoformat().replace("+00:00", "Z")
         line = Line(run, each.seq, each.kind, each.author, at, msgspec.Raw(each.body))
         yield msgspec.json.encode(line) + b"\n"
 
@@ -87,7 +87,7 @@ def intervals(run: Run) -> bytes:
             (None, None, None) if took is None else (took.exact, took.least, took.most)
         )
         moments = (visit.start, visit.until, visit.not_before, visit.not_after)
-        shown = ("" if each is None else shapes.time(each).isoformat() for each in moments)
+        shown = ("" if each is None else views.time(each).isoformat() for each in moments)
         told = [_cell(name), number, *shown, _figure(seconds), visit.result or "", visit.how]
         sheet.writerow([*told, *map(_figure, bounds)])
     return text.getvalue().encode()
@@ -148,7 +148,7 @@ class _Track:
             known = () if was is None else was.visits
             for number, visit in enumerate(action.visits, action.older + 1):
                 if visit.until is not None and visit not in known:
-                    shown = msgspec.to_builtins(shapes.visit(visit))
+                    shown = msgspec.to_builtins(views.visit(visit))
                     body = {"visit": number, **shown, "took": of_visit(visit)}
                     self._write("visit", f"/visits/{name}", at, body)
 

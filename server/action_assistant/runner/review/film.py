@@ -11,11 +11,11 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.journal.events import Event
-from action_assistant.runner import shapes
-from action_assistant.runner.events import RunEvent
 from action_assistant.runner.review.reel import APART, Mark, Reels, fold, words
-from action_assistant.runner.runs import Run
-from action_assistant.runner.visits import ActionRun
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import RunEvent
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun
 
 _HEAD: Final = (
     "state",
@@ -36,8 +36,8 @@ class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
 
     state: str
     first: int
-    visits: list[shapes.VisitShown] = []
-    messages: list[shapes.MessageShown] = []
+    visits: list[views.VisitShown] = []
+    messages: list[views.MessageShown] = []
     aid: str | None = None
 
 
@@ -51,7 +51,7 @@ class Frame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     text: str = ""
     head: dict[str, Any] = {}
     actions: dict[str, ActionFrame] = {}
-    alarms: list[shapes.AlarmShown] = []
+    alarms: list[views.AlarmShown] = []
 
 
 class Chapter(msgspec.Struct, frozen=True):
@@ -79,7 +79,7 @@ class Film(msgspec.Struct, frozen=True, kw_only=True):
     run: str
     after: int
     newest: int
-    base: shapes.RunShown | None
+    base: views.RunShown | None
     frames: list[Frame]
     chapters: list[Chapter]
     marks: list[MarkShown]
@@ -95,13 +95,13 @@ async def film(reels: Reels, run: str, *, after: int) -> Film:
     base = reel.before(start) if start else None
     events = await reels.page(run, base.seq if base else 0)
     frames = await reels.aside(lambda: _frames(base.run if base else None, events))
-    chapters = [Chapter(0, shapes.time(reel.keys[0].run.requested_at))]
-    chapters += [Chapter(key.seq, shapes.time(key.at)) for key in reel.keys[:-1]]
+    chapters = [Chapter(0, views.time(reel.keys[0].run.requested_at))]
+    chapters += [Chapter(key.seq, views.time(key.at)) for key in reel.keys[:-1]]
     return Film(
         run=run,
         after=base.seq if base else 0,
         newest=reel.keys[-1].seq,
-        base=shapes.shown(base.run) if base else None,
+        base=views.shown(base.run) if base else None,
         frames=frames,
         chapters=chapters,
         marks=[_shown(mark) for mark in reel.marks],
@@ -111,11 +111,11 @@ async def film(reels: Reels, run: str, *, after: int) -> Film:
 def _shown(mark: Mark) -> MarkShown:
     return MarkShown(
         seq=mark.seq,
-        at=shapes.time(mark.at),
+        at=views.time(mark.at),
         kind=mark.kind,
         by=mark.by,
         text=mark.text,
-        since=shapes.time(mark.since) if mark.since is not None else None,
+        since=views.time(mark.since) if mark.since is not None else None,
     )
 
 
@@ -138,14 +138,14 @@ def frame(event: Event, told: RunEvent, before: Run | None, after: Run, at: int)
     old = before.alarms if before is not None else ()
     return Frame(
         seq=event.seq,
-        at=shapes.time(at),
+        at=views.time(at),
         kind=event.kind,
         by=by,
         text=text,
         head=_head(before, after),
         actions=_actions(before, after),
         alarms=[
-            shapes.AlarmShown(each.code, shapes.time(each.at), each.text)
+            views.AlarmShown(each.code, views.time(each.at), each.text)
             for each in after.alarms
             if each not in old
         ],
@@ -157,7 +157,7 @@ def _head(before: Run | None, after: Run) -> dict[str, Any]:
     for name in _HEAD:
         now = getattr(after, name)
         if before is None or getattr(before, name) != now:
-            changed[name] = shapes.time(now) if name.endswith(("_at", "_since")) and now else now
+            changed[name] = views.time(now) if name.endswith(("_at", "_since")) and now else now
     if after.stopped_by is not None and (before is None or before.stopped_by is None):
         changed["stopped_by"] = after.stopped_by
     return changed
@@ -204,6 +204,6 @@ def _changed(before: ActionRun | None, after: ActionRun) -> ActionFrame:
         aid=after.aid,
         state=after.state,
         first=first,
-        visits=[shapes.visit(each) for each in after.visits[first - after.older :]],
-        messages=[shapes.MessageShown(shapes.time(each.at), each.text) for each in fresh],
+        visits=[views.visit(each) for each in after.visits[first - after.older :]],
+        messages=[views.MessageShown(views.time(each.at), each.text) for each in fresh],
     )

@@ -8,8 +8,8 @@ import msgspec
 from sqlalchemy import Row
 
 from action_assistant.journal.events import Event
-from action_assistant.runner import archive, shapes
 from action_assistant.runner.review.desk import Desk
+from action_assistant.runner.runs import queries, views
 
 _PAGE: Final = 500  # events read at once
 
@@ -25,13 +25,13 @@ class HistoryEvent(msgspec.Struct, frozen=True):
 
 
 async def listed(
-    desk: Desk, wanted: archive.Filter, limit: int, going: Mapping[str, shapes.Summary]
-) -> list[shapes.Listed]:
+    desk: Desk, wanted: queries.Filter, limit: int, going: Mapping[str, views.Summary]
+) -> list[views.Listed]:
     """Runs, newest first; those that are `going` are as they are there."""
-    rows = await desk.rows(archive.listed(wanted, limit))
+    rows = await desk.rows(queries.listed(wanted, limit))
     labels = await _labels(desk, rows)
     shown = (
-        shapes.listed(going.get(row.id) or shapes.summary_of_row(row), row, labels.get(row.id, []))
+        views.listed(going.get(row.id) or views.summary_of_row(row), row, labels.get(row.id, []))
         for row in rows
     )
     return [each for each in shown if not wanted.states or each.state in wanted.states]
@@ -40,7 +40,7 @@ async def listed(
 async def _labels(desk: Desk, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     if rows:
-        for row in await desk.rows(archive.labels_of([row.id for row in rows])):
+        for row in await desk.rows(queries.labels_of([row.id for row in rows])):
             found.setdefault(row.run, []).append(row.label)
     return found
 
@@ -56,5 +56,5 @@ async def streamed(desk: Desk, run: str, after: int) -> tuple[int, bytes]:
 
 
 def _told(event: Event) -> bytes:
-    at, body = shapes.time(event.at), msgspec.Raw(event.body)
+    at, body = views.time(event.at), msgspec.Raw(event.body)
     return msgspec.json.encode(HistoryEvent(event.seq, event.kind, event.author, at, body))

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import msgspec
 
-from action_assistant.runner import shapes
 from action_assistant.runner.recordings import Recording, hours
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.run import Run
 
 
 class RawPut(msgspec.Struct, frozen=True):
@@ -54,7 +54,7 @@ def raw_of(run: Run, here: Sequence[Recording], gone: Iterable[RawPut], until: i
         return Raw(run.engine, [], "A simulated engine sends no messages.")
     first, last = hours(run.started_at or run.requested_at, until)
     found = {
-        put.name: RawHour(put.name, put.bytes, shapes.time(put.at), put.file)
+        put.name: RawHour(put.name, put.bytes, views.time(put.at), put.file)
         for put in gone
         if first <= put.name[: len(first)] <= last
     }

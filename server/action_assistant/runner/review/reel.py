@@ -14,7 +14,7 @@ import msgspec
 
 from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.journal.events import Event, Snapshot
-from action_assistant.runner.events import (
+from action_assistant.runner.runs.events import (
     AlarmRaised,
     Ended,
     ModifyRefused,
@@ -30,9 +30,11 @@ from action_assistant.runner.events import (
     StopSent,
     decode,
 )
-from action_assistant.runner.history import Aside, Ledger
-from action_assistant.runner.recorder import stream_of
-from action_assistant.runner.runs import Run, begin, follow
+from action_assistant.runner.runs.fold import begin, follow
+from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.runs.run import Run
+from action_assistant.web.workers.lanes import Aside
 
 #: Raise it when `runs.follow` tells something else of the same events: older keyframes are void then.
 FOLD: Final = 3

@@ -19,16 +19,16 @@ from sqlalchemy import Row, Select, exists, literal, or_, select
 from action_assistant.errors import Conflict, Refused
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.removal import Removed
-from action_assistant.runner import shapes
-from action_assistant.runner.driving import Clock
-from action_assistant.runner.history import Aside
-from action_assistant.runner.recorder import stream_of
+from action_assistant.runner.clock import Clock
 from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review import about, bundle
 from action_assistant.runner.review.raw import RawPut, stream_of_raw
 from action_assistant.runner.review.shelf import Journaled
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.schema.runner_tables import review, run, runner_event
 from action_assistant.settings import Keep
+from action_assistant.web.workers.lanes import Aside
 
 log: Final = logging.getLogger(__name__)
 
@@ -214,7 +214,7 @@ def _unfinished() -> Select[Any]:
 
 
 def _place(row: Row[Any]) -> str:
-    ended: datetime = shapes.time(row.ended_at)
+    ended: datetime = views.time(row.ended_at)
     return f"runs/{ended:%Y-%m}/run-{row.number:06d}-{row.id}.jsonl.gz"
 
 

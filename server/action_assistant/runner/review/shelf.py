@@ -12,11 +12,11 @@ from action_assistant.errors import Refused
 from action_assistant.journal.chain import Head
 from action_assistant.journal.events import Addition, Draft, Event, Snapshot
 from action_assistant.journal.removal import Removed
-from action_assistant.runner import shapes
-from action_assistant.runner.history import Aside
 from action_assistant.runner.review import bundle
 from action_assistant.runner.review.reel import Archive
+from action_assistant.runner.runs import views
 from action_assistant.schema.runner_tables import run
+from action_assistant.web.workers.lanes import Aside
 
 _PREFIX: Final = "run/"
 _KEPT: Final = 64 << 20  # bytes of events from archives in memory
@@ -105,7 +105,7 @@ class Shelf:
                 events = await self._aside(lambda: list(bundle.read(path)))
             except OSError as error:
                 raise Archived(
-                    f"Run {place.number} was archived on {shapes.time(place.archived_at):%Y-%m-%d} "
+                    f"Run {place.number} was archived on {views.time(place.archived_at):%Y-%m-%d} "
                     f"as {place.archived_as}, which is not in {self.folder} ({error.strerror}). "
                     "`action-assistant runs restore FILE` puts it back."
                 ) from error

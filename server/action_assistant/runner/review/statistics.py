@@ -6,7 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row, Select, select, union_all
 
-from action_assistant.runner.durations import Took, at_rank, took_us
+from action_assistant.runner.runs.durations import Took, at_rank, took_us
 from action_assistant.schema.runner_tables import action_sum, run
 from action_assistant.umrf.model import EXIT, PRECONDITIONS, Graph, Relation
 

@@ -19,12 +19,13 @@ from action_assistant.errors import Refused, Unavailable
 from action_assistant.journal.events import Draft, Snapshot
 from action_assistant.journal.reader import FileReader
 from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.history import Aside, History, Ledger
-from action_assistant.runner.recorder import stream_of
 from action_assistant.runner.review.desk import Desk, Going
 from action_assistant.runner.review.reel import Archive
 from action_assistant.runner.review.shelf import Shelf
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs.history import History, Ledger
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.runs.run import Run
+from action_assistant.web.workers.lanes import Aside
 
 P = ParamSpec("P")
 T = TypeVar("T")

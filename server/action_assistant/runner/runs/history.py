@@ -8,12 +8,10 @@ from sqlalchemy import Row, Select
 
 from action_assistant.errors import NotFound
 from action_assistant.journal.events import Event
-from action_assistant.runner.events import ModifyRequested, Requested, RunEvent, decode
-from action_assistant.runner.recorder import Store, stream_of
-from action_assistant.runner.runs import Run, replay
-from action_assistant.web.workers.lanes import Aside
-
-__all__ = ["Aside", "History", "Ledger", "Past"]
+from action_assistant.runner.runs.events import ModifyRequested, Requested, RunEvent, decode
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.recorder import Store, stream_of
+from action_assistant.runner.runs.run import Run
 
 
 class Ledger(Store, Protocol):

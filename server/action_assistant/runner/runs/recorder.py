@@ -13,7 +13,7 @@ import anyio
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.journal.events import Draft, Event
-from action_assistant.runner.events import RunEvent, encode
+from action_assistant.runner.runs.events import RunEvent, encode
 
 log: Final = logging.getLogger(__name__)
 

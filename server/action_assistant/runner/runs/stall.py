@@ -12,8 +12,8 @@ import msgspec
 from msgspec.structs import replace
 
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
-from action_assistant.runner.runs import Run
-from action_assistant.runner.visits import ActionRun
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import (
     ENTRY,

@@ -8,7 +8,7 @@ before anything else of its own, why it did not follow; only the end of some gra
 import re
 from typing import Final
 
-from action_assistant.runner.runs import Run
+from action_assistant.runner.runs.run import Run
 
 #: The alarm with the engine's words. It is journaled, so that they outlive this process.
 REFUSED: Final = "start_refused"

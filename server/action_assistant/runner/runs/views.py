@@ -8,11 +8,11 @@ import msgspec
 from msgspec.structs import replace
 from sqlalchemy import Row
 
-from action_assistant.runner.durations import Took, of_run
-from action_assistant.runner.events import AtRest, Author, Overridden, Override
 from action_assistant.runner.links.parameter_texts import sent
-from action_assistant.runner.runs import Desired, Run, State
-from action_assistant.runner.visits import ActionRun, How, Outcome, Visit
+from action_assistant.runner.runs.durations import Took, of_run
+from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override
+from action_assistant.runner.runs.run import Desired, Run, State
+from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
 
 _LIVE: Final = 3_000  # visits in one live message, over all actions
 _WHOLE: Final = 20_000

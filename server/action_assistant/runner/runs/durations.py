@@ -10,8 +10,8 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.runner.runs import Run
-from action_assistant.runner.visits import MOMENT_US, Visit
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import MOMENT_US, Visit
 
 _EXACT_S: Final = 0.001
 

@@ -1,7 +1,7 @@
 """What was seen of an engine, folded into a run. Pure, and part of the fold of a run."""
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Final, assert_never
+from typing import Final, assert_never
 
 from msgspec.structs import replace
 
@@ -15,16 +15,14 @@ from action_assistant.runner.links.observations import (
     Seen,
     Snapshot,
 )
-from action_assistant.runner.visits import ActionRun, Sight, changed, heard, resulted, shown
-
-if TYPE_CHECKING:  # the fold of a run is made of this
-    from action_assistant.runner.runs import Run
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun, Sight, changed, heard, resulted, shown
 
 #: An answer that took longer was given up.
 _ASKED_US: Final = 1_000_000
 
 
-def observe(run: "Run", seen: Iterable[Seen]) -> "Run":
+def observe(run: Run, seen: Iterable[Seen]) -> Run:
     """The run after this was seen, in this order."""
     actions = dict(run.actions)
     run = replace(run, actions=actions)  # nobody else has it yet: the loop fills it
@@ -54,13 +52,13 @@ def observe(run: "Run", seen: Iterable[Seen]) -> "Run":
     return run
 
 
-def _state_of(run: "Run", graph: str, state: str) -> "Run":
+def _state_of(run: Run, graph: str, state: str) -> Run:
     if graph == run.graph_name:
         return replace(run, graph_state=state)
     return replace(run, parts=run.parts | {graph: state})
 
 
-def _shown(run: "Run", actions: dict[str, ActionRun], item: Snapshot) -> "Run":
+def _shown(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> Run:
     """What a snapshot says of its actions. What a failure or a sub-graph may do to others counts
     first, since both may be told together."""
     own = item.graph == run.graph_name
@@ -86,14 +84,14 @@ def _shown(run: "Run", actions: dict[str, ActionRun], item: Snapshot) -> "Run":
     return replace(run, looked=run.looked | {item.graph: looked}, failed=failed)
 
 
-def _looked_at(run: "Run", looked: int) -> "Run":
+def _looked_at(run: Run, looked: int) -> Run:
     """Answers have shown it as it was known until now."""
     if run.over_at is not None or looked <= run.going_at:
         return run
     return replace(run, going_at=looked)
 
 
-def _timed(run: "Run", at: int, asked: int | None) -> "Run":
+def _timed(run: Run, at: int, asked: int | None) -> Run:
     """Since when it is over, as far as that is seen. Only when the graph says so is it worth a look
     at every action."""
     if run.graph_state in TERMINAL and run.apparent_end is not None:
@@ -103,19 +101,19 @@ def _timed(run: "Run", at: int, asked: int | None) -> "Run":
     return replace(run, over_at=None, going_at=max(run.going_at, asked or 0))
 
 
-def names_all(run: "Run", item: Snapshot) -> bool:
+def names_all(run: Run, item: Snapshot) -> bool:
     """Whether a snapshot leaves out no action that is known of its graph."""
     return all(name in item.nodes for name in _known_of(run, item.graph))
 
 
-def _known_of(run: "Run", graph: str) -> Iterator[str]:
+def _known_of(run: Run, graph: str) -> Iterator[str]:
     own, prefix = graph == run.graph_name, f"{graph}/"
     for name in run.actions:
         if "/" not in name if own else name.startswith(prefix):
             yield name if own else name.removeprefix(prefix)
 
 
-def key_of(run: "Run", graph: str, node: str) -> str:
+def key_of(run: Run, graph: str, node: str) -> str:
     """The name of an action in a run: nodes of sub-graphs stand behind the name of theirs."""
     return node if graph == run.graph_name else f"{graph}/{node}"
 
