@@ -19,11 +19,11 @@ from table import Table, seconds
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.runner.links.observations import NodeResult, NodeState
-from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review import bundle
 from action_assistant.runner.review import statistics as sums
 from action_assistant.runner.review.film import film
 from action_assistant.runner.review.reel import APART, Reels
+from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.events import (
     Author,

@@ -28,7 +28,7 @@ from action_assistant.errors import Refused
 from action_assistant.runner.control import Control
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.model import Action, Graph, Parameter

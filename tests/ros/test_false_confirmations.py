@@ -34,7 +34,7 @@ from action_assistant.runner.emulator.messages import Quirks
 from action_assistant.runner.emulator.node import StandInNode
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.run import ENDED
 from action_assistant.runner.steering import RestRequest, confirm_rest

@@ -13,7 +13,7 @@ pytest.importorskip(
 from action_assistant.runner.control import Control
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Override
 from ros.robots import robot
 from runner.world import ANN, MemoryLedger, at_once, order, sequence

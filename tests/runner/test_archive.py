@@ -11,7 +11,7 @@ from action_assistant.runner import projection
 from action_assistant.runner.clock import wall_clock
 from action_assistant.runner.control import Control
 from action_assistant.runner.links.port import Registration
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs import queries, views
 from action_assistant.schema.runner_tables import robot, run
 from runner.world import ANN, BEN, order, sequence, until

@@ -8,10 +8,10 @@ import anyio
 import pytest
 
 from action_assistant.runner.links.port import Answer, Order
-from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.review.shelf import Shelf
+from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.settings import Keep
 from runner.fleet import Open
 from runner.test_robots import NEVER, fleet

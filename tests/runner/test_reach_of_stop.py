@@ -10,7 +10,7 @@ from action_assistant.errors import Conflict
 from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.messages import Start
 from action_assistant.runner.links.port import Link, NotSent, Order, Registration
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from runner.fleet import Fleet, Open

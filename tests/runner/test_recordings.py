@@ -10,7 +10,7 @@ import pytest
 from action_assistant.errors import NotFound
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, Feedback
-from action_assistant.runner.recordings import FeedbackLine, GetLine, Recordings
+from action_assistant.runner.robots.recordings import FeedbackLine, GetLine, Recordings
 from runner.world import at_once, live_through
 
 HOUR = 3_600_000_000

@@ -10,7 +10,6 @@ import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
 from action_assistant.runner.control import Control
-from action_assistant.runner.flight import Commanded, EngineBecame, StopWasProven
 from action_assistant.runner.links.port import (
     Candidate,
     EngineRefused,
@@ -20,7 +19,8 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.live import Hub
 from action_assistant.runner.preflight import Preflight
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.robots.robot_events import Commanded, EngineBecame, StopWasProven
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import EngineSaid, Override
 from action_assistant.runner.starting import GroupRequest

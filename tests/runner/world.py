@@ -34,7 +34,7 @@ from action_assistant.runner.links.port import (
     Standing,
 )
 from action_assistant.runner.links.simulator import SimulatorLink
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Author, RunEvent, decode
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run

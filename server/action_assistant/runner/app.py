@@ -22,12 +22,12 @@ from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
 from action_assistant.runner.live import Hub
-from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review.desk import Desk
 from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.review.shelf import Shelf
 from action_assistant.runner.review.stored import Asked, Place
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.robots.recordings import Recordings
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.workers import Workers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.auth.keys import Keys

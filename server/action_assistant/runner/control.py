@@ -19,18 +19,19 @@ from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.booking import Book, Stops, booked
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.flight import Commanded
 from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, Order, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.links.unreachable import AbsentLink
 from action_assistant.runner.preflight import Preflight, Settled, check_items, of_taken
-from action_assistant.runner.registered import Robot
-from action_assistant.runner.robots import Ground, Robots
+from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.registration import Robot
+from action_assistant.runner.robots.registry import Ground, Robots
+from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, MovesAgain
 from action_assistant.runner.runs.history import History, Ledger, Past
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.silencing import Silencing
 from action_assistant.runner.starting import Cleared, Grouped, GroupRequest, Started, Starting
 from action_assistant.runner.stragglers import Stragglers
 from action_assistant.web.auth.access import done_for_nobody
@@ -418,6 +419,7 @@ class Control:
             self._robots_changed,
             self._foreign,
             self._stragglers.shows,
+            Silencing,
         )
         self._tasks.start_soon(self._stragglers.run)
         self.robots.open(ground)

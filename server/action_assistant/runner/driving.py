@@ -14,7 +14,6 @@ import msgspec
 from action_assistant.errors import Refused
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.doubts import Doubts
-from action_assistant.runner.flight import alarm_of
 from action_assistant.runner.links.observations import Hazard, Seen
 from action_assistant.runner.links.port import (
     EngineChanged,
@@ -31,6 +30,7 @@ from action_assistant.runner.links.port import (
     outline,
 )
 from action_assistant.runner.proof import SET_GOING
+from action_assistant.runner.robots.robot_events import alarm_of
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     AtRest,

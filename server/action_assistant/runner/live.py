@@ -23,7 +23,7 @@ from action_assistant.runner.asking import author_of
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.registered import Robot
+from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run

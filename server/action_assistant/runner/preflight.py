@@ -11,10 +11,10 @@ import msgspec
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.admission import Admitted, Prepared
-from action_assistant.runner.engines import Index
-from action_assistant.runner.foreign_graphs import strangers
 from action_assistant.runner.links.observations import Snapshot, failed_in
 from action_assistant.runner.links.port import Answer, Standing
+from action_assistant.runner.robots.engine import Index
+from action_assistant.runner.robots.foreign_graphs import strangers
 from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.check import STRUCTURAL, check
 from action_assistant.umrf.facts import EngineFacts

@@ -7,8 +7,8 @@ from sqlalchemy import Executable, func, insert, update
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.registered import Registered, Removed
 from action_assistant.runner.review import about, again
+from action_assistant.runner.robots.registration import Registered, Removed
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     Answered,

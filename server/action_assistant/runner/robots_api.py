@@ -11,7 +11,11 @@ from action_assistant.errors import BadInput, NotFound
 from action_assistant.runner.asking import LARGE, author_of, body_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import GroupOperation, LookOperation
-from action_assistant.runner.flight import (
+from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
+from action_assistant.runner.preflight import Preflight
+from action_assistant.runner.robots.recordings import Recording
+from action_assistant.runner.robots.registration import Robot
+from action_assistant.runner.robots.robot_events import (
     Commanded,
     EngineBecame,
     RobotEvent,
@@ -19,10 +23,6 @@ from action_assistant.runner.flight import (
     StopUnproven,
     StopWasProven,
 )
-from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
-from action_assistant.runner.preflight import Preflight
-from action_assistant.runner.recordings import Recording
-from action_assistant.runner.registered import Robot
 from action_assistant.runner.runs import views
 from action_assistant.runner.starting import read_group
 from action_assistant.umrf.files import codec

@@ -13,11 +13,16 @@ from anyio.abc import TaskGroup
 
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.doubts import Doubts
-from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.flight import RobotEvent, StopAsked, StopUnproven, StopWasProven
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, ForeignCommand, NoAnswer
 from action_assistant.runner.proof import SET_GOING, Rest, send_stop
+from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.robot_events import (
+    RobotEvent,
+    StopAsked,
+    StopUnproven,
+    StopWasProven,
+)
 from action_assistant.runner.runs.events import Author
 
 _GAP_S: Final = 0.1

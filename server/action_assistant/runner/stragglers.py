@@ -16,12 +16,12 @@ from anyio.abc import TaskGroup
 from action_assistant.errors import NotFound, Refused
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.flight import Commanded
 from action_assistant.runner.links.engine_text import run_in
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import ForeignCommand, NoAnswer
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs.events import MovesAgain
 from action_assistant.runner.runs.history import History
 from action_assistant.runner.runs.run import Run

@@ -19,10 +19,10 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import projection
 from action_assistant.runner.links.observations import NodeState
-from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review import about, bundle
 from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.review.shelf import Shelf
+from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs.events import Ended, Observed, Published, encode
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import stream_of

@@ -16,7 +16,6 @@ from action_assistant.runner import recorded_runs
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.recordings import Recording, hours
 from action_assistant.runner.review import about, again, exports, statistics
 from action_assistant.runner.review.cause import causes
 from action_assistant.runner.review.cause_words import words
@@ -25,6 +24,7 @@ from action_assistant.runner.review.film import Film, film
 from action_assistant.runner.review.raw import Raw, RawPut, raw_of, stream_of_raw
 from action_assistant.runner.review.reel import Reels
 from action_assistant.runner.review.shelf import Archived, Shelf
+from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import History

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import msgspec
 
-from action_assistant.runner.recordings import Recording, hours
+from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.run import Run
 

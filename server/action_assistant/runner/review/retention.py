@@ -20,10 +20,10 @@ from action_assistant.errors import Conflict, Refused
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.removal import Removed
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.recordings import Recordings
 from action_assistant.runner.review import about, bundle
 from action_assistant.runner.review.raw import RawPut, stream_of_raw
 from action_assistant.runner.review.shelf import Journaled
+from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.schema.runner_tables import review, run, runner_event

@@ -9,8 +9,8 @@ import msgspec
 from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, Conflict
-from action_assistant.runner.engines import KnownEngine
 from action_assistant.runner.links.port import SIMULATOR, EngineState, Generation, Registration
+from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.runs.views import time
 from action_assistant.umrf.facts import BadProfile, facts_of
 

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Collection, Iterator, Mapping
-from typing import Final
+from typing import Final, Protocol, TypeAlias
 
 import anyio
 import msgspec
@@ -11,9 +11,6 @@ from anyio.abc import TaskGroup
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.engines import Index, KnownEngine
-from action_assistant.runner.flight import Commanded, EngineBecame, FlightRecorder
-from action_assistant.runner.foreign_graphs import strangers
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     SIMULATOR,
@@ -23,8 +20,10 @@ from action_assistant.runner.links.port import (
     Reach,
     Registration,
 )
-from action_assistant.runner.recordings import Recordings
-from action_assistant.runner.registered import (
+from action_assistant.runner.robots.engine import Index, KnownEngine
+from action_assistant.runner.robots.foreign_graphs import strangers
+from action_assistant.runner.robots.recordings import Recordings
+from action_assistant.runner.robots.registration import (
     STREAM,
     Registered,
     Removed,
@@ -32,9 +31,14 @@ from action_assistant.runner.registered import (
     check_registration,
     seen,
 )
+from action_assistant.runner.robots.robot_events import (
+    Commanded,
+    EngineBecame,
+    FlightRecorder,
+    RobotEvent,
+)
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import Ledger
-from action_assistant.runner.silencing import Silencing
 from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
 from action_assistant.web.workers.lanes import Aside
 
@@ -43,9 +47,32 @@ log: Final = logging.getLogger(__name__)
 _NO_LINK: Final = "Nothing can be started or stopped there from here."
 
 
+class ForeignStops(Protocol):
+    """What stops graphs that were not started from here."""
+
+    def trouble(self, robot: str, graph: str) -> str | None:
+        """None when the graph is not being stopped; else why that is not proven yet, "" at first."""
+        ...
+
+    def going(self, robot: str) -> bool:
+        """Whether something is being stopped there."""
+        ...
+
+    def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
+        """Want a graph stopped. Never waits."""
+        ...
+
+    def hear_of(self, robot: str, command: ForeignCommand) -> None:
+        """Somebody else may just have set it going."""
+        ...
+
+
+Note: TypeAlias = Callable[[str, RobotEvent, str], None]
+
+
 class Ground(msgspec.Struct, frozen=True):
     """What the registry stands on. `foreign` hears of each command of somebody else,
-    `shows` of all graphs that an engine shows."""
+    `shows` of all graphs that an engine shows; `stops` makes what stops foreign graphs."""
 
     ledger: Ledger
     tasks: TaskGroup
@@ -54,6 +81,7 @@ class Ground(msgspec.Struct, frozen=True):
     changed: Callable[[], None]
     foreign: Callable[[KnownEngine, ForeignCommand], Commanded]
     shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None]
+    stops: Callable[[TaskGroup, Clock, Note, Callable[[], None]], ForeignStops]
 
 
 class Robots:
@@ -74,13 +102,13 @@ class Robots:
         self._scopes: dict[str, anyio.CancelScope] = {}
         self._ground: Ground | None = None
         self._flight: FlightRecorder | None = None
-        self._silencing: Silencing | None = None
+        self._silencing: ForeignStops | None = None
 
     def open(self, ground: Ground) -> None:
         """Watch what was given, and from now on whatever is added."""
         self._ground = ground
         self._flight = FlightRecorder(ground.ledger, ground.tasks)
-        self._silencing = Silencing(
+        self._silencing = ground.stops(
             ground.tasks, ground.wall, self._flight.note, lambda: ground.changed()
         )
         if self.recordings is not None:
@@ -167,7 +195,7 @@ class Robots:
         return self._ground
 
     @property
-    def silencing(self) -> Silencing:
+    def silencing(self) -> ForeignStops:
         """Stops of what others run there."""
         if self._silencing is None:
             raise RuntimeError("the registry is not open")

@@ -26,7 +26,7 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
-from action_assistant.runner.recordings import Recordings
+from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Signature
