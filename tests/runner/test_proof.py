@@ -4,8 +4,8 @@ import anyio
 
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer
-from action_assistant.runner.proof import Rest
 from action_assistant.runner.robots.foreign_graphs import strangers
+from action_assistant.runner.stop.proof import Rest
 from runner.world import virtual
 
 

@@ -31,9 +31,9 @@ from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, MovesAgain
 from action_assistant.runner.runs.history import History, Ledger, Past
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.silencing import Silencing
 from action_assistant.runner.starting import Cleared, Grouped, GroupRequest, Started, Starting
-from action_assistant.runner.stragglers import Stragglers
+from action_assistant.runner.stop.foreign_stop import Silencing
+from action_assistant.runner.stop.late_activity import Stragglers
 from action_assistant.web.auth.access import done_for_nobody
 from action_assistant.web.workers.lanes import Aside
 

@@ -13,7 +13,6 @@ import msgspec
 
 from action_assistant.errors import Refused
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.doubts import Doubts
 from action_assistant.runner.links.observations import Hazard, Seen
 from action_assistant.runner.links.port import (
     EngineChanged,
@@ -29,7 +28,6 @@ from action_assistant.runner.links.port import (
     Transitions,
     outline,
 )
-from action_assistant.runner.proof import SET_GOING
 from action_assistant.runner.robots.robot_events import alarm_of
 from action_assistant.runner.runs.events import (
     AlarmRaised,
@@ -53,7 +51,9 @@ from action_assistant.runner.runs.fold import follow, thin
 from action_assistant.runner.runs.history import sent_of
 from action_assistant.runner.runs.recorder import Recorder, Store
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.stop_loop import StopLoop
+from action_assistant.runner.stop.doubtful_errors import Doubts
+from action_assistant.runner.stop.proof import SET_GOING
+from action_assistant.runner.stop.stop_loop import StopLoop
 from action_assistant.runner.watching import Watch
 from action_assistant.web.workers.lanes import Aside
 

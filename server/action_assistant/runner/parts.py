@@ -7,7 +7,7 @@ keeps that name until the node begins again, which puts another one in its place
 from collections.abc import Sequence
 
 from action_assistant.runner.links.observations import ACTIVE, TERMINAL, Snapshot
-from action_assistant.runner.proof import NEVER_BEGAN
+from action_assistant.runner.stop.proof import NEVER_BEGAN
 
 
 class Parts:

@@ -7,7 +7,7 @@ takes longer than people would wait. What can be done is to look on, and to take
 import logging
 from collections import OrderedDict, deque
 from collections.abc import Callable, Mapping
-from typing import Final, TypeAlias, TypeVar
+from typing import Final, Protocol, TypeAlias, TypeVar
 
 import anyio
 import msgspec
@@ -15,13 +15,11 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import NotFound, Refused
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.links.engine_text import run_in
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import ForeignCommand, NoAnswer
 from action_assistant.runner.robots.engine import KnownEngine
-from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.robots.robot_events import Commanded
+from action_assistant.runner.robots.robot_events import Commanded, FlightRecorder
 from action_assistant.runner.runs.events import MovesAgain
 from action_assistant.runner.runs.history import History
 from action_assistant.runner.runs.run import Run
@@ -38,15 +36,34 @@ T = TypeVar("T")
 Reopen: TypeAlias = Callable[[Run, int, MovesAgain], None]
 
 
+class Reopenable(Protocol):
+    """A run that is open, or is just being left."""
+
+    run: Run
+
+    def moves_again(self, event: MovesAgain) -> bool:
+        """It had ended and moves. False when it is stored and left already."""
+        ...
+
+
+class RobotRecords(Protocol):
+    """Where it is recorded what others told robots."""
+
+    @property
+    def flight(self) -> FlightRecorder:
+        """The records."""
+        ...
+
+
 class Stragglers:
     """Watches what engines show for runs that are over. `open` are the runs that are not;
     `reopen` is given a run as stored, the seq of its last event, and what opens it again."""
 
     def __init__(
         self,
-        open_: Mapping[str, OpenRun],
+        open_: Mapping[str, Reopenable],
         history: History,
-        robots: Robots,
+        robots: RobotRecords,
         tasks: TaskGroup,
         *,
         wall: Clock,

@@ -12,10 +12,8 @@ import anyio
 from anyio.abc import TaskGroup
 
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.doubts import Doubts
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, ForeignCommand, NoAnswer
-from action_assistant.runner.proof import SET_GOING, Rest, send_stop
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.robot_events import (
     RobotEvent,
@@ -24,6 +22,8 @@ from action_assistant.runner.robots.robot_events import (
     StopWasProven,
 )
 from action_assistant.runner.runs.events import Author
+from action_assistant.runner.stop.doubtful_errors import Doubts
+from action_assistant.runner.stop.proof import SET_GOING, Rest, send_stop
 
 _GAP_S: Final = 0.1
 _SLOWEST_S: Final = 1.0

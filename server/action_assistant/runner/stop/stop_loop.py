@@ -10,10 +10,9 @@ from typing import Final, Protocol
 import anyio
 
 from action_assistant.runner.links.port import Link
-from action_assistant.runner.proof import send_stop
 from action_assistant.runner.runs.events import Author, End, RunEvent, StopRequested, StopSent
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.watching import Watch
+from action_assistant.runner.stop.proof import send_stop
 
 _FIRST_GAP_S: Final = 0.1
 _GAP_S: Final = 1.0
@@ -23,11 +22,29 @@ _SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobod
 _ONE_PRESS_S: Final = 1.0
 
 
+class StopMonitor(Protocol):
+    """What watches the run. `trouble`: why there is no proof of rest yet."""
+
+    trouble: str
+
+    def look(self) -> None:
+        """Ask the engine now."""
+        ...
+
+    def stop_left(self) -> None:
+        """A message to stop has left: what was asked before proves nothing."""
+        ...
+
+
 class Stopped(Protocol):
     """The run that is stopped."""
 
     run: Run
-    watch: Watch
+
+    @property
+    def watch(self) -> StopMonitor:
+        """What watches it."""
+        ...
 
     def tell(self, event: RunEvent, author: str = "") -> None:
         """Show and store an event."""
