@@ -6,8 +6,8 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotUmrf
-from action_assistant.runner.admission import admit, read_request
 from action_assistant.runner.runs.events import Override
+from action_assistant.runner.start.admission import admit, read_request
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.files import codec

@@ -18,12 +18,12 @@ from action_assistant.runner.links.port import (
     Registration,
 )
 from action_assistant.runner.live import Hub
-from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.robot_events import Commanded, EngineBecame, StopWasProven
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import EngineSaid, Override
-from action_assistant.runner.starting import GroupRequest
+from action_assistant.runner.start.preflight import Preflight
+from action_assistant.runner.start.start_checks import GroupRequest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.fleet import Fleet, Open, given

@@ -20,7 +20,6 @@ from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.events import Snapshot as Kept
 from action_assistant.runner import projection
-from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.control import Control
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.links.observations import Snapshot
@@ -38,6 +37,7 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Author, RunEvent, decode
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.start.admission import StartRequest
 from action_assistant.schema.runner_tables import RUNNER
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import SIMULATED

@@ -16,7 +16,6 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import BadInput, NotFound, TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import robots_api
-from action_assistant.runner.admission import decoded, read_request
 from action_assistant.runner.asking import LARGE, author_of, body_of, start_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import (
@@ -35,6 +34,7 @@ from action_assistant.runner.review.retention import Retention
 from action_assistant.runner.review.stored import Asked, json_of
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.run import Run, State
+from action_assistant.runner.start.admission import decoded, read_request
 from action_assistant.runner.steering import RestRequest
 from action_assistant.web.auth.access import Needs, person_of, refuse, require
 from action_assistant.web.network.connection_limits import Crowd, Turns

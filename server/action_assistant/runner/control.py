@@ -15,14 +15,11 @@ from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
 from action_assistant.runner import steering
-from action_assistant.runner.admission import StartRequest
-from action_assistant.runner.booking import Book, Stops, booked
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, Order, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.links.unreachable import AbsentLink
-from action_assistant.runner.preflight import Preflight, Settled, check_items, of_taken
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.robots.registry import Ground, Robots
@@ -31,7 +28,16 @@ from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, MovesAgain
 from action_assistant.runner.runs.history import History, Ledger, Past
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.starting import Cleared, Grouped, GroupRequest, Started, Starting
+from action_assistant.runner.start.admission import StartRequest
+from action_assistant.runner.start.idempotency import Book, Stops, booked
+from action_assistant.runner.start.preflight import Preflight, Settled, check_items, of_taken
+from action_assistant.runner.start.start_checks import (
+    Cleared,
+    Grouped,
+    GroupRequest,
+    Started,
+    Starting,
+)
 from action_assistant.runner.stop.foreign_stop import Silencing
 from action_assistant.runner.stop.late_activity import Stragglers
 from action_assistant.web.auth.access import done_for_nobody

@@ -12,7 +12,6 @@ from action_assistant.runner.asking import LARGE, author_of, body_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import GroupOperation, LookOperation
 from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
-from action_assistant.runner.preflight import Preflight
 from action_assistant.runner.robots.recordings import Recording
 from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.robots.robot_events import (
@@ -24,7 +23,8 @@ from action_assistant.runner.robots.robot_events import (
     StopWasProven,
 )
 from action_assistant.runner.runs import views
-from action_assistant.runner.starting import read_group
+from action_assistant.runner.start.preflight import Preflight
+from action_assistant.runner.start.start_checks import read_group
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Signature
 from action_assistant.web.auth.access import Needs

@@ -5,13 +5,13 @@ from typing import Annotated, Final
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
-from action_assistant.runner.admission import StartRequest, decoded, prepared
 from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.links.port import SIMULATOR, EngineRefused, NotSent, Order, Outline
-from action_assistant.runner.preflight import not_matched_in
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.start.admission import StartRequest, decoded, prepared
+from action_assistant.runner.start.preflight import not_matched_in
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.web.workers.lanes import Aside
 

@@ -14,7 +14,7 @@ __all__ = ["Crashed", "Lane", "Workers", "child"]
 
 #: What the server process has imported before it forks anybody.
 _PRELOADED: Final = (
-    "action_assistant.runner.starting",
+    "action_assistant.runner.start.start_checks",
     "action_assistant.runner.links.simulated",
     "action_assistant.runner.review.stored",
 )

@@ -14,7 +14,6 @@ from litestar.types import ControllerRouterHandler
 from action_assistant import paths
 from action_assistant.errors import BadInput
 from action_assistant.runner import recorded_runs
-from action_assistant.runner.admission import decoded
 from action_assistant.runner.asking import LARGE, author_of, body_of
 from action_assistant.runner.control import Control
 from action_assistant.runner.described import FitOperation
@@ -26,6 +25,7 @@ from action_assistant.runner.review.raw import Raw
 from action_assistant.runner.review.retention import Retention, Swept
 from action_assistant.runner.review.statistics import Statistics
 from action_assistant.runner.review.stored import Asked, json_of
+from action_assistant.runner.start.admission import decoded
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.network.connection_limits import Turns
 

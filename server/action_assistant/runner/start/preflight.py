@@ -10,12 +10,12 @@ from typing import Final, Literal, TypeAlias
 import msgspec
 
 from action_assistant.errors import Conflict, Refused
-from action_assistant.runner.admission import Admitted, Prepared
 from action_assistant.runner.links.observations import Snapshot, failed_in
 from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.robots.engine import Index
 from action_assistant.runner.robots.foreign_graphs import strangers
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.start.admission import Admitted, Prepared
 from action_assistant.umrf.check import STRUCTURAL, check
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec

@@ -9,7 +9,6 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
-from action_assistant.runner.admission import StartRequest
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.links.port import Order, Outline
 from action_assistant.runner.runs import queries
@@ -18,7 +17,8 @@ from action_assistant.runner.runs.fold import begin
 from action_assistant.runner.runs.history import Ledger
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.starting import Cleared
+from action_assistant.runner.start.admission import StartRequest
+from action_assistant.runner.start.start_checks import Cleared
 
 
 def booked(

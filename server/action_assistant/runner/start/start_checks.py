@@ -9,16 +9,16 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
-from action_assistant.runner import preflight
-from action_assistant.runner.admission import Prepared, StartRequest, decoded, prepared
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.links.port import SIMULATOR, Answer, Link, NoAnswer
 from action_assistant.runner.links.simulator import Simulator
-from action_assistant.runner.preflight import Item, Preflight, Settled, Sight
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Overridden, Override
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.start import preflight
+from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
+from action_assistant.runner.start.preflight import Item, Preflight, Settled, Sight
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.web.workers.lanes import Aside
 
