@@ -25,7 +25,7 @@ pytest.importorskip(
 )
 
 from action_assistant.errors import Refused
-from action_assistant.runner.control import Control
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots

@@ -28,16 +28,16 @@ from rclpy.context import Context
 from temoto_msgs.msg import UmrfGraphFeedback, UmrfGraphStart, UmrfGraphStop
 
 from action_assistant.errors import Refused
-from action_assistant.runner.control import Control
-from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.emulator.messages import Quirks
 from action_assistant.runner.emulator.node import StandInNode
+from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.run import ENDED
-from action_assistant.runner.steering import RestRequest, confirm_rest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import Execution
 from ros.robots import robot

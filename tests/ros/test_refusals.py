@@ -10,7 +10,7 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from action_assistant.runner.control import Control
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots

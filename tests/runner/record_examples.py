@@ -17,12 +17,12 @@ import msgspec
 
 from action_assistant.paths import examples
 from action_assistant.runner import recorded_runs
-from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, Start, index_of
+from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.recorder import stream_of
-from action_assistant.runner.steering import RestRequest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import (
     ENTRY,

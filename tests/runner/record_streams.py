@@ -19,15 +19,15 @@ import anyio
 import msgspec
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, Start, index_of
+from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import decode
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.start_checks import GroupRequest
-from action_assistant.runner.steering import RestRequest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
 from action_assistant.umrf.semantics import script_from

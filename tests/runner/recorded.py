@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 
 import anyio
 
-from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.engine_text import snapshot
 from action_assistant.runner.links.listeners import Ears
 from action_assistant.runner.links.observations import Snapshot

@@ -7,9 +7,9 @@ from typing import Any
 
 import anyio
 
-from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, Start
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.runs import views
 from action_assistant.umrf.semantics import script_from
 from runner.air import Air, Node, now, now_ms

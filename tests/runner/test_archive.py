@@ -9,7 +9,7 @@ from sqlalchemy import select
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import projection
 from action_assistant.runner.clock import wall_clock
-from action_assistant.runner.control import Control
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs import queries, views

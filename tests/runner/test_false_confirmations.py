@@ -18,14 +18,14 @@ import anyio
 import pytest
 
 from action_assistant.errors import Refused
-from action_assistant.runner.control import Control
-from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Pause, Quirks, Start, Stop
+from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import Link
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.run import ENDED, State
-from action_assistant.runner.steering import RestRequest, confirm_rest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import Execution, script_from

@@ -10,14 +10,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from action_assistant.errors import Refused
-from action_assistant.runner.control import Control
-from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.observations import ACTIVE, NodeState
 from action_assistant.runner.links.port import EngineRefused, NoAnswer, Order, Report, Transitions
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.runs.events import StopRequested
 from action_assistant.runner.runs.run import ENDED, State
-from action_assistant.runner.steering import RestRequest, confirm_rest
 from runner.world import ANN, BEN, Robot, World, engine, live_through, order, sequence, two_ends
 
 GRAPHS = {"one": sequence("one"), "two": two_ends("two")}

@@ -5,7 +5,7 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.runner.lateness import fresh
+from action_assistant.runner.execution.feedback_order import fresh
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.runs.events import Author, Observed, Published, Requested
 from action_assistant.runner.runs.fold import begin, follow

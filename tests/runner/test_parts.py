@@ -8,9 +8,9 @@ import pytest
 
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import index_of
+from action_assistant.runner.execution.sub_graphs import Parts
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Registration
-from action_assistant.runner.parts import Parts
 from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec

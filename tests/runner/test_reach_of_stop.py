@@ -7,8 +7,8 @@ import anyio
 import pytest
 
 from action_assistant.errors import Conflict
-from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.messages import Start
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import Link, NotSent, Order, Registration
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.umrf.facts import EngineFacts

@@ -7,9 +7,9 @@ import anyio
 import msgspec
 import pytest
 
-from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Index, Quirks, Start
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.refusals import StartLog, why_refused
 from action_assistant.runner.runs.run import Run

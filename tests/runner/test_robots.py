@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
-from action_assistant.runner.control import Control
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import (
     Candidate,
     EngineRefused,

@@ -7,7 +7,7 @@ import anyio
 import msgspec
 import pytest
 
-from action_assistant.runner.control import Control
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.review.cause import causes
 from action_assistant.runner.review.cause_words import words
 from action_assistant.runner.runs.events import Override

@@ -14,8 +14,8 @@ import anyio
 import pytest
 
 from action_assistant.errors import Refused
-from action_assistant.runner.driving import OpenRun
 from action_assistant.runner.emulator.messages import Message, Quirks, Start, Stop
+from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.files import codec
 from runner.air import now, now_ms

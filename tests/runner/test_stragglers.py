@@ -9,8 +9,8 @@ from typing import Any
 
 import anyio
 
-from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.messages import Quirks
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Ended, MovesAgain, Proof, StopSent
 from runner.air import now_ms

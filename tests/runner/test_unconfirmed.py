@@ -11,15 +11,15 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound
-from action_assistant.runner.control import Control
 from action_assistant.runner.emulator.messages import Quirks, Start, Stop
+from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.engine_process import EngineProcess, has_ended, process
 from action_assistant.runner.links.engine_text import snapshot
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Override
-from action_assistant.runner.steering import RestRequest
 from action_assistant.runner.stop.doubtful_errors import Doubts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Conditions

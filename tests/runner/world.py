@@ -20,8 +20,8 @@ from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.events import Snapshot as Kept
 from action_assistant.runner import projection
-from action_assistant.runner.control import Control
-from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,

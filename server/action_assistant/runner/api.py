@@ -17,14 +17,15 @@ from action_assistant.errors import BadInput, NotFound, TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import robots_api
 from action_assistant.runner.asking import LARGE, author_of, body_of, start_of
-from action_assistant.runner.control import Control
 from action_assistant.runner.described import (
     ModifyOperation,
     RestOperation,
     StartOperation,
     StopOperation,
 )
-from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.live import Hub, Stopping, attend, work_out
 from action_assistant.runner.review import listing
@@ -35,7 +36,6 @@ from action_assistant.runner.review.stored import Asked, json_of
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.run import Run, State
 from action_assistant.runner.start.admission import decoded, read_request
-from action_assistant.runner.steering import RestRequest
 from action_assistant.web.auth.access import Needs, person_of, refuse, require
 from action_assistant.web.network.connection_limits import Crowd, Turns
 from action_assistant.web.workers.lanes import Aside

@@ -17,7 +17,7 @@ from action_assistant.runner import projection
 from action_assistant.runner.api import House, routes
 from action_assistant.runner.asking import SMALL
 from action_assistant.runner.clock import wall_clock
-from action_assistant.runner.control import Control
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators

@@ -21,8 +21,8 @@ from litestar.exceptions import WebSocketDisconnect, WebSocketException
 from action_assistant.errors import Refused
 from action_assistant.runner.asking import author_of
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.control import Control
-from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author

@@ -9,8 +9,8 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound
 from action_assistant.runner.asking import LARGE, author_of, body_of
-from action_assistant.runner.control import Control
 from action_assistant.runner.described import GroupOperation, LookOperation
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
 from action_assistant.runner.robots.recordings import Recording
 from action_assistant.runner.robots.registration import Robot

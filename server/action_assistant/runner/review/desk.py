@@ -14,8 +14,8 @@ from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refus
 from action_assistant.journal.events import Draft, Event
 from action_assistant.runner import recorded_runs
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.control import Control
-from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.review import about, again, exports, statistics
 from action_assistant.runner.review.cause import causes
 from action_assistant.runner.review.cause_words import words

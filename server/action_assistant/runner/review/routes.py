@@ -15,8 +15,8 @@ from action_assistant import paths
 from action_assistant.errors import BadInput
 from action_assistant.runner import recorded_runs
 from action_assistant.runner.asking import LARGE, author_of, body_of
-from action_assistant.runner.control import Control
 from action_assistant.runner.described import FitOperation
+from action_assistant.runner.execution.service import Control
 from action_assistant.runner.review import about, again
 from action_assistant.runner.review.compare import Comparison
 from action_assistant.runner.review.desk import CauseShown, Desk, Expectation, Format, Marked

@@ -18,7 +18,7 @@ from litestar import MediaType, Response
 from action_assistant.errors import Refused, Unavailable
 from action_assistant.journal.events import Draft, Snapshot
 from action_assistant.journal.reader import FileReader
-from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.review.desk import Desk, Going
 from action_assistant.runner.review.reel import Archive
 from action_assistant.runner.review.shelf import Shelf

@@ -5,7 +5,7 @@ from typing import Annotated, Final
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
-from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.port import SIMULATOR, EngineRefused, NotSent, Order, Outline
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.runs.events import Author, Override

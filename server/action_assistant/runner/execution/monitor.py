@@ -10,16 +10,16 @@ from anyio.abc import TaskGroup
 from msgspec.structs import replace
 
 from action_assistant.errors import Refused
-from action_assistant.runner.lateness import fresh
+from action_assistant.runner.execution.echo_difference import differs
+from action_assistant.runner.execution.feedback_order import fresh
+from action_assistant.runner.execution.sub_graphs import Parts
 from action_assistant.runner.links.engine_process import has_ended
 from action_assistant.runner.links.observations import TERMINAL, Seen, Snapshot
 from action_assistant.runner.links.port import Answer, Link, NoAnswer
-from action_assistant.runner.parts import Parts
 from action_assistant.runner.runs import refusals, stall
 from action_assistant.runner.runs.events import Answered, End, Proof, Published, RunEvent, Silent
 from action_assistant.runner.runs.fold import is_news
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.sameness import differs
 from action_assistant.runner.stop.doubtful_errors import Doubts
 from action_assistant.runner.stop.proof import NEVER_BEGAN, Rest, hash_of
 from action_assistant.web.workers.lanes import Aside

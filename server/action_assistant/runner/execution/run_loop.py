@@ -13,6 +13,7 @@ import msgspec
 
 from action_assistant.errors import Refused
 from action_assistant.runner.clock import Clock
+from action_assistant.runner.execution.monitor import Watch
 from action_assistant.runner.links.observations import Hazard, Seen
 from action_assistant.runner.links.port import (
     EngineChanged,
@@ -54,7 +55,6 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.doubtful_errors import Doubts
 from action_assistant.runner.stop.proof import SET_GOING
 from action_assistant.runner.stop.stop_loop import StopLoop
-from action_assistant.runner.watching import Watch
 from action_assistant.web.workers.lanes import Aside
 
 log: Final = logging.getLogger(__name__)

@@ -14,9 +14,9 @@ from anyio.abc import TaskGroup
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
-from action_assistant.runner import steering
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.driving import OpenRun
+from action_assistant.runner.execution import interventions
+from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, Order, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.links.unreachable import AbsentLink
@@ -319,24 +319,24 @@ class Control:
 
     async def pause(self, run: str, author: Author) -> Run:
         """Pause a run. Raises NotFound, Conflict, Unavailable."""
-        return await steering.pause(await self._movable(run), author)
+        return await interventions.pause(await self._movable(run), author)
 
     async def resume(self, run: str, author: Author) -> Run:
         """Let a paused run go on. Raises NotFound, Conflict, Unavailable."""
-        return await steering.resume(await self._movable(run), author)
+        return await interventions.resume(await self._movable(run), author)
 
     async def modify(self, run: str, body: bytes, author: Author) -> Run:
         """Give a run another version of its graph. Raises NotFound, BadInput, Conflict,
         Unavailable."""
         opened = await self._movable(run)
         engine = self.robots.link(opened.run.engine)
-        return await steering.modify(opened, body, author, engine=engine, aside=self._aside)
+        return await interventions.modify(opened, body, author, engine=engine, aside=self._aside)
 
-    async def confirm_rest(self, run: str, asked: steering.RestRequest, author: Author) -> Run:
+    async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:
         """Take somebody's word that a run is at rest, where its engine's is none. Raises NotFound,
         BadInput, Conflict."""
         opened = await self._movable(run)
-        told = steering.confirm_rest(opened, asked, author)
+        told = interventions.confirm_rest(opened, asked, author)
         self._settled[run] = Settled(told.engine, run, told.incarnation or "", opened.failed)
         return told
 
