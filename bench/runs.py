@@ -18,11 +18,11 @@ from table import Table, seconds
 
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
+from action_assistant.runner.analysis import statistics as sums
+from action_assistant.runner.analysis.keyframes import APART, Reels
+from action_assistant.runner.analysis.replay import film
+from action_assistant.runner.archives import archive_file
 from action_assistant.runner.links.observations import NodeResult, NodeState
-from action_assistant.runner.review import bundle
-from action_assistant.runner.review import statistics as sums
-from action_assistant.runner.review.film import film
-from action_assistant.runner.review.reel import APART, Reels
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.events import (
@@ -304,7 +304,7 @@ async def _stored(folder: Path, events: Sequence[Any]) -> int:
     for i in range(0, len(drafts), 500):
         await journal.append(events[0].stream, drafts[i : i + 500])
     end, stored = await journal.end(events[0].stream), await journal.read(events[0].stream)
-    file = bundle.Bundle(folder / "one.jsonl.gz", events[0].stream, "one", end)
+    file = archive_file.Bundle(folder / "one.jsonl.gz", events[0].stream, "one", end)
     file.add(stored)
     file.close()
     await journal.close()

@@ -16,7 +16,7 @@ import anyio
 import msgspec
 
 from action_assistant.paths import examples
-from action_assistant.runner import recorded_runs
+from action_assistant.runner.archives import examples as recorded_runs
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, Start, index_of
 from action_assistant.runner.execution.interventions import RestRequest

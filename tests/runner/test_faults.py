@@ -7,10 +7,10 @@ from typing import Any
 import anyio
 import pytest
 
+from action_assistant.runner.archives.archive_store import Shelf
+from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.links.port import Answer, Order
-from action_assistant.runner.review.desk import Desk
-from action_assistant.runner.review.retention import Retention
-from action_assistant.runner.review.shelf import Shelf
+from action_assistant.runner.review.service import Desk
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.settings import Keep
 from runner.fleet import Open

@@ -7,9 +7,9 @@ import anyio
 import msgspec
 import pytest
 
+from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.causes import causes
 from action_assistant.runner.execution.service import Control
-from action_assistant.runner.review.cause import causes
-from action_assistant.runner.review.cause_words import words
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.model import ENTRY, Conditions, Graph, Parameter, Relation

@@ -73,13 +73,13 @@ def _sweep(server: Server, ages: dict[str, float | None]) -> int:
 
 
 def _check(folder: Path) -> int:
-    from action_assistant.runner.review import bundle
+    from action_assistant.runner.archives import archive_file
 
     found = sorted(folder.glob("runs/**/*.jsonl.gz"))
     damaged = 0
     for path in found:
         try:
-            for _ in bundle.read(path):
+            for _ in archive_file.read(path):
                 pass
         except (Refused, OSError) as error:
             damaged += 1
@@ -89,15 +89,15 @@ def _check(folder: Path) -> int:
 
 
 def _restore(options: argparse.Namespace) -> int:
-    from action_assistant.runner.review import bundle
+    from action_assistant.runner.archives import archive_file
 
     folder = settings.keep(options.data.resolve()).folder
     code = 0
     for path in options.files:
         try:
-            place = bundle.title_of(path).place
-            events = sum(1 for _ in bundle.read(path))
-            bundle.put(path, folder / place)
+            place = archive_file.title_of(path).place
+            events = sum(1 for _ in archive_file.read(path))
+            archive_file.put(path, folder / place)
         except (Refused, OSError) as error:
             text = error.detail if isinstance(error, Refused) else f"{path}: {error.strerror}"
             code = refused(No(text))

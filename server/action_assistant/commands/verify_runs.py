@@ -7,8 +7,8 @@ from typing import Final, Literal
 import msgspec
 
 from action_assistant.commands.client import No, Server, print_json, refused, running
-from action_assistant.runner.review.again import Departure, Step, course, departure
-from action_assistant.runner.review.desk import Expectation
+from action_assistant.runner.analysis.expected_runs import Departure, Step, course, departure
+from action_assistant.runner.review.service import Expectation
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
 

@@ -16,6 +16,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import BadInput, NotFound, TooMany
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import robots_api
+from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.asking import LARGE, author_of, body_of, start_of
 from action_assistant.runner.described import (
     ModifyOperation,
@@ -30,9 +31,8 @@ from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.live import Hub, Stopping, attend, work_out
 from action_assistant.runner.review import listing
 from action_assistant.runner.review import routes as review
-from action_assistant.runner.review.desk import Desk
-from action_assistant.runner.review.retention import Retention
-from action_assistant.runner.review.stored import Asked, json_of
+from action_assistant.runner.review.service import Desk
+from action_assistant.runner.review.worker_queries import Asked, json_of
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.run import Run, State
 from action_assistant.runner.start.admission import decoded, read_request

@@ -7,7 +7,7 @@ from sqlalchemy import Executable, func, insert, update
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.review import about, again
+from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.robots.registration import Registered, Removed
 from action_assistant.runner.runs.events import (
     AlarmRaised,
@@ -29,10 +29,10 @@ def fold(event: Event) -> Sequence[Executable]:
     """What an event means for the tables."""
     if event.kind == Registered.kind:
         return (_robot(msgspec.json.decode(event.body, type=Registered)),)
-    if about.is_about(event.stream):
-        return about.fold(event)
-    if event.stream == again.STREAM:
-        return again.fold(event)
+    if annotations.is_about(event.stream):
+        return annotations.fold(event)
+    if event.stream == expected_runs.STREAM:
+        return expected_runs.fold(event)
     if event.kind == Removed.kind:
         gone = msgspec.json.decode(event.body, type=Removed)
         return (update(robot).where(robot.c.name == gone.name).values(retired_at=gone.at),)

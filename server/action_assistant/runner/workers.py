@@ -16,7 +16,7 @@ __all__ = ["Crashed", "Lane", "Workers", "child"]
 _PRELOADED: Final = (
     "action_assistant.runner.start.start_checks",
     "action_assistant.runner.links.simulated",
-    "action_assistant.runner.review.stored",
+    "action_assistant.runner.review.worker_queries",
 )
 _NICE: Final = 5  # somebody waits for a start
 _NICER: Final = 10

@@ -18,10 +18,11 @@ from action_assistant.journal import sqlite as sqlite_journal
 from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import projection
+from action_assistant.runner.analysis import annotations
+from action_assistant.runner.archives import archive_file
+from action_assistant.runner.archives.archive_store import Shelf
+from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.links.observations import NodeState
-from action_assistant.runner.review import about, bundle
-from action_assistant.runner.review.retention import Retention
-from action_assistant.runner.review.shelf import Shelf
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs.events import Ended, Observed, Published, encode
 from action_assistant.runner.runs.fold import replay
@@ -69,7 +70,9 @@ async def add_run(journal: Journal, run: str, number: int, length: int, ended_at
         await journal.append(stream_of(run), drafts[i : i + 500])
     told = replay(events)
     assert told is not None
-    await journal.append(about.stream_about(run), [about.draft(about.sum_of(told, None, ended_at))])
+    await journal.append(
+        annotations.stream_about(run), [annotations.draft(annotations.sum_of(told, None, ended_at))]
+    )
 
 
 def retention(journal: Journal, data: Path, **more: Any) -> Retention:
@@ -120,10 +123,10 @@ def put_away(data: Path, dies_at: int) -> None:
 
 
 _STEPS: Final[tuple[tuple[Any, str], ...]] = (
-    (bundle.Bundle, "add"),
-    (bundle.Bundle, "close"),
-    (bundle, "sha256_of"),
-    (bundle, "_settle"),
+    (archive_file.Bundle, "add"),
+    (archive_file.Bundle, "close"),
+    (archive_file, "sha256_of"),
+    (archive_file, "_settle"),
     (os, "fsync"),
     (Path, "replace"),
     (Path, "unlink"),

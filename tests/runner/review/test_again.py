@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from action_assistant.runner.review.again import Recorded, fitted, recorded
+from action_assistant.runner.analysis.expected_runs import Recorded, fitted, recorded
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
 from runner.process import RunnerProcess, over, started

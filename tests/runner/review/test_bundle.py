@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.events import Event
-from action_assistant.runner.review import bundle
+from action_assistant.runner.archives import archive_file
 
 
 def chained(bodies: list[bytes]) -> tuple[list[Event], Head]:
@@ -24,7 +24,7 @@ def chained(bodies: list[bytes]) -> tuple[list[Event], Head]:
 
 def written(path: Path, bodies: list[bytes]) -> list[Event]:
     events, end = chained(bodies)
-    file = bundle.Bundle(path, "run/r1", "runs/one.jsonl.gz", end)
+    file = archive_file.Bundle(path, "run/r1", "runs/one.jsonl.gz", end)
     file.add(events)
     file.close()
     return events
@@ -40,7 +40,7 @@ BODIES = st.one_of(
 @given(st.lists(BODIES, min_size=1, max_size=12))
 def test_what_was_written_is_read_byte_for_byte(tmp_path: Path, bodies: list[bytes]) -> None:
     path = tmp_path / "one.jsonl.gz"
-    assert written(path, bodies) == list(bundle.read(path))
+    assert written(path, bodies) == list(archive_file.read(path))
 
 
 def test_no_byte_of_it_can_be_changed_or_be_missing(tmp_path: Path) -> None:
@@ -51,12 +51,12 @@ def test_no_byte_of_it_can_be_changed_or_be_missing(tmp_path: Path) -> None:
         if place in {4, 5, 6, 7, 8, 9}:
             continue  # time, level and system, which say nothing of the content
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x55]) + whole[place + 1 :])
-        with pytest.raises(bundle.Damaged):
-            list(bundle.read(path))
+        with pytest.raises(archive_file.Damaged):
+            list(archive_file.read(path))
     for place in range(0, len(whole), 7):
         path.write_bytes(whole[:place])
-        with pytest.raises(bundle.Damaged):
-            list(bundle.read(path))
+        with pytest.raises(archive_file.Damaged):
+            list(archive_file.read(path))
 
 
 @pytest.mark.parametrize(
@@ -77,15 +77,15 @@ def test_a_file_that_somebody_put_together_is_refused(tmp_path: Path, change: ob
     lines = gzip.decompress(path.read_bytes()).splitlines(keepends=True)
     assert callable(change)
     path.write_bytes(gzip.compress(b"".join(change(lines))))
-    with pytest.raises(bundle.Damaged):
-        list(bundle.read(path))
+    with pytest.raises(archive_file.Damaged):
+        list(archive_file.read(path))
 
 
 def test_a_journal_that_does_not_keep_its_word_is_not_put_away(tmp_path: Path) -> None:
     path = tmp_path / "one.jsonl.gz"
     events, end = chained([b"{}"] * 6)
-    file = bundle.Bundle(path, "run/r1", "runs/one.jsonl.gz", end)
+    file = archive_file.Bundle(path, "run/r1", "runs/one.jsonl.gz", end)
     file.add(events[:5])
-    with pytest.raises(bundle.Damaged):
+    with pytest.raises(archive_file.Damaged):
         file.close()
     assert list(tmp_path.iterdir()) == []

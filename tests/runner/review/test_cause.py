@@ -7,10 +7,10 @@ import pytest
 
 from action_assistant.journal.events import Draft
 from action_assistant.paths import examples
-from action_assistant.runner import recorded_runs
+from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.causes import Cause, causes
+from action_assistant.runner.archives import examples as recorded_runs
 from action_assistant.runner.links.observations import GraphState, NodeResult, NodeState
-from action_assistant.runner.review.cause import Cause, causes
-from action_assistant.runner.review.cause_words import words
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     Author,

@@ -4,8 +4,8 @@ from typing import Any
 
 import msgspec
 
+from action_assistant.runner.analysis.comparison import compare
 from action_assistant.runner.links.observations import NodeResult, NodeState
-from action_assistant.runner.review.compare import compare
 from action_assistant.runner.runs.events import Ended, Observed, Published
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run

@@ -13,9 +13,15 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from action_assistant.runner.review import about, again, compare, exports, statistics
-from action_assistant.runner.review.desk import Desk
-from action_assistant.runner.review.shelf import Shelf
+from action_assistant.runner.analysis import (
+    annotations,
+    comparison,
+    expected_runs,
+    exports,
+    statistics,
+)
+from action_assistant.runner.archives.archive_store import Shelf
+from action_assistant.runner.review.service import Desk
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.durations import Took, at_rank, took_us
 from action_assistant.runner.runs.recorder import stream_of
@@ -52,8 +58,8 @@ def figures(told: Lived) -> statistics.Statistics:
     ledger = told.place.world.ledger
 
     async def found() -> statistics.Statistics:
-        draft = about.draft(about.sum_of(told.run, None, 0))
-        await ledger.append(about.stream_about(told.run.id), [draft])
+        draft = annotations.draft(annotations.sum_of(told.run, None, 0))
+        await ledger.append(annotations.stream_about(told.run.id), [draft])
         rows = await ledger.query(statistics.runs_of(told.run.graph_name, None, 10))
         sums = await ledger.query(statistics.sums_of([row.id for row in rows]))
         return statistics.statistics(rows, sums, graph_of(told))
@@ -114,7 +120,7 @@ def test_the_truth_lies_inside_of_every_figure(
             point.span.least - ROUNDED <= (last - run.started_at) / 1e6 + 0.5
         )  # the engine's own end
         assert point.span.most is None or (last - run.started_at) / 1e6 <= point.span.most + ROUNDED
-    for name, calls in again.recorded(run).behaviours.items():
+    for name, calls in expected_runs.recorded(run).behaviours.items():
         after = calls[0].get("after_s")
         (visit, *_) = run.actions[name].visits
         if after is not None and visit.most is not None:
@@ -149,17 +155,17 @@ def test_what_ended_unseen_and_what_was_seen_to_go_on_are_not_the_same() -> None
     texts = [
         getattr(each.place.world.ledger.told(each.run.id)[0], "umrf", "") for each in (done, other)
     ]
-    found = compare.compare(done.run, other.run, *texts)
+    found = comparison.compare(done.run, other.run, *texts)
     first = next(step for step in found.steps if step.action == "Work_0")
     assert first.relation == "end"
-    twice = compare.compare(done.run, done.run, texts[0], texts[0])
+    twice = comparison.compare(done.run, done.run, texts[0], texts[0])
     assert {step.relation for step in twice.steps} == {"unknown"}
     assert "not known" in twice.text
 
 
 def test_a_script_says_between_which_bounds_it_had_to_choose() -> None:
     told = lived("line", {"*": [{"after_s": 3.0}]}, Air(), None)
-    found = again.recorded(told.run)
+    found = expected_runs.recorded(told.run)
     assert 2.0 <= found.behaviours["Work_0"][0]["after_s"] <= 4.0
     assert any("between" in doubt.text for doubt in found.doubts)
 
@@ -200,12 +206,15 @@ def test_a_percentile_of_ranges_holds_that_of_what_was_true(
 def test_runs_that_an_older_version_has_summed_up_are_summed_up_again(tmp_path: Path) -> None:
     told = lived("line", {"*": [{"after_s": 2.0}]}, Air(), None)
     ledger = told.place.world.ledger
-    old = {"Work_0": about.ActionSum(visits=1, took=(0,)), "Work_1": about.ActionSum(visits=1)}
+    old = {
+        "Work_0": annotations.ActionSum(visits=1, took=(0,)),
+        "Work_1": annotations.ActionSum(visits=1),
+    }
 
     async def again_() -> list[Any]:
-        stream = about.stream_about(told.run.id)
+        stream = annotations.stream_about(told.run.id)
         ledger.streams.pop(stream, None)
-        await ledger.append(stream, [about.draft(about.SummedUp(1, old))])
+        await ledger.append(stream, [annotations.draft(annotations.SummedUp(1, old))])
         before = await ledger.query(statistics.sums_of([told.run.id]))
         assert [row.took for row in before if row.took] == [[[0, None]]]  # at least: it is no value
         async with told.place.world.runner() as control, anyio.create_task_group() as tasks:

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from action_assistant.journal.events import Draft
+from action_assistant.runner.analysis.keyframes import APART, Reels
+from action_assistant.runner.analysis.replay import Film, Frame, film
 from action_assistant.runner.links.observations import NodeResult, NodeState, Seen, Snapshot
-from action_assistant.runner.review.film import Film, Frame, film
-from action_assistant.runner.review.reel import APART, Reels
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import (
     Author,

@@ -12,10 +12,11 @@ import pytest
 from sqlalchemy import select
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.review import about, bundle
-from action_assistant.runner.review.film import film
-from action_assistant.runner.review.reel import Reels
-from action_assistant.runner.review.shelf import Archived
+from action_assistant.runner.analysis import annotations
+from action_assistant.runner.analysis.keyframes import Reels
+from action_assistant.runner.analysis.replay import film
+from action_assistant.runner.archives import archive_file
+from action_assistant.runner.archives.archive_store import Archived
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.schema.runner_tables import run
@@ -75,8 +76,8 @@ async def test_an_archived_run_looks_as_it_did(data: Path) -> None:
 
 async def test_pinned_and_young_and_open_runs_stay(data: Path) -> None:
     journal = await opened(data)
-    marked = about.Marked(1, Author("ann", "Ann"), about.Marks(pinned=True))
-    await journal.append(about.stream_about("r1"), [about.draft(marked)])
+    marked = annotations.Marked(1, Author("ann", "Ann"), annotations.Marks(pinned=True))
+    await journal.append(annotations.stream_about("r1"), [annotations.draft(marked)])
     only = retention(journal, data, is_open=lambda each: each == "r2")
     assert (await only.sweep(98, None)).runs == 0
     assert (await only.sweep(30, None)).runs == 1
@@ -93,10 +94,10 @@ async def test_an_archive_that_is_gone_or_damaged_is_named(data: Path) -> None:
         await shelf(journal, data).read("run/r1")
     whole = moved.read_bytes()
     path.write_bytes(whole[:200] + b"?" + whole[201:])
-    with pytest.raises(bundle.Damaged):
+    with pytest.raises(archive_file.Damaged):
         await shelf(journal, data).read("run/r1")
     shutil.copy(path.parent / "run-000003-r3.jsonl.gz", path)
-    with pytest.raises(bundle.Damaged):
+    with pytest.raises(archive_file.Damaged):
         await shelf(journal, data).read("run/r1")
     path.write_bytes(whole)
     assert len(await shelf(journal, data).read("run/r1")) == 12

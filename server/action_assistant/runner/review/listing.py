@@ -8,7 +8,7 @@ import msgspec
 from sqlalchemy import Row
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.review.desk import Desk
+from action_assistant.runner.review.service import Desk
 from action_assistant.runner.runs import queries, views
 
 _PAGE: Final = 500  # events read at once

@@ -13,18 +13,18 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant import paths
 from action_assistant.errors import BadInput
-from action_assistant.runner import recorded_runs
+from action_assistant.runner.analysis import annotations, expected_runs
+from action_assistant.runner.analysis.comparison import Comparison
+from action_assistant.runner.analysis.replay import Film
+from action_assistant.runner.analysis.statistics import Statistics
+from action_assistant.runner.archives import examples
+from action_assistant.runner.archives.raw_messages import Raw
+from action_assistant.runner.archives.retention import Retention, Swept
 from action_assistant.runner.asking import LARGE, author_of, body_of
 from action_assistant.runner.described import FitOperation
 from action_assistant.runner.execution.service import Control
-from action_assistant.runner.review import about, again
-from action_assistant.runner.review.compare import Comparison
-from action_assistant.runner.review.desk import CauseShown, Desk, Expectation, Format, Marked
-from action_assistant.runner.review.film import Film
-from action_assistant.runner.review.raw import Raw
-from action_assistant.runner.review.retention import Retention, Swept
-from action_assistant.runner.review.statistics import Statistics
-from action_assistant.runner.review.stored import Asked, json_of
+from action_assistant.runner.review.service import CauseShown, Desk, Expectation, Format, Marked
+from action_assistant.runner.review.worker_queries import Asked, json_of
 from action_assistant.runner.start.admission import decoded
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.network.connection_limits import Turns
@@ -49,7 +49,7 @@ class Fit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     umrf: msgspec.Raw
     action: str | None = None
-    fault: again.Fault | None = None
+    fault: expected_runs.Fault | None = None
 
 
 class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -106,15 +106,15 @@ def _of_one(house: Has) -> list[ControllerRouterHandler]:
         return await house.desk.marks(run)
 
     @patch("/api/runs/{run:str}/marks", summary="Pin, note or label a run", guards=[Needs("edit")])
-    async def mark(run: str, data: about.Marks, request: _Asking) -> Marked:
+    async def mark(run: str, data: annotations.Marks, request: _Asking) -> Marked:
         return await house.desk.mark(run, data, author_of(request))
 
     @get("/api/runs/{run:str}/script", summary="What a run did, as a script for the simulator")
     async def script(
-        run: str, action: str | None = None, fault: again.Fault | None = None
-    ) -> Response[again.Recorded]:
+        run: str, action: str | None = None, fault: expected_runs.Fault | None = None
+    ) -> Response[expected_runs.Recorded]:
         text = await house.asked.text(Desk.script, run, _fault(action, fault))
-        return json_of(text, again.Recorded)
+        return json_of(text, expected_runs.Recorded)
 
     @post(
         "/api/runs/{run:str}/script",
@@ -124,12 +124,12 @@ def _of_one(house: Has) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
         request_max_body_size=LARGE,
     )
-    async def fit(run: str, request: _Asking) -> Response[again.Recorded]:
+    async def fit(run: str, request: _Asking) -> Response[expected_runs.Recorded]:
         async with body_of(request, house.turns) as body:
             asked = decoded(body, Fit)
             fault = _fault(asked.action, asked.fault)
             text = await house.asked.text(Desk.script, run, fault, bytes(asked.umrf))
-        return json_of(text, again.Recorded)
+        return json_of(text, expected_runs.Recorded)
 
     @get("/api/runs/{run:str}/export", summary="A run as a file: jsonl, csv or mcap")
     async def export(
@@ -180,7 +180,7 @@ def _of_many(house: Has) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def take_in_examples(request: _Asking) -> list[str]:
-        texts = await to_thread.run_sync(recorded_runs.shipped, paths.examples())
+        texts = await to_thread.run_sync(examples.shipped, paths.examples())
         return await house.desk.take_in(texts, author_of(request))
 
     return [comparison, statistics, take_in_examples]
@@ -206,7 +206,9 @@ def _expecting(house: Has) -> list[ControllerRouterHandler]:
     return [listed, expect, retire]
 
 
-def _fault(action: str | None, fault: again.Fault | None) -> tuple[str, again.Fault] | None:
+def _fault(
+    action: str | None, fault: expected_runs.Fault | None
+) -> tuple[str, expected_runs.Fault] | None:
     if (action is None) != (fault is None):
         raise BadInput("A fault belongs to an action: give both, or none.")
     return (action, fault) if action and fault else None

@@ -19,10 +19,11 @@ from sqlalchemy import Row, Select, exists, literal, or_, select
 from action_assistant.errors import Conflict, Refused
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.removal import Removed
+from action_assistant.runner.analysis import annotations
+from action_assistant.runner.archives import archive_file
+from action_assistant.runner.archives.archive_store import Journaled
+from action_assistant.runner.archives.raw_messages import RawPut, stream_of_raw
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.review import about, bundle
-from action_assistant.runner.review.raw import RawPut, stream_of_raw
-from action_assistant.runner.review.shelf import Journaled
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.recorder import stream_of
@@ -117,7 +118,7 @@ class Retention:
         end = await self._journal.end(stream)
         place = _place(row)
         path = self.keep.folder / place
-        written = await self._aside(lambda: bundle.Bundle(path, stream, place, end))
+        written = await self._aside(lambda: archive_file.Bundle(path, stream, place, end))
         try:
             after = 0
             while events := await self._journal.read(stream, after=after, limit=_PAGE):
@@ -131,8 +132,8 @@ class Retention:
         removed = Removed(stream, end.seq, end.chain.hex(), place, digest)
 
         def told(by: int) -> Addition:
-            put = about.Put(at, place, digest, by, _fields(row))
-            return Addition(about.stream_about(row.id), (about.draft(put),))
+            put = annotations.Put(at, place, digest, by, _fields(row))
+            return Addition(annotations.stream_about(row.id), (annotations.draft(put),))
 
         if await self._journal.query(_pinned(row.id)):
             raise Conflict("Somebody has pinned it meanwhile.")
@@ -152,9 +153,9 @@ class Retention:
         if not self._left_over:
             return
         for row in await self._journal.query(_unfinished()):
-            told = await self._journal.read(about.stream_about(row.id))
-            put = next(event for event in reversed(told) if event.kind == about.Put.kind)
-            by = msgspec.json.decode(put.body, type=about.Put).by
+            told = await self._journal.read(annotations.stream_about(row.id))
+            put = next(event for event in reversed(told) if event.kind == annotations.Put.kind)
+            by = msgspec.json.decode(put.body, type=annotations.Put).by
             await self._clear(stream_of(row.id), by)
         self._left_over = False
 
@@ -181,7 +182,7 @@ class Retention:
         file = f"raw/{robot}/{path.name}"
         target = self.keep.folder / file
         size = (await anyio.Path(path).stat()).st_size
-        digest = await self._aside(lambda: bundle.put(path, target))
+        digest = await self._aside(lambda: archive_file.put(path, target))
         put = RawPut(self._wall(), robot, path.name, file, size, digest)
         draft = Draft(put.kind, "", msgspec.json.encode(put))
         await self._journal.append(stream_of_raw(robot), [draft])

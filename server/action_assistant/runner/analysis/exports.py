@@ -9,8 +9,8 @@ import msgspec
 from mcap.writer import CompressionType, Writer
 
 from action_assistant.journal.events import Event
+from action_assistant.runner.analysis.keyframes import fold
 from action_assistant.runner.links.observations import NodeResult, NodeState, Snapshot
-from action_assistant.runner.review.reel import fold
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.durations import of_visit
 from action_assistant.runner.runs.events import Observed

@@ -18,10 +18,9 @@ from litestar import MediaType, Response
 from action_assistant.errors import Refused, Unavailable
 from action_assistant.journal.events import Draft, Snapshot
 from action_assistant.journal.reader import FileReader
-from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.review.desk import Desk, Going
-from action_assistant.runner.review.reel import Archive
-from action_assistant.runner.review.shelf import Shelf
+from action_assistant.runner.analysis.keyframes import Archive
+from action_assistant.runner.archives.archive_store import Shelf
+from action_assistant.runner.review.service import Desk, Opened
 from action_assistant.runner.runs.history import History, Ledger
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
@@ -49,7 +48,7 @@ class Asked:
     """Asks a worker. `opened` are the runs that go on, once that is known."""
 
     def __init__(self, aside: Aside, place: Place, ledger: Archive) -> None:
-        self.opened: Mapping[str, OpenRun] = {}
+        self.opened: Mapping[str, Opened] = {}
         self._aside = aside
         self._place = place
         self._ledger = ledger
@@ -161,9 +160,16 @@ class _File(FileReader):
         return given
 
 
-class _Nothing(Going):
+class _Nothing:
     """Where nothing goes on: all that is known is stored."""
 
     def __init__(self, ledger: Ledger) -> None:
-        self.open = {}
+        self.open: Mapping[str, Opened] = {}
         self.history = History(ledger)
+
+    def next_number(self) -> int:
+        """Nothing begins here."""
+        raise NotImplementedError
+
+    def watch(self, watcher: Callable[[Opened], None]) -> None:
+        """Nothing changes here."""

@@ -12,8 +12,8 @@ from action_assistant.errors import Refused
 from action_assistant.journal.chain import Head
 from action_assistant.journal.events import Addition, Draft, Event, Snapshot
 from action_assistant.journal.removal import Removed
-from action_assistant.runner.review import bundle
-from action_assistant.runner.review.reel import Archive
+from action_assistant.runner.analysis.keyframes import Archive
+from action_assistant.runner.archives import archive_file
 from action_assistant.runner.runs import views
 from action_assistant.schema.runner_tables import run
 from action_assistant.web.workers.lanes import Aside
@@ -102,7 +102,7 @@ class Shelf:
         if stream not in self._read:
             path = self.folder / place.archived_as
             try:
-                events = await self._aside(lambda: list(bundle.read(path)))
+                events = await self._aside(lambda: list(archive_file.read(path)))
             except OSError as error:
                 raise Archived(
                     f"Run {place.number} was archived on {views.time(place.archived_at):%Y-%m-%d} "
@@ -110,7 +110,7 @@ class Shelf:
                     "`action-assistant runs restore FILE` puts it back."
                 ) from error
             if not events or events[0].stream != stream:
-                raise bundle.Damaged(f"{place.archived_as} holds another run.")
+                raise archive_file.Damaged(f"{place.archived_as} holds another run.")
             self._read[stream] = events, sum(len(each.body) + 200 for each in events)
         self._read.move_to_end(stream)
         while len(self._read) > 1 and sum(size for _, size in self._read.values()) > _KEPT:

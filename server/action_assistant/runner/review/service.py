@@ -2,7 +2,7 @@
 
 import logging
 from collections import Counter
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, Concatenate, Final, Literal, ParamSpec, Protocol, TypeAlias, TypeVar
 
@@ -12,23 +12,21 @@ from sqlalchemy import Row, Select, func, select
 
 from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refused, TooLarge
 from action_assistant.journal.events import Draft, Event
-from action_assistant.runner import recorded_runs
+from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
+from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.causes import causes
+from action_assistant.runner.analysis.comparison import Comparison, compare
+from action_assistant.runner.analysis.keyframes import Reels
+from action_assistant.runner.analysis.replay import Film, film
+from action_assistant.runner.archives import examples
+from action_assistant.runner.archives.archive_store import Archived, Shelf
+from action_assistant.runner.archives.raw_messages import Raw, RawPut, raw_of, stream_of_raw
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.service import Control
-from action_assistant.runner.review import about, again, exports, statistics
-from action_assistant.runner.review.cause import causes
-from action_assistant.runner.review.cause_words import words
-from action_assistant.runner.review.compare import Comparison, compare
-from action_assistant.runner.review.film import Film, film
-from action_assistant.runner.review.raw import Raw, RawPut, raw_of, stream_of_raw
-from action_assistant.runner.review.reel import Reels
-from action_assistant.runner.review.shelf import Archived, Shelf
 from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import History
-from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.runs.recorder import Recorder, stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.workers import Crashed
 from action_assistant.schema.runner_tables import expectation, review, run, run_label
@@ -71,7 +69,7 @@ class Expectation(msgspec.Struct, frozen=True, kw_only=True):
     author: Author
     umrf: msgspec.Raw
     script: msgspec.Raw
-    course: list[again.Step]
+    course: list[expected_runs.Step]
 
 
 class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
@@ -100,15 +98,30 @@ class Asking(Protocol):
         ...
 
 
-class Going:
+class Opened(Protocol):
+    """A run that goes on."""
+
+    run: Run
+    recorder: Recorder
+
+
+class Going(Protocol):
     """What goes on, as far as looking back needs it: open runs, and how others are read."""
 
-    open: dict[str, OpenRun]
     history: History
 
+    @property
+    def open(self) -> Mapping[str, Opened]:
+        """The runs that are not over."""
+        ...
+
     def next_number(self) -> int:
-        """Nothing begins here."""
-        raise NotImplementedError
+        """The number of a run that is taken in."""
+        ...
+
+    def watch(self, watcher: Callable[[Opened], None]) -> None:
+        """Be told, at once, of every run that has changed."""
+        ...
 
 
 class Desk:
@@ -117,7 +130,7 @@ class Desk:
 
     def __init__(
         self,
-        control: Control | Going,
+        control: Going,
         ledger: Shelf,
         aside: Aside,
         wall: Clock,
@@ -132,10 +145,9 @@ class Desk:
         self._ended = anyio.Event()
         self._summed_up: int | None = None  # all runs that had ended by then are summed up
         self._tried: Counter[str] = Counter()  # runs whose sums took a worker's life
-        if isinstance(control, Control):
-            control.watch(self._saw)
+        control.watch(self._saw)
 
-    def _saw(self, opened: OpenRun) -> None:
+    def _saw(self, opened: Opened) -> None:
         if opened.run.end is not None:
             if not opened.recorder.recorded:
                 self._summed_up = None  # it may be stored long after it ended
@@ -163,7 +175,7 @@ class Desk:
         before, since = self._wall(), self._summed_up
         figures = func.coalesce(func.json_extract(run.c.summary, "$.figures"), 0)
         done = select(review.c.run).where(
-            review.c.run == run.c.id, review.c.summed, figures == about.FIGURES
+            review.c.run == run.c.id, review.c.summed, figures == annotations.FIGURES
         )
         query = (
             select(run.c.id)
@@ -189,18 +201,18 @@ class Desk:
             if self._tried[run_id] < _TRIES or not isinstance(refused, Crashed | TooLarge):
                 raise  # it will be, later
             log.error("run %s is left out of sums: %s", run_id, refused.detail)
-            summed = about.SummedUp(self._wall(), {})
+            summed = annotations.SummedUp(self._wall(), {})
         except Exception:  # whatever a run of long ago holds, those that go on are not ended by it
             log.exception("run %s cannot be read; it is left out of sums", run_id)
-            summed = about.SummedUp(self._wall(), {}, figures=about.FIGURES)
-        await self._ledger.append(about.stream_about(run_id), [about.draft(summed)])
+            summed = annotations.SummedUp(self._wall(), {}, figures=annotations.FIGURES)
+        await self._ledger.append(annotations.stream_about(run_id), [annotations.draft(summed)])
 
-    async def summed(self, run_id: str, now: int) -> about.SummedUp:
+    async def summed(self, run_id: str, now: int) -> annotations.SummedUp:
         """The sum of a run that is over. Raises NotFound."""
         found = (await self.reels.reel(run_id)).keys[-1].run
         good = found.end == "finished" and found.result == "on_true"
         graph = None if good else await self._graph(run_id)  # only failures have causes
-        return await self._aside(lambda: about.sum_of(found, graph, now))
+        return await self._aside(lambda: annotations.sum_of(found, graph, now))
 
     async def whole(self, run_id: str) -> views.RunWhole:
         """A run that is over, and the graph as it was sent. Raises NotFound."""
@@ -280,11 +292,11 @@ class Desk:
         """The graph as it was sent. Raises NotFound."""
         return (await self._control.history.umrf(run_id)).encode()
 
-    async def mark(self, run_id: str, marks: about.Marks, author: Author) -> Marked:
+    async def mark(self, run_id: str, marks: annotations.Marks, author: Author) -> Marked:
         """Pin, note or label a run. Raises NotFound."""
         await self.known(run_id)
-        marked = about.Marked(self._wall(), author, marks)
-        await self._ledger.append(about.stream_about(run_id), [about.draft(marked)])
+        marked = annotations.Marked(self._wall(), author, marks)
+        await self._ledger.append(annotations.stream_about(run_id), [annotations.draft(marked)])
         return await self.marks(run_id)
 
     async def marks(self, run_id: str) -> Marked:
@@ -322,21 +334,21 @@ class Desk:
         return events[-1].seq if events else after, b"".join(exports.lines(run_id, events))
 
     async def script(
-        self, run_id: str, fault: tuple[str, again.Fault] | None, umrf: bytes | None = None
-    ) -> again.Recorded:
+        self, run_id: str, fault: tuple[str, expected_runs.Fault] | None, umrf: bytes | None = None
+    ) -> expected_runs.Recorded:
         """What the run did as a script, for its own graph or for another version of it. Raises
         NotFound, BadInput, NotUmrf."""
         found = await self.known(run_id)
         if fault is not None and fault[0] not in found.actions:
             raise BadInput(f"The run has no action {fault[0]!r}.", where={"path": "/fault"})
-        script = again.recorded(found, fault)
+        script = expected_runs.recorded(found, fault)
         if umrf is None:
             return script
         try:
             reading = await self._aside(lambda: codec.read(umrf))
         except codec.Unreadable as wrong:
             raise NotUmrf(wrong.message, where={"path": f"/umrf{wrong.path}"}) from wrong
-        return again.fitted(script, found, reading.graph)
+        return expected_runs.fitted(script, found, reading.graph)
 
     # --- many runs ----------------------------------------------------------------------------
 
@@ -361,13 +373,15 @@ class Desk:
         """Take in recorded runs as examples, each once; their ids. Raises BadInput, Unavailable."""
         taken: list[str] = []
         for text in texts:
-            first, rest = recorded_runs.read(text)
+            first, rest = examples.read(text)
             stream = stream_of(first.run)
             if not await self._ledger.newest(stream):
-                label = about.Marks(labels=(recorded_runs.LABEL,))
-                marked = about.Marked(self._wall(), author, label)
-                await self._ledger.append(about.stream_about(first.run), [about.draft(marked)])
-                begin = recorded_runs.numbered(first, self._control.next_number())
+                label = annotations.Marks(labels=(examples.LABEL,))
+                marked = annotations.Marked(self._wall(), author, label)
+                await self._ledger.append(
+                    annotations.stream_about(first.run), [annotations.draft(marked)]
+                )
+                begin = examples.numbered(first, self._control.next_number())
                 await self._ledger.append(stream, [begin, *rest], expected=0)
             taken.append(first.run)
         self._summed_up = None  # they ended long ago
@@ -389,20 +403,22 @@ class Desk:
         else:
             saved = await self._asked.value(Desk.expected, run_id, name, author, self._wall())
         draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
-        await self._ledger.append(again.STREAM, [draft])
+        await self._ledger.append(expected_runs.STREAM, [draft])
         return _shown(saved)
 
-    async def expected(self, run_id: str, name: str, author: Author, now: int) -> again.Expected:
+    async def expected(
+        self, run_id: str, name: str, author: Author, now: int
+    ) -> expected_runs.Expected:
         """What would be expected. Raises NotFound, Conflict."""
         found = await self.known(run_id)
         if found.end is None:
             raise Conflict("The run is not over yet.")
         umrf = await self._control.history.umrf(run_id)
-        recorded = again.recorded(found)
+        recorded = expected_runs.recorded(found)
         script = {"behaviours": recorded.behaviours}
-        course = again.course(codec.read(umrf.encode()).graph, script_from(script))
+        course = expected_runs.course(codec.read(umrf.encode()).graph, script_from(script))
         _check_alike(found, course)
-        return again.Expected(
+        return expected_runs.Expected(
             at=now,
             name=name,
             author=author,
@@ -419,20 +435,20 @@ class Desk:
         rows = await self._ledger.query(select(expectation).order_by(expectation.c.name))
         return [_shown(await self._saved(row.seq)) for row in rows]
 
-    async def _saved(self, seq: int) -> again.Expected:
-        (event,) = await self._ledger.read(again.STREAM, after=seq - 1, upto=seq)
-        return msgspec.json.decode(event.body, type=again.Expected)
+    async def _saved(self, seq: int) -> expected_runs.Expected:
+        (event,) = await self._ledger.read(expected_runs.STREAM, after=seq - 1, upto=seq)
+        return msgspec.json.decode(event.body, type=expected_runs.Expected)
 
     async def retire(self, name: str, author: Author) -> None:
         """Expect it no more. Raises NotFound."""
         if not await self._ledger.query(select(expectation).where(expectation.c.name == name)):
             raise NotFound(f"Nothing is expected under the name {name!r}.")
-        retired = again.Retired(self._wall(), name, author)
+        retired = expected_runs.Retired(self._wall(), name, author)
         draft = Draft(retired.kind, author.id, msgspec.json.encode(retired))
-        await self._ledger.append(again.STREAM, [draft])
+        await self._ledger.append(expected_runs.STREAM, [draft])
 
 
-def _check_alike(found: Run, course: tuple[again.Step, ...]) -> None:
+def _check_alike(found: Run, course: tuple[expected_runs.Step, ...]) -> None:
     """A run that the simulator cannot repeat is no expectation: it would fail by itself."""
     simulated: dict[str, list[str]] = {}
     for step in course:
@@ -452,7 +468,7 @@ def _check_alike(found: Run, course: tuple[again.Step, ...]) -> None:
             )
 
 
-def _shown(saved: again.Expected) -> Expectation:
+def _shown(saved: expected_runs.Expected) -> Expectation:
     return Expectation(
         name=saved.name,
         run=saved.run,

@@ -11,7 +11,7 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.review.reel import APART, Mark, Reels, fold, words
+from action_assistant.runner.analysis.keyframes import APART, Mark, Reels, fold, words
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import RunEvent
 from action_assistant.runner.runs.run import Run

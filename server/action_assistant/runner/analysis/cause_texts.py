@@ -2,7 +2,7 @@
 
 from typing import assert_never
 
-from action_assistant.runner.review.cause import (
+from action_assistant.runner.analysis.causes import (
     ActionFailed,
     Cause,
     EngineRestarted,

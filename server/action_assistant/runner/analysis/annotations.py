@@ -13,8 +13,8 @@ from sqlalchemy import Executable, delete, func, insert, update
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Draft, Event
-from action_assistant.runner.review.cause import causes
-from action_assistant.runner.review.cause_words import words
+from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.causes import causes
 from action_assistant.runner.runs.durations import Took, of_run, of_visit, took_us
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
