@@ -12,7 +12,7 @@ import anyio
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from action_assistant.runner.live import Hub, Outbox
+from action_assistant.runner.api.live import Hub, Outbox
 from runner.process import RunnerProcess, over, started
 from runner.world import ANN, World, carousel, order, sequence, virtual, wall
 

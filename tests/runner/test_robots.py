@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
+from action_assistant.runner.api.live import Hub
 from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import (
     Candidate,
@@ -17,7 +18,6 @@ from action_assistant.runner.links.port import (
     Order,
     Registration,
 )
-from action_assistant.runner.live import Hub
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.robot_events import Commanded, EngineBecame, StopWasProven
 from action_assistant.runner.runs import queries

@@ -14,16 +14,17 @@ from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
 from action_assistant.public_url import RUNNER
 from action_assistant.runner import projection
-from action_assistant.runner.api import House, routes
+from action_assistant.runner.api.caller import SMALL
+from action_assistant.runner.api.live import Hub
+from action_assistant.runner.api.runs import routes
+from action_assistant.runner.api.services import House
 from action_assistant.runner.archives.archive_store import Shelf
 from action_assistant.runner.archives.retention import Retention
-from action_assistant.runner.asking import SMALL
 from action_assistant.runner.clock import wall_clock
 from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
-from action_assistant.runner.live import Hub
 from action_assistant.runner.review.service import Desk
 from action_assistant.runner.review.worker_queries import Asked, Place
 from action_assistant.runner.robots.recordings import Recordings

@@ -8,8 +8,8 @@ from litestar import Request, Response, delete, get, patch, post
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound
-from action_assistant.runner.asking import LARGE, author_of, body_of
-from action_assistant.runner.described import GroupOperation, LookOperation
+from action_assistant.runner.api.caller import LARGE, author_of, body_of
+from action_assistant.runner.api.openapi import GroupOperation, LookOperation
 from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
 from action_assistant.runner.robots.recordings import Recording

@@ -17,11 +17,11 @@ from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.analysis.comparison import Comparison
 from action_assistant.runner.analysis.replay import Film
 from action_assistant.runner.analysis.statistics import Statistics
+from action_assistant.runner.api.caller import LARGE, author_of, body_of
+from action_assistant.runner.api.openapi import FitOperation
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.raw_messages import Raw
 from action_assistant.runner.archives.retention import Retention, Swept
-from action_assistant.runner.asking import LARGE, author_of, body_of
-from action_assistant.runner.described import FitOperation
 from action_assistant.runner.execution.service import Control
 from action_assistant.runner.review.service import CauseShown, Desk, Expectation, Format, Marked
 from action_assistant.runner.review.worker_queries import Asked, json_of

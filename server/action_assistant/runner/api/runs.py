@@ -3,7 +3,6 @@
 from collections.abc import AsyncIterator
 from datetime import UTC, datetime
 from typing import Annotated, Any, Final, get_args
-from weakref import WeakKeyDictionary
 
 import anyio
 import msgspec
@@ -14,57 +13,32 @@ from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound, TooMany
-from action_assistant.journal.journal import Journal
-from action_assistant.runner import robots_api
-from action_assistant.runner.archives.retention import Retention
-from action_assistant.runner.asking import LARGE, author_of, body_of, start_of
-from action_assistant.runner.described import (
+from action_assistant.runner.api import review as review
+from action_assistant.runner.api import robots
+from action_assistant.runner.api.caller import LARGE, author_of, body_of, start_of
+from action_assistant.runner.api.live import Stopping, attend, work_out
+from action_assistant.runner.api.openapi import (
     ModifyOperation,
     RestOperation,
     StartOperation,
     StopOperation,
 )
+from action_assistant.runner.api.services import House
 from action_assistant.runner.execution.interventions import RestRequest
-from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.service import Control
 from action_assistant.runner.links.port import SIMULATOR
-from action_assistant.runner.live import Hub, Stopping, attend, work_out
 from action_assistant.runner.review import listing
-from action_assistant.runner.review import routes as review
 from action_assistant.runner.review.service import Desk
-from action_assistant.runner.review.worker_queries import Asked, json_of
+from action_assistant.runner.review.worker_queries import json_of
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.run import Run, State
 from action_assistant.runner.start.admission import decoded, read_request
 from action_assistant.web.auth.access import Needs, person_of, refuse, require
-from action_assistant.web.network.connection_limits import Crowd, Turns
-from action_assistant.web.workers.lanes import Aside
 
 _PAGE: Final = 500  # events read at once
-_BODIES: Final = 4  # large ones of a person at a time
 _STOP_BYTES: Final = 4_096  # of the body of a Stop; whatever comes after them is not read
 _STOP_S: Final = 1.0  # that a Stop waits for its body
 _ALIVE_S: Final = 15.0  # between two signs of life of an event stream
 _Asking = Request[Any, Any, Any]
-
-
-class House:
-    """What the routes work on; filled when the process is up, before the first request."""
-
-    control: Control
-    hub: Hub
-    crowd: Crowd
-    journal: Journal
-    desk: Desk
-    asked: Asked
-    retention: Retention
-    turns: Turns
-    aside: Aside
-    sent: WeakKeyDictionary[OpenRun, views.Sent]
-
-    def __init__(self) -> None:
-        self.sent = WeakKeyDictionary()
-        self.turns = Turns(_BODIES)
 
 
 class StopAsked(msgspec.Struct, frozen=True):
@@ -79,7 +53,7 @@ def routes(house: House) -> list[ControllerRouterHandler]:
         *_starts(house),
         *_moves(house),
         *_reads(house),
-        *robots_api.routes(house),
+        *robots.routes(house),
         *review.routes(house),
         _live(house),
     ]

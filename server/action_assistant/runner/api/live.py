@@ -19,7 +19,7 @@ from litestar import WebSocket
 from litestar.exceptions import WebSocketDisconnect, WebSocketException
 
 from action_assistant.errors import Refused
-from action_assistant.runner.asking import author_of
+from action_assistant.runner.api.caller import author_of
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import Control

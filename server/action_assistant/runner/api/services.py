@@ -1,0 +1,36 @@
+"""What the routes of the runner work on."""
+
+from typing import Final
+from weakref import WeakKeyDictionary
+
+from action_assistant.journal.journal import Journal
+from action_assistant.runner.api.live import Hub
+from action_assistant.runner.archives.retention import Retention
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import Control
+from action_assistant.runner.review.service import Desk
+from action_assistant.runner.review.worker_queries import Asked
+from action_assistant.runner.runs import views
+from action_assistant.web.network.connection_limits import Crowd, Turns
+from action_assistant.web.workers.lanes import Aside
+
+_BODIES: Final = 4  # large ones of a person at a time
+
+
+class House:
+    """What the routes work on; filled when the process is up, before the first request."""
+
+    control: Control
+    hub: Hub
+    crowd: Crowd
+    journal: Journal
+    desk: Desk
+    asked: Asked
+    retention: Retention
+    turns: Turns
+    aside: Aside
+    sent: WeakKeyDictionary[OpenRun, views.Sent]
+
+    def __init__(self) -> None:
+        self.sent = WeakKeyDictionary()
+        self.turns = Turns(_BODIES)
