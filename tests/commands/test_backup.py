@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from action_assistant.commands.backups import backup
-from action_assistant.editor.app import open_house
+from action_assistant.editor.app import open_services
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.journal import Journal
@@ -149,10 +149,10 @@ async def test_files_that_somebody_copied_back_by_hand_begin_an_epoch_too(data: 
     settings = EditorSettings(data=data, database=f"sqlite:///{data / 'editor.db'}")
 
     async def epoch(*, more: bool = False) -> str:
-        async with open_house(settings) as house:
+        async with open_services(settings) as services:
             if more:
-                await house.catalogue.create(b'{"name": "after"}', "ada")
-            return house.epoch
+                await services.catalogue.create(b'{"name": "after"}', "ada")
+            return services.epoch
 
     first = await epoch()
     shutil.copy(data / "editor.db", data / "copy")

@@ -25,7 +25,7 @@ pytest.importorskip(
 )
 
 from action_assistant.errors import Refused
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots
@@ -114,7 +114,9 @@ class Driven:
         assert not isinstance(reach, str), reach
         robots = Robots(reach=reach)
         try:
-            async with Control.opened(self.ledger, robots, wall=wall, aside=at_once) as control:
+            async with ExecutionService.opened(
+                self.ledger, robots, wall=wall, aside=at_once
+            ) as control:
                 await robots.register(Registration(name="David", domain=self.domain), ANN)
                 for n in range(runs):
                     with anyio.fail_after(60):
@@ -125,7 +127,7 @@ class Driven:
             with anyio.CancelScope(shield=True):
                 await reach.aclose()
 
-    async def _run(self, control: Control, n: int) -> None:
+    async def _run(self, control: ExecutionService, n: int) -> None:
         graph, stop = plan(self.chance, n)
         try:
             started = await control.start(order(graph, engine="David", graph=None), ANN)

@@ -11,7 +11,7 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots
@@ -40,7 +40,7 @@ def test_a_run_that_did_not_obey_ends_with_the_process_of_its_engine(
         reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(domain)})
         assert not isinstance(reach, str), reach
         robots = Robots(reach=reach)
-        async with Control.opened(ledger, robots, wall=wall, aside=at_once) as control:
+        async with ExecutionService.opened(ledger, robots, wall=wall, aside=at_once) as control:
             await _answering(robots, domain)
             run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
             await control.stop(run, BEN)
@@ -71,7 +71,7 @@ def test_an_engine_that_was_not_started_by_its_name_is_of_no_known_process(domai
         reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(domain)})
         assert not isinstance(reach, str), reach
         robots = Robots(reach=reach)
-        async with Control.opened(MemoryLedger(), robots, wall=wall, aside=at_once):
+        async with ExecutionService.opened(MemoryLedger(), robots, wall=wall, aside=at_once):
             await _answering(robots, domain)
             engine = robots.link("David")
             assert engine is not None

@@ -32,7 +32,7 @@ from action_assistant.runner.emulator.messages import Quirks
 from action_assistant.runner.emulator.node import StandInNode
 from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots
@@ -130,7 +130,9 @@ class Story:
         stranger = await anyio.to_thread.run_sync(Stranger, self.domain)
         try:
             robots = Robots(reach=reach)
-            async with Control.opened(self.ledger, robots, wall=wall, aside=at_once) as control:
+            async with ExecutionService.opened(
+                self.ledger, robots, wall=wall, aside=at_once
+            ) as control:
                 control.watch(self.judge)
                 await robots.register(Registration(name="David", domain=self.domain), ANN)
                 with anyio.fail_after(20):
@@ -150,7 +152,7 @@ class Story:
                     await anyio.to_thread.run_sync(stack.close)
                 await anyio.to_thread.run_sync(stranger.leave)
 
-    async def step(self, control: Control, stranger: Stranger) -> None:
+    async def step(self, control: ExecutionService, stranger: Stranger) -> None:
         """Something happens."""
         name = self.chance.choice(list(GRAPHS))
         what = self.chance.choices(

@@ -10,7 +10,7 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots
@@ -32,7 +32,7 @@ async def refused(domain: int) -> MemoryLedger:
     graph = msgspec.structs.replace(graph, actions=(carols, *graph.actions[1:]))
     override = Override(codes=("actors", "others", "actions"), reason="it is a test")
     try:
-        async with Control.opened(ledger, robots, wall=wall, aside=at_once) as control:
+        async with ExecutionService.opened(ledger, robots, wall=wall, aside=at_once) as control:
             await robots.register(Registration(name="David", domain=domain), ANN)
             with anyio.fail_after(30):
                 while robots.robot("David").state != "answering":  # noqa: ASYNC110

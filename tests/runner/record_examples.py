@@ -20,7 +20,7 @@ from action_assistant.runner.archives import examples as recorded_runs
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, Start, index_of
 from action_assistant.runner.execution.interventions import RestRequest
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.umrf.files import codec
@@ -95,7 +95,7 @@ class Stage:
         self.world = World({ROBOT: AirLink(self.air, ROBOT)})
         self.script = script_from({"behaviours": script})
         self.index = index_of([codec.write_action(each) for each in known], [])
-        self.control: Control
+        self.control: ExecutionService
 
     def robot(self) -> Node:
         """The engine comes up."""

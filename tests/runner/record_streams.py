@@ -22,7 +22,7 @@ from action_assistant.journal.events import Event
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, Start, index_of
 from action_assistant.runner.execution.interventions import RestRequest
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import decode
 from action_assistant.runner.runs.fold import replay
@@ -54,7 +54,7 @@ class Place:
         links = {name: AirLink(self.air, name, f"/{name}") for name in ("Robin", "Marian")}
         self.world = World(dict(links))
         self.script = script_from({"behaviours": script})
-        self.control: Control
+        self.control: ExecutionService
 
     def robot(self, name: str) -> None:
         """An engine comes up."""

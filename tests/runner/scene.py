@@ -9,7 +9,7 @@ import anyio
 
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Quirks, Start
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs import views
 from action_assistant.umrf.semantics import script_from
 from runner.air import Air, Node, now, now_ms
@@ -57,7 +57,7 @@ class Scene:
         return self.air.join(stand_in, PATHS[name])
 
     @asynccontextmanager
-    async def played(self) -> AsyncIterator[Control]:
+    async def played(self) -> AsyncIterator[ExecutionService]:
         """The runner, with everything alive around it."""
         with self.air.hearing(self._hear):
             async with anyio.create_task_group() as wind:
@@ -81,6 +81,6 @@ def asked(name: str = "David", **more: Any) -> Any:
     return order(PATROL, engine=name, **more)
 
 
-def shown(control: Control, run: str) -> Any:
+def shown(control: ExecutionService, run: str) -> Any:
     """A run as the API and the page show it."""
     return views.shown(control.open[run].run)

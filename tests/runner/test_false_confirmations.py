@@ -22,7 +22,7 @@ from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Pause, Quirks, Start, Stop
 from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Link
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.run import ENDED, State
@@ -169,7 +169,7 @@ class Story:
             await self.come_to_rest()
             wind.cancel_scope.cancel()
 
-    async def do(self, control: Control, people: Any, step: str, value: Any) -> None:
+    async def do(self, control: ExecutionService, people: Any, step: str, value: Any) -> None:
         """One step."""
         alive = [each for each in self.air.nodes if not each.robot.gone]
         node = self.chance.choice(alive) if alive else None
@@ -234,7 +234,7 @@ class Story:
             node.robot.thaw(now_ms())
             self.air.stir(node)
 
-    def look_at_robots(self, control: Control) -> None:
+    def look_at_robots(self, control: ExecutionService) -> None:
         """Somebody goes there, and says so of what is at rest where the engine's word is none."""
         moving = self.moving()
         for run, opened in tuple(control.open.items()):
@@ -277,7 +277,7 @@ class Story:
         self.air.late_s = self.air.old_s = 0.0
         self.world.ledger.down = False
 
-    async def start(self, control: Control, name: str) -> None:
+    async def start(self, control: ExecutionService, name: str) -> None:
         """A start, which may be refused; some people override what can be."""
         override = {"override": EVERYTHING} if self.chance.random() < 0.7 else {}
         with suppress(Refused):

@@ -10,7 +10,7 @@ import pytest
 from action_assistant.runner.archives.archive_store import Shelf
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.links.port import Answer, Order
-from action_assistant.runner.review.service import Desk
+from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.settings import Keep
 from runner.fleet import Open
@@ -95,10 +95,10 @@ def test_a_link_that_breaks_while_a_graph_of_somebody_else_is_stopped_ends_nothi
             setattr(david, fault, True)
             control.stop_robot("David", BEN)
             await anyio.sleep(10)
-            assert control.robots.silencing.trouble("David", "cleaning")
+            assert control.robots.foreign_stops.trouble("David", "cleaning")
             assert control.open[run.id].run.state == "running"
             setattr(david, fault, False)
-            await until(lambda: not control.robots.silencing.going("David"))
+            await until(lambda: not control.robots.foreign_stops.going("David"))
             assert not await david.moving("cleaning")
 
     lived()
@@ -154,8 +154,8 @@ async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_no
     world = World()
     async with world.runner() as control, anyio.create_task_group() as tasks:
         shelf = Shelf(world.ledger, Path("nowhere"), at_once)  # type: ignore[arg-type]
-        desk = Desk(control, shelf, at_once, wall)
-        reel, failed = desk.reels.reel, []
+        review_service = ReviewService(control, shelf, at_once, wall)
+        reel, failed = review_service.reels.reel, []
 
         async def fails_once(run: str) -> Any:
             if not failed:
@@ -163,8 +163,8 @@ async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_no
                 raise ZeroDivisionError
             return await reel(run)
 
-        desk.reels.reel = fails_once  # type: ignore[method-assign]
-        tasks.start_soon(desk.run)
+        review_service.reels.reel = fails_once  # type: ignore[method-assign]
+        tasks.start_soon(review_service.run)
         for _ in range(2):
             run = (await control.start(order(sequence(actions=1)), ANN)).run
             await until(lambda run=run: run.id not in control.open)

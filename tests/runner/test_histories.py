@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from action_assistant.errors import Refused
 from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.observations import ACTIVE, NodeState
 from action_assistant.runner.links.port import EngineRefused, NoAnswer, Order, Report, Transitions
 from action_assistant.runner.links.simulator import SimulatorLink
@@ -84,7 +84,7 @@ class Story:
             await self.come_to_rest()
             engines.cancel_scope.cancel()
 
-    async def do(self, control: Control, people: Any, step: str, value: Any) -> None:
+    async def do(self, control: ExecutionService, people: Any, step: str, value: Any) -> None:
         """One step."""
         match step:
             case "wait":
@@ -131,7 +131,7 @@ class Story:
         self.robot.loss = self.robot.start_loss = self.world.ledger.slow = 0.0
         self.robot.silent = self.world.ledger.down = False
 
-    async def start(self, control: Control, name: str, where: str) -> None:
+    async def start(self, control: ExecutionService, name: str, where: str) -> None:
         """A start, which may be refused."""
         script = {"script": self.script} if where == "simulator" else {}
         with suppress(Refused):

@@ -8,7 +8,7 @@ import pytest
 
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import index_of
-from action_assistant.runner.execution.sub_graphs import Parts
+from action_assistant.runner.execution.sub_graphs import SubGraphs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.runs.events import Override
@@ -113,7 +113,7 @@ OLD = snapshot("g__S__0", "FINISHED", W_0="FINISHED")
 def test_a_part_is_a_runs_own_once_the_action_that_is_it_has_begun(
     state: str, part: Snapshot, ours: list[bool]
 ) -> None:
-    parts, own = Parts(), snapshot("g", "RUNNING", S_0=state)
+    parts, own = SubGraphs(), snapshot("g", "RUNNING", S_0=state)
     assert [bool(parts.ours(own, [part])) for _ in ours] == ours
 
 
@@ -122,4 +122,4 @@ def test_a_part_of_a_part_is_judged_by_that_and_a_graph_of_no_action_is_none() -
     middle = snapshot("g__S__0", "RUNNING", T_0="RUNNING")
     inner = snapshot("g__S__0__T__0", "RUNNING", W_0="RUNNING")
     stray = snapshot("g__other__1", "RUNNING", W_0="RUNNING")
-    assert Parts().ours(own, [inner, stray, middle]) == [middle, inner]
+    assert SubGraphs().ours(own, [inner, stray, middle]) == [middle, inner]

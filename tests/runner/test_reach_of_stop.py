@@ -8,7 +8,7 @@ import pytest
 
 from action_assistant.errors import Conflict
 from action_assistant.runner.emulator.messages import Start
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Link, NotSent, Order, Registration
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.umrf.facts import EngineFacts
@@ -37,7 +37,7 @@ async def test_a_graph_with_the_mark_of_a_run_on_another_robot_is_stopped_too() 
         (look,) = await control.look(group(sequence(), "Eve"))
         assert {each.code: each.verdict for each in look.items}["quiet"] == "blocked"
         assert control.stop_robot("Eve", BEN) == ([], ["Eve: cleaning"])
-        await until(lambda: not control.robots.silencing.going("Eve"))
+        await until(lambda: not control.robots.foreign_stops.going("Eve"))
         assert not await eve.moving("cleaning")
         assert control.open[run.id].run.desired == "running"
 
@@ -80,7 +80,7 @@ async def test_a_graph_that_somebody_started_a_moment_ago_is_stopped(after_s: fl
         await anyio.sleep(after_s)
         control.stop_all(BEN)
         await until(lambda: scene.nodes["David"].robot.moving == (), patience=5)
-        await until(lambda: not control.robots.silencing.going("David"))
+        await until(lambda: not control.robots.foreign_stops.going("David"))
 
 
 @virtual
@@ -105,7 +105,7 @@ async def test_a_stop_of_it_that_is_pressed_again_goes_on_for_another_minute() -
         control.stop_robot("David", BEN)
         await anyio.sleep(20)
         david.loss = 0.0
-        await until(lambda: not control.robots.silencing.going("David"))
+        await until(lambda: not control.robots.foreign_stops.going("David"))
         assert not await david.moving("cleaning")
 
 
@@ -146,7 +146,7 @@ async def test_a_start_that_comes_while_its_robot_is_registered_anew_can_be_stop
     world, david = World(), Open(NEVER)
     robots = Robots(reach=Leases(David=david))
     async with (
-        Control.opened(world.ledger, robots, wall=wall, aside=at_once) as control,
+        ExecutionService.opened(world.ledger, robots, wall=wall, aside=at_once) as control,
         anyio.create_task_group() as tasks,
     ):
         await control.register(Registration(name="David"), ANN)
@@ -175,7 +175,7 @@ async def test_a_robot_is_neither_changed_nor_forgotten_while_something_is_stopp
         with pytest.raises(Conflict, match="being stopped"):
             await control.remove("David", BEN)
         david.loss = 0.0
-        await until(lambda: not control.robots.silencing.going("David"))
+        await until(lambda: not control.robots.foreign_stops.going("David"))
         await control.remove("David", BEN)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from action_assistant.runner.emulator.engine import StandIn
 from action_assistant.runner.emulator.messages import Index, Quirks, Start
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.refusals import StartLog, why_refused
 from action_assistant.runner.runs.run import Run
@@ -61,7 +61,7 @@ def of_another(graph: Graph = PATROL) -> Graph:
     return msgspec.structs.replace(graph, actions=(carols, *others))
 
 
-async def told(scene: Scene, control: Control, request: Any) -> Run:
+async def told(scene: Scene, control: ExecutionService, request: Any) -> Run:
     """A start that the engine refuses, once it is over; it never begins anything."""
     run = (await control.start(request, ANN)).run
     assert await ended(control, run.id) == "refused", control.open.get(run.id)

@@ -10,7 +10,7 @@ import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
 from action_assistant.runner.api.live import Hub
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import (
     Candidate,
     EngineRefused,
@@ -33,10 +33,10 @@ NEVER = {"*": [{"never": True}]}
 
 
 @asynccontextmanager
-async def fleet(world: World, **robots: Open) -> AsyncIterator[Control]:
+async def fleet(world: World, **robots: Open) -> AsyncIterator[ExecutionService]:
     """A runner that knows these robots, after they have answered for the first time."""
     reach = Robots(reach=Fleet(**robots))
-    async with Control.opened(world.ledger, reach, wall=wall, aside=at_once) as control:
+    async with ExecutionService.opened(world.ledger, reach, wall=wall, aside=at_once) as control:
         for name in robots:
             await control.register(Registration(name=name), ANN)
         await until(lambda: all(control.robots.robot(name).heard_at for name in robots))
@@ -101,7 +101,7 @@ async def test_a_robot_that_falls_silent_is_busy_and_one_that_left_is_gone() -> 
         david.silent = False
         david.become("answering", "")
         await until(lambda: control.robots.robot("David").state == "answering")
-        told = [event for _, event in await control.robots.flight.newest("David", 99)]
+        told = [event for _, event in await control.robots.robot_log.newest("David", 99)]
     states = [event.state for event in told if isinstance(event, EngineBecame)]
     assert states.index("busy") < states.index("gone")
     assert states[-1] == "answering"
@@ -119,7 +119,7 @@ async def test_an_engine_that_came_back_is_called_restarted() -> None:
 @virtual
 async def test_a_changed_profile_makes_another_link_and_a_removed_robot_is_unknown() -> None:
     reach = Fleet(David=Open())
-    async with Control.opened(
+    async with ExecutionService.opened(
         World().ledger, Robots(reach=reach), wall=wall, aside=at_once
     ) as control:
         await control.register(Registration(name="David"), ANN)
@@ -167,7 +167,7 @@ async def test_registered_robots_are_known_after_a_restart_and_removed_ones_are_
     async with fleet(world, David=Open(), Eve=Open()) as control:
         await control.remove("Eve", ANN)
     again = Robots(reach=Fleet(David=Open()))
-    async with Control.opened(world.ledger, again, wall=wall, aside=at_once) as control:
+    async with ExecutionService.opened(world.ledger, again, wall=wall, aside=at_once) as control:
         assert [robot.name for robot in control.robots.all()] == ["simulator", "David"]
 
 
@@ -177,7 +177,7 @@ async def test_candidates_are_those_that_nobody_registered() -> None:
     seen = Candidate(domain=0, rmw="x", get_service="/umrf_graph_get")
     other = Candidate(domain=3, rmw="x", get_service="/eve/umrf_graph_get", actor="Eve")
     reach.sight = (seen, other)
-    async with Control.opened(
+    async with ExecutionService.opened(
         World().ledger, Robots(reach=reach), wall=wall, aside=at_once
     ) as control:
         assert await control.robots.candidates() == (seen, other)
@@ -250,9 +250,9 @@ async def test_a_graph_of_somebody_else_is_in_the_way_until_it_is_stopped() -> N
         (same,) = await control.look(group(sequence("cleaning"), "David"))
         assert same.never
         assert control.robots.silence(BEN, lambda _: ()) == ["David: cleaning"]
-        await until(lambda: not control.robots.silencing.going("David"))
+        await until(lambda: not control.robots.foreign_stops.going("David"))
         assert not await david.moving("cleaning")
-        told = [event for _, event in await control.robots.flight.newest("David", 9)]
+        told = [event for _, event in await control.robots.robot_log.newest("David", 9)]
         assert isinstance(told[-1], StopWasProven)
         (look,) = await control.look(group(sequence(), "David"))
         assert verdicts(look)["quiet"] == "passed"
@@ -360,7 +360,7 @@ async def test_a_change_that_was_read_while_the_run_was_stopped_is_not_sent() ->
         return work(*args)
 
     world = World()
-    async with Control.opened(world.ledger, Robots(), wall=wall, aside=slowly) as control:
+    async with ExecutionService.opened(world.ledger, Robots(), wall=wall, aside=slowly) as control:
         run = (await control.start(order(sequence(), script=NEVER), ANN)).run
         await anyio.sleep(1)
         async with anyio.create_task_group() as tasks:
@@ -476,11 +476,11 @@ async def test_a_start_of_somebody_else_is_recorded_with_its_graph_and_the_run_i
         await anyio.sleep(1)
         ((seq, told),) = [
             (seq, event)
-            for seq, event in await control.robots.flight.newest("David", 9)
+            for seq, event in await control.robots.robot_log.newest("David", 9)
             if isinstance(event, Commanded)
         ]
         assert (told.command, told.run, told.number) == ("start", run.id, run.number)
-        assert await control.robots.flight.graph("David", seq) == text
+        assert await control.robots.robot_log.graph("David", seq) == text
         control.stop_all(ANN)
         await until(lambda: not control.open)
 

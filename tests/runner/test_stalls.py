@@ -9,7 +9,7 @@ import pytest
 
 from action_assistant.runner.analysis.cause_texts import words
 from action_assistant.runner.analysis.causes import causes
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.model import ENTRY, Conditions, Graph, Parameter, Relation
@@ -60,7 +60,7 @@ MAYBE = answering(sequence("patrol", 2), 0, 1, Conditions(on_true="run", on_fals
 HALTS = answering(sequence("Sub", 2), 0, 1, Conditions())
 
 
-async def stalled(control: Control, graph: Graph, seconds: float = 25.0) -> str:
+async def stalled(control: ExecutionService, graph: Graph, seconds: float = 25.0) -> str:
     run = (await control.start(asked(graph), ANN)).run.id
     await anyio.sleep(seconds)
     return run

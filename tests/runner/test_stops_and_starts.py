@@ -272,7 +272,7 @@ async def begun_anew_after(wait_s: float) -> bool:
         await until(lambda: control.robots.silence(BEN, lambda _: ()) != [])
         scene.air.old_s = 0.5
         again = now() + wait_s
-        while control.robots.silencing.going("David"):
+        while control.robots.foreign_stops.going("David"):
             if now() >= again:
                 scene.air.carry(theirs, "terminal")
                 again = float("inf")

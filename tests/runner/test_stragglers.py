@@ -10,7 +10,7 @@ from typing import Any
 import anyio
 
 from action_assistant.runner.emulator.messages import Quirks
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Ended, MovesAgain, Proof, StopSent
 from runner.air import now_ms
@@ -25,7 +25,7 @@ def scene(**more: Any) -> Scene:
     return Scene(11, **({"quirks": SLOW, "script": TWO_SECONDS} | more))
 
 
-async def proven_stopped(control: Control) -> str:
+async def proven_stopped(control: ExecutionService) -> str:
     """A run that was stopped while its first action was still being loaded."""
     run = (await control.start(asked(), ANN)).run.id
     await anyio.sleep(0.3)

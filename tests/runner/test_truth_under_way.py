@@ -74,5 +74,5 @@ async def test_each_run_that_is_open_on_a_robot_hears_what_others_start_there() 
         told = {run: {each.code for each in shown(control, run).alarms} for run in control.open}
         assert "foreign_start" in told[first]
         assert "foreign_other" in told[second]
-        heard = [each for _, each in await control.robots.flight.newest("David", 9)]
+        heard = [each for _, each in await control.robots.robot_log.newest("David", 9)]
         assert [each.run for each in heard if each.kind == "robot.commanded.v1"] == [first]

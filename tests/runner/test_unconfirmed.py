@@ -13,14 +13,14 @@ import pytest
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.runner.emulator.messages import Quirks, Start, Stop
 from action_assistant.runner.execution.interventions import RestRequest
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.engine_process import EngineProcess, has_ended, process
 from action_assistant.runner.links.engine_text import snapshot
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Override
-from action_assistant.runner.stop.doubtful_errors import Doubts
+from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Conditions
 from runner.scene import Scene, asked, shown
@@ -46,7 +46,7 @@ THROWS: dict[str, Any] = {"*": [{"after_s": 60, "ignores_stop": True, "stop_erro
 
 
 @asynccontextmanager
-async def stopped(script: dict[str, Any]) -> AsyncIterator[tuple[Scene, Control, str]]:
+async def stopped(script: dict[str, Any]) -> AsyncIterator[tuple[Scene, ExecutionService, str]]:
     """A run that somebody wants stopped, 8 seconds later."""
     scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
     async with scene.played() as control:
@@ -174,7 +174,7 @@ async def test_what_a_stranger_s_graph_left_blocks_a_start_until_somebody_answer
         await anyio.sleep(2)
         control.stop_robot("David", BEN)
         await anyio.sleep(70)
-        assert not control.robots.silencing.going("David")  # given up, without a proof
+        assert not control.robots.foreign_stops.going("David")  # given up, without a proof
         with pytest.raises(Conflict, match="other on David did not obey"):
             await control.start(asked(), ANN)
         over = Override(codes=("rest",), reason="I stand beside it.")
@@ -347,7 +347,7 @@ def _shown(state: str, **nodes: str) -> Snapshot:
 
 
 def test_an_error_from_before_any_stop_stays_the_action_s_own() -> None:
-    doubts = Doubts(reached=False)
+    doubts = DoubtfulErrors(reached=False)
     assert doubts.look([_shown("RUNNING", A_0="ERROR", B_0="RUNNING")]) == ""
     doubts.reach()
     assert doubts.look([_shown("STOPPED", A_0="ERROR", B_0="FINISHED")]) == ""
@@ -355,7 +355,7 @@ def test_an_error_from_before_any_stop_stays_the_action_s_own() -> None:
 
 
 def test_an_action_that_began_again_since_is_looked_at_anew() -> None:
-    doubts = Doubts(reached=False)
+    doubts = DoubtfulErrors(reached=False)
     doubts.look([_shown("RUNNING", A_0="ERROR")])
     doubts.look([_shown("RUNNING", A_0="RUNNING")])
     doubts.reach()
@@ -363,11 +363,11 @@ def test_an_action_that_began_again_since_is_looked_at_anew() -> None:
 
 
 def test_a_graph_in_error_names_somebody_even_when_no_action_is() -> None:
-    assert "g did not obey" in Doubts(reached=False).look([_shown("ERROR", A_0="FINISHED")])
+    assert "g did not obey" in DoubtfulErrors(reached=False).look([_shown("ERROR", A_0="FINISHED")])
 
 
 def test_a_sub_graph_in_error_counts_and_a_doubt_stays() -> None:
-    doubts = Doubts(reached=False)
+    doubts = DoubtfulErrors(reached=False)
     part = Snapshot(at=1, graph="g__Sub__0", state="ERROR", nodes={"C_0": "ERROR"})
     assert "C_0 did not obey" in doubts.look([_shown("STOPPED", Sub_0="FINISHED"), part])
     assert "C_0 did not obey" in doubts.look([_shown("STOPPED", Sub_0="FINISHED")])
@@ -535,7 +535,7 @@ async def test_a_mark_of_a_run_that_is_not_here_is_asked_for_once() -> None:
         await anyio.sleep(0.5)
         scene.air.carry(Start(graph_name="theirs", targets=("David",), graph_json=text), "other")
         await anyio.sleep(1)
-        async with Control.opened(ledger, robots, wall=wall, aside=at_once, past=past):
+        async with ExecutionService.opened(ledger, robots, wall=wall, aside=at_once, past=past):
             await anyio.sleep(60)
         wind.cancel_scope.cancel()
     assert asked_for == ["AAAAAAAAAAAA"]

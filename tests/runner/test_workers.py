@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 from action_assistant.errors import Conflict, TooLarge, TooMany, Unavailable
-from action_assistant.runner.workers import Crashed, Lane, Workers
+from action_assistant.runner.workers import Crashed, Lane, RunnerWorkers
 from action_assistant.web.auth import access
 from action_assistant.web.auth.access import Caller, done_for_nobody
 from runner.labour import devour, die, pid, refuse, spin, standing, stumble
@@ -25,7 +25,7 @@ def anyio_backend() -> str:
 
 @asynccontextmanager
 async def lane() -> AsyncIterator[Lane]:
-    async with Workers.opened() as workers:
+    async with RunnerWorkers.opened() as workers:
         yield workers.looks
 
 

@@ -21,7 +21,7 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.events import Snapshot as Kept
 from action_assistant.runner import projection
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
@@ -312,9 +312,9 @@ class World:
         self.shown: list[tuple[float, Run]] = []
 
     @asynccontextmanager
-    async def runner(self) -> AsyncIterator[Control]:
+    async def runner(self) -> AsyncIterator[ExecutionService]:
         """A runner, up to its end."""
-        async with Control.opened(
+        async with ExecutionService.opened(
             self.ledger, Robots(self.links), wall=wall, aside=at_once
         ) as control:
             control.watch(self._saw)
@@ -388,7 +388,7 @@ async def until(true: Callable[[], bool], patience: float = 60.0) -> None:
             await anyio.sleep(0.01)
 
 
-async def ended(control: Control, run: str) -> str:
+async def ended(control: ExecutionService, run: str) -> str:
     """How a run has ended, once it has. Times are virtual."""
     await until(lambda: run not in control.open, 3600)
     return (await control.find(run)).state

@@ -15,8 +15,8 @@ from action_assistant.editor.api import drawing, editor, graphs, invitations, ro
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
-from action_assistant.editor.services import Door, House
-from action_assistant.editor.workers import Workers
+from action_assistant.editor.services import EditorServices, EditorState
+from action_assistant.editor.workers import EditorWorkers
 from action_assistant.errors import BadInput
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
@@ -35,27 +35,27 @@ SMALL: Final = 100_000
 
 
 @asynccontextmanager
-async def open_house(
+async def open_services(
     settings: EditorSettings, revoked: Revoked | None = None
-) -> AsyncIterator[House]:
+) -> AsyncIterator[EditorServices]:
     """The editor without its HTTP side. Raises CannotStart."""
     revoked = revoked or Revoked(settings.data)
     journal = await Journal.open(settings.database, branch="editor", fold=h.fold)
     try:
         new = await journal.position() == 0
         async with (
-            Workers.opened() as workers,
+            EditorWorkers.opened() as workers,
             epochs.living_in(journal, settings.data) as epoch,
         ):
             people = await People.known(journal)
-            house = House(settings, journal, people, epoch, revoked, workers)
+            services = EditorServices(settings, journal, people, epoch, revoked, workers)
             try:
-                async with house.invitations.opened():
+                async with services.invitations.opened():
                     if new:
-                        await _greet(house, paths.examples())
-                    yield house
+                        await _greet(services, paths.examples())
+                    yield services
             finally:
-                await house.rooms.close()
+                await services.rooms.close()
     finally:
         await journal.close()
 
@@ -66,7 +66,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     Journal.prepare(settings.database, "editor")
     database_location.remember(settings.data, settings.database)
     keys = Keys.of(settings.data)
-    door = Door()
+    app_state = EditorState()
     revoked = Revoked(settings.data)
     browsers = SignedInBrowsers(settings.data, revoked)
     browsers.every()  # forgets those that are over
@@ -81,12 +81,12 @@ def create_app(settings: EditorSettings) -> ASGIApp:
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_house(settings, revoked) as house:
-            door.open(house)
+        async with open_services(settings, revoked) as services:
+            app_state.open(services)
             yield
 
     async def ready() -> Readiness:
-        return await _readiness(door.house)
+        return await _readiness(app_state.services)
 
     return application(
         [
@@ -95,16 +95,16 @@ def create_app(settings: EditorSettings) -> ASGIApp:
                 settings.port,
                 addresses=addresses,
                 limits=settings.limits,
-                reception=lambda: door.house.invitations,
+                reception=lambda: app_state.services.invitations,
                 revoked=revoked,
                 browsers=browsers,
             ),
-            *invitations.routes(door, addresses, browsers),
-            *editor.routes(door, addresses),
-            *graphs.routes(door),
-            *versions.routes(door),
-            *drawing.routes(door),
-            *room.routes(door),
+            *invitations.routes(app_state, addresses, browsers),
+            *editor.routes(app_state, addresses),
+            *graphs.routes(app_state),
+            *versions.routes(app_state),
+            *drawing.routes(app_state),
+            *room.routes(app_state),
         ],
         title="TeMoto Action Assistant: editor",
         keys=keys,
@@ -113,7 +113,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         page_port=settings.port,
         lifespan=[lifespan],
         ready=ready,
-        measures=lambda: _measures(door.house),
+        measures=lambda: _measures(app_state.services),
         page=paths.page(),
         runner_port=settings.runner_port,
         mount=settings.reached.public.path if settings.reached.public is not None else "",
@@ -121,26 +121,26 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     )
 
 
-async def _greet(house: House, folder: Path) -> None:
+async def _greet(services: EditorServices, folder: Path) -> None:
     """Fill an empty catalogue with the graphs that come with the program."""
     files = [path async for path in anyio.Path(folder).glob("*.umrf.graph.json")]
     for path in sorted(files, reverse=True):  # the last one made stands first in the list
         try:
             # At once: they are small, ours, and nobody is here whom that could hold up.
-            await house.catalogue.bring(await path.read_bytes(), h.EXAMPLES, aside=here)
+            await services.catalogue.bring(await path.read_bytes(), h.EXAMPLES, aside=here)
         except BadInput as error:
             log.error("the example %s cannot be read: %s", path.name, error.detail)
 
 
-async def _readiness(house: House) -> Readiness:
-    problem = await house.journal.health()
+async def _readiness(services: EditorServices) -> Readiness:
+    problem = await services.journal.health()
     return Readiness(problem is None, () if problem is None else (problem,))
 
 
-def _measures(house: House) -> dict[str, float]:
-    rooms = house.rooms.open_rooms()
+def _measures(services: EditorServices) -> dict[str, float]:
+    rooms = services.rooms.open_rooms()
     return {
         "action_assistant_rooms": len(rooms),
-        "action_assistant_divergences": house.rooms.divergences,
+        "action_assistant_divergences": services.rooms.divergences,
         "action_assistant_sockets": sum(len(room.members) for room in rooms),
     }

@@ -9,7 +9,7 @@ from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.catalogue.versions import Versions
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.rate_limits import Budget
-from action_assistant.editor.workers import Workers
+from action_assistant.editor.workers import EditorWorkers
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
 from action_assistant.web.auth.keys import Keys
@@ -17,7 +17,7 @@ from action_assistant.web.auth.revocations import Revoked
 from action_assistant.web.network.connection_limits import Crowd
 
 
-class House:
+class EditorServices:
     """The parts, put together around a journal that is open."""
 
     def __init__(
@@ -27,7 +27,7 @@ class House:
         people: People,
         epoch: str,
         revoked: Revoked,
-        workers: Workers,
+        workers: EditorWorkers,
     ) -> None:
         self.settings = settings
         self.journal = journal
@@ -45,19 +45,19 @@ class House:
         self.history = History(journal, people, self.versions)
 
 
-class Door:
+class EditorState:
     """Leads to the house once it is open: routes are made before the journal is."""
 
     def __init__(self) -> None:
-        self._house: House | None = None
+        self._services: EditorServices | None = None
 
-    def open(self, house: House) -> None:
+    def open(self, services: EditorServices) -> None:
         """From here on requests can be answered."""
-        self._house = house
+        self._services = services
 
     @property
-    def house(self) -> House:
+    def services(self) -> EditorServices:
         """The house. Only requests ask for it, and there are none before it is open."""
-        if self._house is None:
+        if self._services is None:
             raise RuntimeError("the editor is not open yet")
-        return self._house
+        return self._services

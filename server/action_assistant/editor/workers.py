@@ -23,7 +23,7 @@ _PRELOADED: Final = (
 _NICE: Final = 5
 
 
-class Workers:
+class EditorWorkers:
     """The lanes of an editor. `files`: what people bring, and what is played for them. `graphs`: what
     is read of stored graphs. `edits`: large updates before a room takes them."""
 
@@ -35,7 +35,7 @@ class Workers:
 
     @classmethod
     @asynccontextmanager
-    async def opened(cls) -> "AsyncIterator[Workers]":
+    async def opened(cls) -> "AsyncIterator[EditorWorkers]":
         """Workers, as long as you are inside. The first ones are made meanwhile."""
         lanes = cls()
         async with kept_warm(lanes.files, lanes.graphs, lanes.edits):

@@ -17,19 +17,19 @@ from action_assistant.runner import projection
 from action_assistant.runner.api.caller import SMALL
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.api.runs import routes
-from action_assistant.runner.api.services import House
+from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives.archive_store import Shelf
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.clock import wall_clock
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
-from action_assistant.runner.review.service import Desk
-from action_assistant.runner.review.worker_queries import Asked, Place
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.workers import Workers
+from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.revocations import Revoked
@@ -43,9 +43,11 @@ _SWITCH_S: Final = 0.0005
 
 
 @asynccontextmanager
-async def open_house(settings: RunnerSettings, house: House | None = None) -> AsyncIterator[House]:
+async def open_services(
+    settings: RunnerSettings, services: RunnerServices | None = None
+) -> AsyncIterator[RunnerServices]:
     """Everything the routes need, working. Raises CannotStart."""
-    house = house or House()
+    services = services or RunnerServices()
     sys.setswitchinterval(_SWITCH_S)
     journal = await Journal.open(_database(settings), branch="runner", fold=projection.fold)
     try:
@@ -54,30 +56,32 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
         folder, prunes = settings.data / "recordings", keep.raw is None
         recordings = Recordings(folder, on_disk, prunes=prunes)
         shelf = Shelf(journal, keep.folder, on_disk)
-        async with Workers.opened() as workers:
-            place = Place(_file(settings), keep.folder)
-            house.asked = Asked(workers.looks, place, shelf)
-            ours = Asked(workers.ours, place, shelf)  # what moves again waits behind nobody
-            house.aside = workers.looks
+        async with RunnerWorkers.opened() as workers:
+            place = StoragePaths(_file(settings), keep.folder)
+            services.asked = WorkerQueries(workers.looks, place, shelf)
+            ours = WorkerQueries(workers.ours, place, shelf)  # what moves again waits behind nobody
+            services.aside = workers.looks
             reach = ros2_reach(wall_clock)
             robots = Robots(reach=reach, recordings=recordings)
             async with (
                 _kept(reach),
-                Control.opened(
+                ExecutionService.opened(
                     shelf,
                     robots,
                     wall=wall_clock,
                     aside=workers.starts,
                     simulator=Simulators(),
-                    past=lambda run, whole: (ours if whole else house.asked).past(run, whole),
+                    past=lambda run, whole: (ours if whole else services.asked).past(run, whole),
                 ) as control,
             ):
-                house.asked.opened = ours.opened = control.open
-                house.control, house.hub = control, Hub(control, wall_clock)
-                house.crowd = Crowd(limits=settings.limits, keeps_one=True)
-                house.journal = journal
-                house.desk = Desk(control, shelf, on_disk, wall_clock, house.asked)
-                house.retention = Retention(
+                services.asked.opened = ours.opened = control.open
+                services.control, services.hub = control, Hub(control, wall_clock)
+                services.crowd = Crowd(limits=settings.limits, keeps_one=True)
+                services.journal = journal
+                services.review_service = ReviewService(
+                    control, shelf, on_disk, wall_clock, services.asked
+                )
+                services.retention = Retention(
                     journal,
                     recordings,
                     keep,
@@ -86,9 +90,9 @@ async def open_house(settings: RunnerSettings, house: House | None = None) -> As
                     aside=on_disk,
                 )
                 async with anyio.create_task_group() as tasks:
-                    tasks.start_soon(house.desk.run)
-                    tasks.start_soon(house.retention.run)
-                    yield house
+                    tasks.start_soon(services.review_service.run)
+                    tasks.start_soon(services.retention.run)
+                    yield services
                     tasks.cancel_scope.cancel()
     finally:
         await journal.close()
@@ -116,33 +120,33 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     """The runner as an ASGI application. Raises CannotStart."""
     Journal.prepare(_database(settings), "runner")
     revoked = Revoked(settings.data)
-    house = House()
+    services = RunnerServices()
     public = settings.reached.public
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_house(settings, house):
+        async with open_services(settings, services):
             yield
 
     async def ready() -> Readiness:
         problems: list[str] = []
         try:
-            await house.journal.position()
+            await services.journal.position()
         except Refused as refused:
             problems.append(refused.detail)
-        unrecorded = [each for each in house.control.open.values() if not each.recorder.recorded]
+        unrecorded = [each for each in services.control.open.values() if not each.recorder.recorded]
         if unrecorded:
             problems.append(f"{len(unrecorded)} runs are not being recorded")
         return Readiness(ready=not problems, problems=tuple(problems))
 
     def measures() -> dict[str, float]:
         return {
-            "action_assistant_runs_open": len(house.control.open),
-            "action_assistant_live_sockets": len(house.hub.boxes),
+            "action_assistant_runs_open": len(services.control.open),
+            "action_assistant_live_sockets": len(services.hub.boxes),
         }
 
     return application(
-        [*routes(house), *revocation(revoked)],
+        [*routes(services), *revocation(revoked)],
         title="TeMoto Action Assistant: runner",
         keys=Keys.of(settings.data),
         revoked=revoked,

@@ -15,7 +15,7 @@ from action_assistant import paths
 from action_assistant.editor.interchange.action_uses import Known
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.presence import colour_of
-from action_assistant.editor.services import Door
+from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
@@ -61,19 +61,19 @@ class Participant(msgspec.Struct, frozen=True):
     color: str
 
 
-def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
+def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterHandler]:
     """Everything that is about no single graph."""
 
     @get("/api/config", summary="What a page has to know", operation_id="getConfig")
     async def get_config(request: Request[Any, Any, Any]) -> Config:
         runner = addresses.runner_at(
-            request.headers.get("host", ""), door.house.settings.runner_port
+            request.headers.get("host", ""), app_state.services.settings.runner_port
         )
         return Config("local", VERSION, runner)
 
     @get("/api/people", summary="Everyone who acted here", operation_id="listPeople")
     async def list_people() -> list[Participant]:
-        everyone = door.house.people.everyone()
+        everyone = app_state.services.people.everyone()
         return [Participant(p.id, p.name, colour_of(p.id)) for p in everyone]
 
     @get(
@@ -96,7 +96,7 @@ def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         operation_id="listActions",
     )
     async def list_actions() -> list[Known]:
-        known: list[Known] = encoded(await door.house.library.all())
+        known: list[Known] = encoded(await app_state.services.library.all())
         return known
 
     @get(
@@ -113,19 +113,19 @@ def routes(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
             if not last.isdecimal():
                 raise BadInput("Last-Event-ID is the number of an event.")
             after = int(last)
-        return ServerSentEvent(_told(door, after))
+        return ServerSentEvent(_told(app_state, after))
 
     return [get_config, list_people, list_examples, list_actions, follow_events]
 
 
-async def _told(door: Door, after: int | None) -> AsyncIterator[ServerSentEventMessage]:
+async def _told(app_state: EditorState, after: int | None) -> AsyncIterator[ServerSentEventMessage]:
     """Stored events after a position, then new ones as they come."""
-    house = door.house
-    async with house.journal.follow() as events:
-        done = await house.journal.position() if after is None else after
-        while after is not None and (page := await house.journal.read_all(after=done)):
+    services = app_state.services
+    async with services.journal.follow() as events:
+        done = await services.journal.position() if after is None else after
+        while after is not None and (page := await services.journal.read_all(after=done)):
             for event in page:
-                yield _message(door, event)
+                yield _message(app_state, event)
             done = page[-1].position
         coming = asyncio.ensure_future(anext(events))
         try:
@@ -137,20 +137,20 @@ async def _told(door: Door, after: int | None) -> AsyncIterator[ServerSentEventM
                 event = coming.result()
                 coming = asyncio.ensure_future(anext(events))
                 if event.position > done:
-                    yield _message(door, event)
+                    yield _message(app_state, event)
         except StopAsyncIteration:  # the journal is closed
             return
         finally:
             coming.cancel()
 
 
-def _message(door: Door, event: Event) -> ServerSentEventMessage:
+def _message(app_state: EditorState, event: Event) -> ServerSentEventMessage:
     happened = Happened(
         event.position,
         event.stream,
         event.seq,
         event.kind,
-        door.house.people.person(event.author),
+        app_state.services.people.person(event.author),
         h.when(event.at),
         h.graph_of(event.stream),
     )

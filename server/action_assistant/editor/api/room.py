@@ -13,7 +13,7 @@ from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.rate_limits import Budget
 from action_assistant.editor.rooms.room import Room
-from action_assistant.editor.services import Door
+from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused
 from action_assistant.web.auth.access import person_of, plain, refuse
 from action_assistant.web.auth.roles import allowed
@@ -26,26 +26,26 @@ _NORMAL: Final = 1000
 _GOODBYE: Final = 1.0  # seconds that a close frame gets
 
 
-def routes(door: Door) -> list[ControllerRouterHandler]:
+def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """The route; `y-websocket` appends the name of its room, which is always `room`."""
 
     @websocket("/api/graphs/{graph_id:str}/room")
     async def room(socket: Socket, graph_id: str) -> None:
-        house, person = door.house, person_of(socket)
+        services, person = app_state.services, person_of(socket)
         address = socket.client.host if socket.client is not None else ""
         try:
-            with house.crowd.admitted(person.id, address):
-                await house.catalogue.require(graph_id)
-                await house.people.seen(person)
-                async with house.rooms.enter(h.graph_stream(graph_id)) as found:
+            with services.crowd.admitted(person.id, address):
+                await services.catalogue.require(graph_id)
+                await services.people.seen(person)
+                async with services.rooms.enter(h.graph_stream(graph_id)) as found:
                     await socket.accept()
-                    if _knows_another(socket, house.epoch, found):
-                        await _part(socket, house.epoch)
+                    if _knows_another(socket, services.epoch, found):
+                        await _part(socket, services.epoch)
                         return
                     edits = allowed(person.role, "edit")
                     member = Member(person, edits=edits, acks=_wants_acks(socket))
-                    member.post_epoch(house.epoch)
-                    await _converse(socket, found, member, house.budget)
+                    member.post_epoch(services.epoch)
+                    await _converse(socket, found, member, services.budget)
         except Refused as refused:
             await _refuse(socket, refused)
 

@@ -22,7 +22,7 @@ from action_assistant.errors import Refused
 from action_assistant.runner.api.caller import author_of
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
@@ -103,7 +103,7 @@ class Frame(msgspec.Struct, frozen=True):
 class Hub:
     """Everybody who watches."""
 
-    def __init__(self, control: Control, wall: Clock) -> None:
+    def __init__(self, control: ExecutionService, wall: Clock) -> None:
         self.control = control
         self.wall = wall
         self.boxes: set[Outbox] = set()

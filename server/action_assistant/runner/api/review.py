@@ -22,9 +22,15 @@ from action_assistant.runner.api.openapi import FitOperation
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.raw_messages import Raw
 from action_assistant.runner.archives.retention import Retention, Swept
-from action_assistant.runner.execution.service import Control
-from action_assistant.runner.review.service import CauseShown, Desk, Expectation, Format, Marked
-from action_assistant.runner.review.worker_queries import Asked, json_of
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.review.service import (
+    CauseShown,
+    Expectation,
+    Format,
+    ReviewService,
+    RunMarks,
+)
+from action_assistant.runner.review.worker_queries import WorkerQueries, json_of
 from action_assistant.runner.start.admission import decoded
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.network.connection_limits import Turns
@@ -59,23 +65,23 @@ class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     raw: Annotated[float, msgspec.Meta(ge=0)] | None = None
 
 
-class Has(Protocol):
+class ReviewServices(Protocol):
     """What these routes work on; all of it is there before the first request. What only reads is
     `asked` of a worker."""
 
-    control: Control
-    desk: Desk
-    asked: Asked
+    control: ExecutionService
+    review_service: ReviewService
+    asked: WorkerQueries
     retention: Retention
     turns: Turns
 
 
-def routes(house: Has) -> list[ControllerRouterHandler]:
+def routes(services: ReviewServices) -> list[ControllerRouterHandler]:
     """All routes."""
-    return [*_of_one(house), *_of_many(house), *_expecting(house), _archiving(house)]
+    return [*_of_one(services), *_of_many(services), *_expecting(services), _archiving(services)]
 
 
-def _archiving(house: Has) -> ControllerRouterHandler:
+def _archiving(services: ReviewServices) -> ControllerRouterHandler:
     @post(
         "/api/archive",
         status_code=200,
@@ -83,37 +89,37 @@ def _archiving(house: Has) -> ControllerRouterHandler:
         guards=[Needs("restore")],
     )
     async def archive(data: Sweep) -> Swept:
-        return await house.retention.sweep(data.runs, data.raw)
+        return await services.retention.sweep(data.runs, data.raw)
 
     return archive
 
 
-def _of_one(house: Has) -> list[ControllerRouterHandler]:
+def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
     @get("/api/runs/{run:str}/film", summary="What every event of a run changed, a page at a time")
     async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Response[Film]:
-        return json_of(await house.asked.text(Desk.film, run, after), Film)
+        return json_of(await services.asked.text(ReviewService.film, run, after), Film)
 
     @get("/api/runs/{run:str}/causes", summary="What is proven to be behind the end of a run")
     async def found_causes(run: str) -> Response[list[CauseShown]]:
-        return json_of(await house.asked.text(Desk.causes, run), list[CauseShown])
+        return json_of(await services.asked.text(ReviewService.causes, run), list[CauseShown])
 
     @get("/api/runs/{run:str}/umrf", summary="The graph of a run as it was sent")
     async def umrf(run: str) -> Response[bytes]:
-        return json_of(await house.asked.value(Desk.umrf, run), bytes)
+        return json_of(await services.asked.value(ReviewService.umrf, run), bytes)
 
     @get("/api/runs/{run:str}/marks", summary="What people noted about a run")
-    async def marks(run: str) -> Marked:
-        return await house.desk.marks(run)
+    async def marks(run: str) -> RunMarks:
+        return await services.review_service.marks(run)
 
     @patch("/api/runs/{run:str}/marks", summary="Pin, note or label a run", guards=[Needs("edit")])
-    async def mark(run: str, data: annotations.Marks, request: _Asking) -> Marked:
-        return await house.desk.mark(run, data, author_of(request))
+    async def mark(run: str, data: annotations.Marks, request: _Asking) -> RunMarks:
+        return await services.review_service.mark(run, data, author_of(request))
 
     @get("/api/runs/{run:str}/script", summary="What a run did, as a script for the simulator")
     async def script(
         run: str, action: str | None = None, fault: expected_runs.Fault | None = None
     ) -> Response[expected_runs.Recorded]:
-        text = await house.asked.text(Desk.script, run, _fault(action, fault))
+        text = await services.asked.text(ReviewService.script, run, _fault(action, fault))
         return json_of(text, expected_runs.Recorded)
 
     @post(
@@ -125,10 +131,10 @@ def _of_one(house: Has) -> list[ControllerRouterHandler]:
         request_max_body_size=LARGE,
     )
     async def fit(run: str, request: _Asking) -> Response[expected_runs.Recorded]:
-        async with body_of(request, house.turns) as body:
+        async with body_of(request, services.turns) as body:
             asked = decoded(body, Fit)
             fault = _fault(asked.action, asked.fault)
-            text = await house.asked.text(Desk.script, run, fault, bytes(asked.umrf))
+            text = await services.asked.text(ReviewService.script, run, fault, bytes(asked.umrf))
         return json_of(text, expected_runs.Recorded)
 
     @get("/api/runs/{run:str}/export", summary="A run as a file: jsonl, csv or mcap")
@@ -137,33 +143,33 @@ def _of_one(house: Has) -> list[ControllerRouterHandler]:
     ) -> Response[bytes] | Stream:
         head = {"content-disposition": f'attachment; filename="run.{form}"'}
         if form == "jsonl":
-            seq, first = await house.asked.value(Desk.lines, run, 0)
-            lines = _lines(house.asked, run, seq, first)
+            seq, first = await services.asked.value(ReviewService.lines, run, 0)
+            lines = _lines(services.asked, run, seq, first)
             return Stream(lines, media_type=_TYPES[form], headers=head)
-        content = await house.asked.value(Desk.export, run, form)
+        content = await services.asked.value(ReviewService.export, run, form)
         return Response(content, media_type=_TYPES[form], headers=head)
 
     @get("/api/runs/{run:str}/raw", summary="Where the raw messages from the time of a run are")
     async def raw(run: str) -> Response[Raw]:
-        found = await house.control.find(run)
-        kept = house.control.robots.recordings
+        found = await services.control.find(run)
+        kept = services.control.robots.recordings
         here = [] if found.simulated or kept is None else await kept.listed(found.engine)
-        text = await house.asked.text(Desk.raw, run, here, time.time_ns() // 1000)
+        text = await services.asked.text(ReviewService.raw, run, here, time.time_ns() // 1000)
         return json_of(text, Raw)
 
     return [film, found_causes, umrf, marks, mark, script, fit, export, raw]
 
 
-async def _lines(asked: Asked, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
+async def _lines(asked: WorkerQueries, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
     while page:
         yield page
-        seq, page = await asked.value(Desk.lines, run, seq)
+        seq, page = await asked.value(ReviewService.lines, run, seq)
 
 
-def _of_many(house: Has) -> list[ControllerRouterHandler]:
+def _of_many(services: ReviewServices) -> list[ControllerRouterHandler]:
     @get("/api/comparison", summary="Two runs side by side, and where they part")
     async def comparison(a: str, b: str) -> Response[Comparison]:
-        return json_of(await house.asked.text(Desk.compare, a, b), Comparison)
+        return json_of(await services.asked.text(ReviewService.compare, a, b), Comparison)
 
     @get("/api/statistics", summary="The newest runs of a graph together")
     async def statistics(
@@ -171,7 +177,9 @@ def _of_many(house: Has) -> list[ControllerRouterHandler]:
         robot: str | None = None,
         last: Annotated[int, Parameter(ge=1, le=1000)] = 200,
     ) -> Response[Statistics]:
-        return json_of(await house.asked.text(Desk.statistics, graph, robot, last), Statistics)
+        return json_of(
+            await services.asked.text(ReviewService.statistics, graph, robot, last), Statistics
+        )
 
     @post(
         "/api/examples",
@@ -181,15 +189,15 @@ def _of_many(house: Has) -> list[ControllerRouterHandler]:
     )
     async def take_in_examples(request: _Asking) -> list[str]:
         texts = await to_thread.run_sync(examples.shipped, paths.examples())
-        return await house.desk.take_in(texts, author_of(request))
+        return await services.review_service.take_in(texts, author_of(request))
 
     return [comparison, statistics, take_in_examples]
 
 
-def _expecting(house: Has) -> list[ControllerRouterHandler]:
+def _expecting(services: ReviewServices) -> list[ControllerRouterHandler]:
     @get("/api/expectations", summary="Runs that shall go the same for ever")
     async def listed() -> Response[list[Expectation]]:
-        return json_of(await house.asked.text(Desk.expectations), list[Expectation])
+        return json_of(await services.asked.text(ReviewService.expectations), list[Expectation])
 
     @post(
         "/api/expectations",
@@ -197,11 +205,11 @@ def _expecting(house: Has) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def expect(data: Expect, request: _Asking) -> Expectation:
-        return await house.desk.expect(data.run, data.name, author_of(request))
+        return await services.review_service.expect(data.run, data.name, author_of(request))
 
     @delete("/api/expectations/{name:str}", summary="Expect it no more", guards=[Needs("edit")])
     async def retire(name: str, request: _Asking) -> None:
-        await house.desk.retire(name, author_of(request))
+        await services.review_service.retire(name, author_of(request))
 
     return [listed, expect, retire]
 

@@ -10,7 +10,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import BadInput, NotFound
 from action_assistant.runner.api.caller import LARGE, author_of, body_of
 from action_assistant.runner.api.openapi import GroupOperation, LookOperation
-from action_assistant.runner.execution.service import Control
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
 from action_assistant.runner.robots.recordings import Recording
 from action_assistant.runner.robots.registration import Robot
@@ -35,10 +35,10 @@ _EVENTS: Final = 200
 _Asking = Request[Any, Any, Any]
 
 
-class Has(Protocol):
+class RobotServices(Protocol):
     """What these routes work on."""
 
-    control: Control
+    control: ExecutionService
     turns: Turns
     aside: Aside
 
@@ -106,86 +106,86 @@ class GroupShown(msgspec.Struct, frozen=True, kw_only=True):
     failed: dict[str, str]
 
 
-def routes(house: Has) -> list[ControllerRouterHandler]:
+def routes(services: RobotServices) -> list[ControllerRouterHandler]:
     """All of them."""
-    return [*_registry(house), *_one_robot(house), *_starts(house)]
+    return [*_registry(services), *_one_robot(services), *_starts(services)]
 
 
-def _registry(house: Has) -> list[ControllerRouterHandler]:
+def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
     @get("/api/robots", summary="Engines that runs can go to")
     async def robots() -> list[Robot]:
-        return list(house.control.robots.all())
+        return list(services.control.robots.all())
 
     @get("/api/reach", summary="Whether robots can be reached over ROS 2 from here")
     async def reach() -> Reached:
-        return Reached(list(house.control.robots.all()), house.control.robots.no_reach)
+        return Reached(list(services.control.robots.all()), services.control.robots.no_reach)
 
     @get("/api/candidates", summary="Engines in sight that nobody registered yet")
     async def candidates() -> list[Candidate]:
-        return list(await house.control.robots.candidates())
+        return list(await services.control.robots.candidates())
 
     @post("/api/robots", summary="Register a robot", guards=[Needs("register")])
     async def register(data: Registration, request: _Asking) -> Response[Robot]:
-        robot = await house.control.register(data, author_of(request))
+        robot = await services.control.register(data, author_of(request))
         return Response(robot, status_code=201, headers={"location": f"/api/robots/{robot.name}"})
 
     @patch("/api/robots/{name:str}", summary="Change a robot", guards=[Needs("register")])
     async def change(name: str, data: Change, request: _Asking) -> Robot:
-        known = house.control.robots.registration(name)
+        known = services.control.robots.registration(name)
         fields = {k: v for k, v in msgspec.structs.asdict(data).items() if v is not None}
         changed = msgspec.structs.asdict(known) | fields
         try:
             asked = msgspec.convert(changed, Registration)
         except msgspec.ValidationError as wrong:
             raise BadInput(str(wrong)) from wrong
-        return await house.control.register(asked, author_of(request))
+        return await services.control.register(asked, author_of(request))
 
     @delete("/api/robots/{name:str}", summary="Forget a robot", guards=[Needs("register")])
     async def remove(name: str, request: _Asking) -> None:
-        await house.control.remove(name, author_of(request))
+        await services.control.remove(name, author_of(request))
 
     return [robots, reach, candidates, register, change, remove]
 
 
-def _one_robot(house: Has) -> list[ControllerRouterHandler]:
+def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     @get("/api/robots/{name:str}", summary="One engine")
     async def robot(name: str) -> Robot:
         if name == SIMULATOR:
-            return next(house.control.robots.all())
-        return house.control.robots.robot(name)
+            return next(services.control.robots.all())
+        return services.control.robots.robot(name)
 
     @get("/api/robots/{name:str}/known", summary="Actions and graphs that a robot has indexed")
     async def known(name: str) -> Known:
-        index = await house.control.robots.index(name)
+        index = await services.control.robots.index(name)
         actions = [_action(action, index.actions[action]) for action in sorted(index.actions)]
         return Known(actions, sorted(index.graphs), index.unread)
 
     @get("/api/robots/{name:str}/events", summary="What others told a robot, newest first")
     async def events(name: str) -> list[Told]:
-        house.control.robots.registration(name)
-        found = await house.control.robots.flight.newest(name, _EVENTS)
+        services.control.robots.registration(name)
+        found = await services.control.robots.robot_log.newest(name, _EVENTS)
         return [_told(seq, event) for seq, event in reversed(found)]
 
     @get("/api/robots/{name:str}/events/{seq:int}/umrf", summary="The graph of a command, as UMRF")
     async def commanded(name: str, seq: int) -> Response[bytes]:
-        house.control.robots.registration(name)
-        return await _umrf(house, await house.control.robots.flight.graph(name, seq))
+        services.control.robots.registration(name)
+        return await _umrf(services, await services.control.robots.robot_log.graph(name, seq))
 
     @get("/api/robots/{name:str}/umrf", summary="A graph that a robot holds, as UMRF")
     async def held(name: str, graph: str) -> Response[bytes]:
         """Without its run state: a graph that carries one must not be sent again."""
-        return await _umrf(house, house.control.robots.held(name, graph))
+        return await _umrf(services, services.control.robots.held(name, graph))
 
     @get("/api/robots/{name:str}/recordings", summary="What an engine said, hour by hour")
     async def recorded(name: str) -> list[Recording]:
-        house.control.robots.registration(name)
-        kept = house.control.robots.recordings
+        services.control.robots.registration(name)
+        kept = services.control.robots.recordings
         return [] if kept is None else await kept.listed(name)
 
     @get("/api/robots/{name:str}/recordings/{file:str}", summary="An hour, as JSON lines, gzipped")
     async def recording(name: str, file: str) -> Response[bytes]:
-        house.control.robots.registration(name)
-        kept = house.control.robots.recordings
+        services.control.robots.registration(name)
+        kept = services.control.robots.recordings
         if kept is None:
             raise NotFound("Nothing is recorded here.")
         return Response(await kept.file(name, file), media_type="application/gzip")
@@ -197,12 +197,12 @@ def _one_robot(house: Has) -> list[ControllerRouterHandler]:
         guards=[Needs("stop")],
     )
     async def stop(name: str, request: _Asking) -> Stopped:
-        return Stopped(*house.control.stop_robot(name, author_of(request)))
+        return Stopped(*services.control.stop_robot(name, author_of(request)))
 
     return [robot, known, events, commanded, held, recorded, recording, stop]
 
 
-def _starts(house: Has) -> list[ControllerRouterHandler]:
+def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/preflight",
         status_code=200,
@@ -212,8 +212,8 @@ def _starts(house: Has) -> list[ControllerRouterHandler]:
         request_max_body_size=LARGE,
     )
     async def look(request: _Asking) -> list[Preflight]:
-        async with body_of(request, house.turns) as body:
-            return await house.control.look(read_group(body))
+        async with body_of(request, services.turns) as body:
+            return await services.control.look(read_group(body))
 
     @post(
         "/api/groups",
@@ -223,8 +223,8 @@ def _starts(house: Has) -> list[ControllerRouterHandler]:
         request_max_body_size=LARGE,
     )
     async def start(request: _Asking) -> Response[GroupShown]:
-        async with body_of(request, house.turns) as body:
-            grouped = await house.control.start_group(read_group(body), author_of(request))
+        async with body_of(request, services.turns) as body:
+            grouped = await services.control.start_group(read_group(body), author_of(request))
         runs = [views.shown(run) for run in grouped.runs]
         shown = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
         return Response(shown, status_code=201 if grouped.fresh else 200)
@@ -264,8 +264,8 @@ def _told(seq: int, event: RobotEvent) -> Told:
             assert_never(event)
 
 
-async def _umrf(house: Has, text: str) -> Response[bytes]:
-    return Response(await house.aside(canonical, text), media_type="application/json")
+async def _umrf(services: RobotServices, text: str) -> Response[bytes]:
+    return Response(await services.aside(canonical, text), media_type="application/json")
 
 
 def canonical(text: str) -> bytes:

@@ -23,11 +23,11 @@ from action_assistant.runner.api.openapi import (
     StartOperation,
     StopOperation,
 )
-from action_assistant.runner.api.services import House
+from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.review import listing
-from action_assistant.runner.review.service import Desk
+from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import json_of
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.run import Run, State
@@ -47,19 +47,19 @@ class StopAsked(msgspec.Struct, frozen=True):
     stop_id: str = ""
 
 
-def routes(house: House) -> list[ControllerRouterHandler]:
+def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     """All routes."""
     return [
-        *_starts(house),
-        *_moves(house),
-        *_reads(house),
-        *robots.routes(house),
-        *review.routes(house),
-        _live(house),
+        *_starts(services),
+        *_moves(services),
+        *_reads(services),
+        *robots.routes(services),
+        *review.routes(services),
+        _live(services),
     ]
 
 
-def _starts(house: House) -> list[ControllerRouterHandler]:
+def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs",
         summary="Start a version, at most once per request_id",
@@ -68,29 +68,31 @@ def _starts(house: House) -> list[ControllerRouterHandler]:
         request_max_body_size=LARGE,
     )
     async def start(request: _Asking) -> Response[views.RunShown]:
-        async with body_of(request, house.turns) as body:
+        async with body_of(request, services.turns) as body:
             asked = read_request(body)
             if asked.engine != SIMULATOR:
                 require(request, "operate")
-            started = await house.control.start(asked, author_of(request))
+            started = await services.control.start(asked, author_of(request))
         return Response(
-            await _shown(house, started.run),
+            await _shown(services, started.run),
             status_code=201 if started.fresh else 200,
             headers={"location": f"/api/runs/{started.run.id}"},
         )
 
     @get("/api/starts/{request_id:str}", summary="What has become of a start, by its request_id")
     async def started(request_id: str) -> views.StartShown:
-        under_way = house.control.under_way(request_id)  # before: what it becomes is stored by then
-        rows = await house.control.history.rows(queries.of_start(request_id))
-        runs = [await house.control.find(row.id) for row in rows]
-        found = [await _shown(house, run) for run in runs]
+        under_way = services.control.under_way(
+            request_id
+        )  # before: what it becomes is stored by then
+        rows = await services.control.history.rows(queries.of_start(request_id))
+        runs = [await services.control.find(row.id) for row in rows]
+        found = [await _shown(services, run) for run in runs]
         return views.StartShown(request_id=request_id, under_way=under_way, runs=found)
 
     return [start, started]
 
 
-def _moves(house: House) -> list[ControllerRouterHandler]:
+def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/stop",
         status_code=202,
@@ -100,7 +102,7 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
     )
     async def stop_all(request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
-        return Stopping(stop_id, house.control.stop_all(author_of(request), stop_id))
+        return Stopping(stop_id, services.control.stop_all(author_of(request), stop_id))
 
     @post(
         "/api/runs/{run:str}/stop",
@@ -111,7 +113,7 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
     )
     async def stop(run: str, request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
-        return Stopping(stop_id, await house.control.stop(run, author_of(request), stop_id))
+        return Stopping(stop_id, await services.control.stop(run, author_of(request), stop_id))
 
     @post(
         "/api/runs/{run:str}/pause",
@@ -120,8 +122,8 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
         guards=[Needs("simulate")],
     )
     async def pause(run: str, request: _Asking) -> views.RunShown:
-        await _require_hand_on(house, run, request)
-        return views.shown(await house.control.pause(run, author_of(request)))
+        await _require_hand_on(services, run, request)
+        return views.shown(await services.control.pause(run, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/resume",
@@ -130,8 +132,8 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
         guards=[Needs("simulate")],
     )
     async def resume(run: str, request: _Asking) -> views.RunShown:
-        await _require_hand_on(house, run, request)
-        return views.shown(await house.control.resume(run, author_of(request)))
+        await _require_hand_on(services, run, request)
+        return views.shown(await services.control.resume(run, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/modify",
@@ -142,9 +144,9 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
         request_max_body_size=LARGE,
     )
     async def modify(run: str, request: _Asking) -> views.RunShown:
-        await _require_hand_on(house, run, request)
-        async with body_of(request, house.turns) as body:
-            return views.shown(await house.control.modify(run, body, author_of(request)))
+        await _require_hand_on(services, run, request)
+        async with body_of(request, services.turns) as body:
+            return views.shown(await services.control.modify(run, body, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/at_rest",
@@ -155,12 +157,12 @@ def _moves(house: House) -> list[ControllerRouterHandler]:
     )
     async def at_rest(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), RestRequest)
-        return views.shown(await house.control.confirm_rest(run, asked, author_of(request)))
+        return views.shown(await services.control.confirm_rest(run, asked, author_of(request)))
 
     return [stop_all, stop, pause, resume, modify, at_rest]
 
 
-def _reads(house: House) -> list[ControllerRouterHandler]:
+def _reads(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get("/api/runs", summary="Runs, newest first")
     async def listed(
         graph: str | None = None,
@@ -194,44 +196,44 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
         )
         going = {
             run: views.summary(opened.run, recorded=opened.recorder.recorded)
-            for run, opened in house.control.open.items()
+            for run, opened in services.control.open.items()
         }
-        found = await house.asked.text(listing.listed, wanted, limit, going)
+        found = await services.asked.text(listing.listed, wanted, limit, going)
         return json_of(found, list[views.Listed])
 
     @get("/api/labels", summary="Labels of runs, the most used first")
     async def every_label() -> list[str]:
-        rows = await house.control.history.rows(queries.all_labels())
+        rows = await services.control.history.rows(queries.all_labels())
         return [row.label for row in rows]
 
     @get("/api/runs/{run:str}", summary="A run, and the graph as it was sent")
     async def one(run: str) -> Response[views.RunWhole]:
-        opened = house.control.open.get(run)
+        opened = services.control.open.get(run)
         if opened is None:
-            return json_of(await house.asked.text(Desk.whole, run), views.RunWhole)
-        if opened not in house.sent:
-            house.sent[opened] = await house.asked.value(Desk.sent, run)
-        opened = house.control.open.get(run, opened)
-        await house.hub.work_out(opened)
+            return json_of(await services.asked.text(ReviewService.whole, run), views.RunWhole)
+        if opened not in services.sent:
+            services.sent[opened] = await services.asked.value(ReviewService.sent, run)
+        opened = services.control.open.get(run, opened)
+        await services.hub.work_out(opened)
         whole = views.whole(
             opened.run,
-            house.sent[opened],
+            services.sent[opened],
             recorded=opened.recorder.recorded,
-            memo=house.hub.memo(opened),
+            memo=services.hub.memo(opened),
         )
         return json_of(msgspec.json.encode(whole), views.RunWhole)
 
     @get("/api/runs/{run:str}/events", summary="A run's events as they are stored (SSE)")
     async def events(run: str, request: _Asking) -> Stream | Response[None]:
         after = _last_event_id(request)
-        opened = house.control.open.get(run)
-        newest = await house.asked.newest(run)
+        opened = services.control.open.get(run)
+        newest = await services.asked.newest(run)
         if not newest:
             raise NotFound("There is no such run.")
         if newest <= after and (opened is None or opened.run.end is not None):
             return Response(None, status_code=204)  # tells an EventSource not to come again
         return Stream(
-            _tail(house, run, after),
+            _tail(services, run, after),
             media_type="text/event-stream",
             headers={"cache-control": "no-store"},
         )
@@ -239,22 +241,22 @@ def _reads(house: House) -> list[ControllerRouterHandler]:
     return [listed, every_label, one, events]
 
 
-def _live(house: House) -> ControllerRouterHandler:
+def _live(services: RunnerServices) -> ControllerRouterHandler:
     @websocket("/api/live")
     async def live(socket: WebSocket[Any, Any, Any]) -> None:
         address = socket.client.host if socket.client is not None else ""
         try:
-            with house.crowd.admitted(person_of(socket).id, address):
-                await attend(socket, house.hub)
+            with services.crowd.admitted(person_of(socket).id, address):
+                await attend(socket, services.hub)
         except TooMany as refused:
             await refuse(socket.scope, socket.receive, socket.send, refused)
 
     return live
 
 
-async def _require_hand_on(house: House, run: str, request: _Asking) -> None:
+async def _require_hand_on(services: RunnerServices, run: str, request: _Asking) -> None:
     """Who may steer this run: more is needed for one on a robot. Raises Forbidden, NotFound."""
-    if not await house.control.simulates(run):
+    if not await services.control.simulates(run):
         require(request, "operate")
 
 
@@ -267,12 +269,12 @@ async def _stop_id(request: _Asking) -> str:
         return ""
 
 
-async def _shown(house: House, run: Run) -> views.RunShown:
+async def _shown(services: RunnerServices, run: Run) -> views.RunShown:
     """As it is now, put together without holding up others."""
-    opened = house.control.open.get(run.id)
+    opened = services.control.open.get(run.id)
     if opened is not None:
-        await house.hub.work_out(opened)
-        return house.hub.shown(opened)
+        await services.hub.work_out(opened)
+        return services.hub.shown(opened)
     memo = views.Memo()
     await work_out(run, memo)
     return views.shown(run, memo=memo)
@@ -300,18 +302,18 @@ def _last_event_id(request: _Asking) -> int:
     return int(asked)
 
 
-async def _tail(house: House, run: str, after: int) -> AsyncIterator[bytes]:
+async def _tail(services: RunnerServices, run: str, after: int) -> AsyncIterator[bytes]:
     """Stored events, then those that come, until the run is over."""
     while True:
-        opened = house.control.open.get(run)
+        opened = services.control.open.get(run)
         revision = opened.revision if opened is not None else 0
-        if await house.asked.newest(run) > after:
-            after, page = await house.asked.value(listing.streamed, run, after)
+        if await services.asked.newest(run) > after:
+            after, page = await services.asked.value(listing.streamed, run, after)
             yield page
             continue
         if opened is None:
             return
         with anyio.move_on_after(_ALIVE_S) as waited:
-            await house.control.change(run, revision)
+            await services.control.change(run, revision)
         if waited.cancelled_caught:
             yield b": alive\n\n"

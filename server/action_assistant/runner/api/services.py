@@ -7,9 +7,9 @@ from action_assistant.journal.journal import Journal
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.service import Control
-from action_assistant.runner.review.service import Desk
-from action_assistant.runner.review.worker_queries import Asked
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs import views
 from action_assistant.web.network.connection_limits import Crowd, Turns
 from action_assistant.web.workers.lanes import Aside
@@ -17,15 +17,15 @@ from action_assistant.web.workers.lanes import Aside
 _BODIES: Final = 4  # large ones of a person at a time
 
 
-class House:
+class RunnerServices:
     """What the routes work on; filled when the process is up, before the first request."""
 
-    control: Control
+    control: ExecutionService
     hub: Hub
     crowd: Crowd
     journal: Journal
-    desk: Desk
-    asked: Asked
+    review_service: ReviewService
+    asked: WorkerQueries
     retention: Retention
     turns: Turns
     aside: Aside

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from action_assistant.errors import Refused
 from action_assistant.runner.execution.echo_difference import differs
 from action_assistant.runner.execution.feedback_order import fresh
-from action_assistant.runner.execution.sub_graphs import Parts
+from action_assistant.runner.execution.sub_graphs import SubGraphs
 from action_assistant.runner.links.engine_process import has_ended
 from action_assistant.runner.links.observations import TERMINAL, Seen, Snapshot
 from action_assistant.runner.links.port import Answer, Link, NoAnswer
@@ -20,8 +20,8 @@ from action_assistant.runner.runs import refusals, stall
 from action_assistant.runner.runs.events import Answered, End, Proof, Published, RunEvent, Silent
 from action_assistant.runner.runs.fold import is_news
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.stop.doubtful_errors import Doubts
-from action_assistant.runner.stop.proof import NEVER_BEGAN, Rest, hash_of
+from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
+from action_assistant.runner.stop.proof import NEVER_BEGAN, RestProof, hash_of
 from action_assistant.web.workers.lanes import Aside
 
 log: Final = logging.getLogger(__name__)
@@ -38,7 +38,7 @@ _SEVERAL: Final = (
 )
 
 
-class Watched(Protocol):
+class MonitoredRun(Protocol):
     """The run that is watched."""
 
     run: Run
@@ -72,20 +72,20 @@ class Watched(Protocol):
         ...
 
 
-class Watch:
+class Monitor:
     """Evidence of one run. `trouble`: why its stop is not proven yet; `seen_at`: when its engine last
     showed it; `umrf`: what that has been given last, where it is known. `rested_at`: when it was last
     seen to be over, for one that moves again."""
 
     def __init__(
         self,
-        it: Watched,
+        it: MonitoredRun,
         link: Link,
         *,
         exact: bool,
         wall: Callable[[], int],
         aside: Aside,
-        doubts: Doubts,
+        doubts: DoubtfulErrors,
         rested_at: int | None = None,
     ) -> None:
         self.trouble = ""
@@ -107,10 +107,10 @@ class Watch:
         self._stalled_as: object = None  # the actions at which that was told
         self._lacking: str | None = None  # what the graph that was sent lacks to begin
         self._beside: TaskGroup
-        self._parts = Parts()
+        self._parts = SubGraphs()
         self._answered = False  # by a get, since the last feedback
         self._exact = exact
-        self._rest = Rest(exact=exact)
+        self._rest = RestProof(exact=exact)
         self._doubts = doubts
         self._heard_at = self._began_at = anyio.current_time()
         self._seen_wall = rested_at

@@ -13,7 +13,7 @@ import msgspec
 
 from action_assistant.errors import Refused
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.execution.monitor import Watch
+from action_assistant.runner.execution.monitor import Monitor
 from action_assistant.runner.links.observations import Hazard, Seen
 from action_assistant.runner.links.port import (
     EngineChanged,
@@ -52,7 +52,7 @@ from action_assistant.runner.runs.fold import follow, thin
 from action_assistant.runner.runs.history import sent_of
 from action_assistant.runner.runs.recorder import Recorder, Store
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.stop.doubtful_errors import Doubts
+from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
 from action_assistant.runner.stop.proof import SET_GOING
 from action_assistant.runner.stop.stop_loop import StopLoop
 from action_assistant.web.workers.lanes import Aside
@@ -92,7 +92,9 @@ class OpenRun:
         self._owns_link = owns_link
         self._wall = wall
         self._aside = aside
-        self._doubts = Doubts(reached=seq > 1 and not owns_link)  # what came before is not known
+        self._doubts = DoubtfulErrors(
+            reached=seq > 1 and not owns_link
+        )  # what came before is not known
         self.watch = self._watched()
         self._lines = 0
         self._changed = changed
@@ -238,9 +240,9 @@ class OpenRun:
         self._again.set()
         return True
 
-    def _watched(self) -> Watch:
+    def _watched(self) -> Monitor:
         rested_at = self.run.ended_at
-        return Watch(
+        return Monitor(
             self,
             self._link,
             exact=self._owns_link,

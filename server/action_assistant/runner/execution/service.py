@@ -22,24 +22,24 @@ from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.links.unreachable import AbsentLink
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registration import Robot
-from action_assistant.runner.robots.registry import Ground, Robots
+from action_assistant.runner.robots.registry import RegistryContext, Robots
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, MovesAgain
 from action_assistant.runner.runs.history import History, Ledger, Past
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
-from action_assistant.runner.start.idempotency import Book, Stops, booked
+from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder, booked
 from action_assistant.runner.start.preflight import Preflight, Settled, check_items, of_taken
 from action_assistant.runner.start.start_checks import (
     Cleared,
     Grouped,
     GroupRequest,
+    StartChecks,
     Started,
-    Starting,
 )
-from action_assistant.runner.stop.foreign_stop import Silencing
-from action_assistant.runner.stop.late_activity import Stragglers
+from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
+from action_assistant.runner.stop.late_activity import LateActivity
 from action_assistant.web.auth.access import done_for_nobody
 from action_assistant.web.workers.lanes import Aside
 
@@ -51,7 +51,7 @@ _LOST: Final = (
 )
 
 
-class Control:
+class ExecutionService:
     """Everything that goes on. `opened` gives it, with its tasks running."""
 
     def __init__(
@@ -75,9 +75,9 @@ class Control:
         self._watchers: list[Callable[[OpenRun], None]] = []
         self._news = anyio.Event()
         self._places: dict[str, anyio.Lock] = {}
-        self._book = Book(ledger, tasks, wall)
+        self._book = IdempotentStarts(ledger, tasks, wall)
         self.under_way: Final = self._book.under_way
-        self._starting = Starting(
+        self._starting = StartChecks(
             robots,
             wall=wall,
             aside=aside,
@@ -86,13 +86,13 @@ class Control:
             settled=self._settled_on,
             simulator=simulator,
         )
-        self._stragglers = Stragglers(
+        self._late_activity = LateActivity(
             self.open, self.history, robots, self._tasks, wall=wall, reopen=self._reopen
         )
         self._robot_watchers: list[Callable[[], None]] = []
         self._settled: dict[str, Settled] = {}
         self._number = 0
-        self._stops = Stops()
+        self._stops = StopOrder()
 
     @classmethod
     @asynccontextmanager
@@ -105,7 +105,7 @@ class Control:
         aside: Aside = anyio.to_thread.run_sync,
         simulator: Simulator = in_this_process,
         past: Past | None = None,
-    ) -> "AsyncIterator[Control]":
+    ) -> "AsyncIterator[ExecutionService]":
         """The service, after it has taken up what an earlier process left. `past` reads runs that
         are over, `simulator` makes what simulated ones run on."""
         async with anyio.create_task_group() as tasks:
@@ -210,7 +210,7 @@ class Control:
         """What somebody has seen at rest there since this process began. A start that others have
         played again is theirs, and was not seen."""
         found = [each for each in self._settled.values() if each.engine == engine]
-        return [each for each in found if not self._stragglers.is_of_others(each.run)]
+        return [each for each in found if not self._late_activity.is_of_others(each.run)]
 
     def _going(self, engine: str) -> dict[str, OpenRun]:
         """The runs that go on there. Whatever else carries the mark of one was sent by others."""
@@ -265,7 +265,7 @@ class Control:
         done_for_nobody()  # a run goes on without whoever started it
         await opened.drive(order, incarnation)
         self.open.pop(opened.run.id, None)
-        self._stragglers.ended(opened.run, opened.recorder.seq)
+        self._late_activity.ended(opened.run, opened.recorder.seq)
         self._news.set()
         self._news = anyio.Event()
 
@@ -389,14 +389,14 @@ class Control:
                 f"Run {run.number} goes on {robot}; stop it first. Its Stop would get lost.",
                 where={"path": "/name", "run": run.id},
             )
-        if self.robots.silencing.going(robot):
+        if self.robots.foreign_stops.going(robot):
             raise Conflict(
                 f"Something is being stopped on {robot}; wait until it is.", where={"path": "/name"}
             )
 
     def _foreign(self, engine: KnownEngine, command: ForeignCommand) -> Commanded:
         """Somebody else has told a robot something: which run of ours that concerns."""
-        self._stragglers.sent_by_others(command)
+        self._late_activity.sent_by_others(command)
         runs = [each.run for each in self._going(engine.registration.name).values()]
         for each in runs:
             self.open[each.id].hear_of(command)
@@ -417,17 +417,17 @@ class Control:
     async def _take_up(self) -> None:
         """Adopt what an earlier process left: pending stops first of all; nothing is started."""
         self._number = (await self._ledger.query(queries.last_number()))[0][0]
-        ground = Ground(
+        ground = RegistryContext(
             self._ledger,
             self._tasks,
             self._wall,
             self._aside,
             self._robots_changed,
             self._foreign,
-            self._stragglers.shows,
-            Silencing,
+            self._late_activity.shows,
+            ForeignStopLoop,
         )
-        self._tasks.start_soon(self._stragglers.run)
+        self._tasks.start_soon(self._late_activity.run)
         self.robots.open(ground)
         for row in await self._ledger.query(queries.all_robots()):
             self.robots.add(

@@ -10,7 +10,7 @@ from action_assistant.runner.links.observations import ACTIVE, TERMINAL, Snapsho
 from action_assistant.runner.stop.proof import NEVER_BEGAN
 
 
-class Parts:
+class SubGraphs:
     """What one run has seen of its sub-graphs, look by look."""
 
     def __init__(self) -> None:

@@ -8,7 +8,7 @@ import msgspec
 from sqlalchemy import Row
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.review.service import Desk
+from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.runs import queries, views
 
 _PAGE: Final = 500  # events read at once
@@ -25,11 +25,14 @@ class HistoryEvent(msgspec.Struct, frozen=True):
 
 
 async def listed(
-    desk: Desk, wanted: queries.Filter, limit: int, going: Mapping[str, views.Summary]
+    review_service: ReviewService,
+    wanted: queries.Filter,
+    limit: int,
+    going: Mapping[str, views.Summary],
 ) -> list[views.Listed]:
     """Runs, newest first; those that are `going` are as they are there."""
-    rows = await desk.rows(queries.listed(wanted, limit))
-    labels = await _labels(desk, rows)
+    rows = await review_service.rows(queries.listed(wanted, limit))
+    labels = await _labels(review_service, rows)
     shown = (
         views.listed(going.get(row.id) or views.summary_of_row(row), row, labels.get(row.id, []))
         for row in rows
@@ -37,17 +40,17 @@ async def listed(
     return [each for each in shown if not wanted.states or each.state in wanted.states]
 
 
-async def _labels(desk: Desk, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
+async def _labels(review_service: ReviewService, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     if rows:
-        for row in await desk.rows(queries.labels_of([row.id for row in rows])):
+        for row in await review_service.rows(queries.labels_of([row.id for row in rows])):
             found.setdefault(row.run, []).append(row.label)
     return found
 
 
-async def streamed(desk: Desk, run: str, after: int) -> tuple[int, bytes]:
+async def streamed(review_service: ReviewService, run: str, after: int) -> tuple[int, bytes]:
     """A page of stored events as an event stream has them, and the seq of the last one."""
-    events = await desk.events(run, after, _PAGE)
+    events = await review_service.events(run, after, _PAGE)
     lines = [
         b"id: %d\nevent: %b\ndata: %b\n\n" % (each.seq, each.kind.encode(), _told(each))
         for each in events

@@ -51,7 +51,7 @@ _CLOCK: Final = 3_600_000_000  # microseconds by which a clock may be set back
 Format: TypeAlias = Literal["jsonl", "csv", "mcap"]
 
 
-class Marked(msgspec.Struct, frozen=True):
+class RunMarks(msgspec.Struct, frozen=True):
     """What people noted about a run."""
 
     pinned: bool
@@ -85,12 +85,12 @@ class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
     quote: str
 
 
-class Asking(Protocol):
-    """Somebody who answers what a method of `Desk` would."""
+class ReviewQueries(Protocol):
+    """Somebody who answers what a method of `ReviewService` would."""
 
     async def value(
         self,
-        question: Callable[Concatenate["Desk", P], Awaitable[T]],
+        question: Callable[Concatenate["ReviewService", P], Awaitable[T]],
         *args: P.args,
         **kw: P.kwargs,
     ) -> T:
@@ -98,20 +98,20 @@ class Asking(Protocol):
         ...
 
 
-class Opened(Protocol):
+class OngoingRun(Protocol):
     """A run that goes on."""
 
     run: Run
     recorder: Recorder
 
 
-class Going(Protocol):
+class OngoingRuns(Protocol):
     """What goes on, as far as looking back needs it: open runs, and how others are read."""
 
     history: History
 
     @property
-    def open(self) -> Mapping[str, Opened]:
+    def open(self) -> Mapping[str, OngoingRun]:
         """The runs that are not over."""
         ...
 
@@ -119,22 +119,22 @@ class Going(Protocol):
         """The number of a run that is taken in."""
         ...
 
-    def watch(self, watcher: Callable[[Opened], None]) -> None:
+    def watch(self, watcher: Callable[[OngoingRun], None]) -> None:
         """Be told, at once, of every run that has changed."""
         ...
 
 
-class Desk:
+class ReviewService:
     """Looks back on runs. Nothing here commands a robot. What only reads is asked of a worker that
     has a desk of its own (`stored.Asked`), over the same file and with nothing that goes on."""
 
     def __init__(
         self,
-        control: Going,
+        control: OngoingRuns,
         ledger: Shelf,
         aside: Aside,
         wall: Clock,
-        asked: Asking | None = None,
+        asked: ReviewQueries | None = None,
     ) -> None:
         self.reels = Reels(ledger, aside)
         self._asked = asked
@@ -147,7 +147,7 @@ class Desk:
         self._tried: Counter[str] = Counter()  # runs whose sums took a worker's life
         control.watch(self._saw)
 
-    def _saw(self, opened: Opened) -> None:
+    def _saw(self, opened: OngoingRun) -> None:
         if opened.run.end is not None:
             if not opened.recorder.recorded:
                 self._summed_up = None  # it may be stored long after it ended
@@ -195,7 +195,7 @@ class Desk:
             if self._asked is None:
                 summed = await self.summed(run_id, self._wall())
             else:
-                summed = await self._asked.value(Desk.summed, run_id, self._wall())
+                summed = await self._asked.value(ReviewService.summed, run_id, self._wall())
         except Refused as refused:
             self._tried[run_id] += 1
             if self._tried[run_id] < _TRIES or not isinstance(refused, Crashed | TooLarge):
@@ -292,21 +292,21 @@ class Desk:
         """The graph as it was sent. Raises NotFound."""
         return (await self._control.history.umrf(run_id)).encode()
 
-    async def mark(self, run_id: str, marks: annotations.Marks, author: Author) -> Marked:
+    async def mark(self, run_id: str, marks: annotations.Marks, author: Author) -> RunMarks:
         """Pin, note or label a run. Raises NotFound."""
         await self.known(run_id)
         marked = annotations.Marked(self._wall(), author, marks)
         await self._ledger.append(annotations.stream_about(run_id), [annotations.draft(marked)])
         return await self.marks(run_id)
 
-    async def marks(self, run_id: str) -> Marked:
+    async def marks(self, run_id: str) -> RunMarks:
         """What people noted about it."""
         rows = await self._ledger.query(select(review).where(review.c.run == run_id))
         labels = await self._ledger.query(
             select(run_label.c.label).where(run_label.c.run == run_id).order_by(run_label.c.label)
         )
         pinned, note = (rows[0].pinned, rows[0].note) if rows else (False, "")
-        return Marked(bool(pinned), note, [row.label for row in labels])
+        return RunMarks(bool(pinned), note, [row.label for row in labels])
 
     async def compare(self, a: str, b: str) -> Comparison:
         """Two runs side by side. Raises NotFound."""
@@ -401,7 +401,9 @@ class Desk:
         if self._asked is None:
             saved = await self.expected(run_id, name, author, self._wall())
         else:
-            saved = await self._asked.value(Desk.expected, run_id, name, author, self._wall())
+            saved = await self._asked.value(
+                ReviewService.expected, run_id, name, author, self._wall()
+            )
         draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
         await self._ledger.append(expected_runs.STREAM, [draft])
         return _shown(saved)

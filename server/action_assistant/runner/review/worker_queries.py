@@ -1,6 +1,6 @@
 """Questions about stored runs, answered in a worker: it reads the database itself, and never writes.
 
-A question is a method of `Desk`. `Asked` is the runner's side: it has what was just shown stored
+A question is a method of `ReviewService`. `WorkerQueries` is the runner's side: it has what was just shown stored
 before it asks, and keeps what the worker folded on the way.
 """
 
@@ -20,7 +20,7 @@ from action_assistant.journal.events import Draft, Snapshot
 from action_assistant.journal.reader import FileReader
 from action_assistant.runner.analysis.keyframes import Archive
 from action_assistant.runner.archives.archive_store import Shelf
-from action_assistant.runner.review.service import Desk, Opened
+from action_assistant.runner.review.service import OngoingRun, ReviewService
 from action_assistant.runner.runs.history import History, Ledger
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
@@ -37,26 +37,29 @@ def json_of(text: bytes, _: type[T]) -> Response[T]:
     return cast("Response[T]", Response(text, media_type=MediaType.JSON))
 
 
-class Place(msgspec.Struct, frozen=True):
+class StoragePaths(msgspec.Struct, frozen=True):
     """Where the runs are: the database file, and the folder of archives."""
 
     database: Path
     archive: Path
 
 
-class Asked:
+class WorkerQueries:
     """Asks a worker. `opened` are the runs that go on, once that is known."""
 
-    def __init__(self, aside: Aside, place: Place, ledger: Archive) -> None:
-        self.opened: Mapping[str, Opened] = {}
+    def __init__(self, aside: Aside, place: StoragePaths, ledger: Archive) -> None:
+        self.opened: Mapping[str, OngoingRun] = {}
         self._aside = aside
         self._place = place
         self._ledger = ledger
 
     async def value(
-        self, question: Callable[Concatenate[Desk, P], Awaitable[T]], *args: P.args, **kw: P.kwargs
+        self,
+        question: Callable[Concatenate[ReviewService, P], Awaitable[T]],
+        *args: P.args,
+        **kw: P.kwargs,
     ) -> T:
-        """What a method of `Desk` returns. Raises what that raises, Unavailable, TooMany."""
+        """What a method of `ReviewService` returns. Raises what that raises, Unavailable, TooMany."""
         await self._settled(args)
         found, kept = await self._aside(
             answered, self._place, partial(question, **kw) if kw else question, args
@@ -66,7 +69,10 @@ class Asked:
         return value
 
     async def text(
-        self, question: Callable[Concatenate[Desk, P], Awaitable[T]], *args: P.args, **kw: P.kwargs
+        self,
+        question: Callable[Concatenate[ReviewService, P], Awaitable[T]],
+        *args: P.args,
+        **kw: P.kwargs,
     ) -> bytes:
         """The same as JSON: it need not be taken apart and put together here."""
         await self._settled(args)
@@ -84,7 +90,7 @@ class Asked:
 
     async def past(self, run: str, robots_too: bool) -> tuple[Run, int]:
         """As `history.Past`."""
-        return await self.value(Desk.followed, run, robots_too)
+        return await self.value(ReviewService.followed, run, robots_too)
 
     async def _settled(self, args: Sequence[object]) -> None:
         for each in args:
@@ -100,16 +106,16 @@ class Asked:
 
 
 def answered(
-    place: Place, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
+    place: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[Any, list[Snapshot]]:
     """In the worker: the answer, and what of it is worth keeping."""
-    desk, file = _reading(place)
-    found = asyncio.run(_asked(question, desk, args))
+    review_service, file = _reading(place)
+    found = asyncio.run(_asked(question, review_service, args))
     return found, file.given()
 
 
 def encoded(
-    place: Place, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
+    place: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[bytes, list[Snapshot]]:
     """The same as JSON."""
     found, kept = answered(place, question, args)
@@ -117,16 +123,16 @@ def encoded(
 
 
 async def _asked(
-    question: Callable[..., Awaitable[Any]], desk: Desk, args: Sequence[Any]
+    question: Callable[..., Awaitable[Any]], review_service: ReviewService, args: Sequence[Any]
 ) -> object:
-    return await question(desk, *args)
+    return await question(review_service, *args)
 
 
 @lru_cache(maxsize=1)
-def _reading(place: Place) -> "tuple[Desk, _File]":
-    file = _File(place.database)
+def _reading(place: StoragePaths) -> "tuple[ReviewService, _ReadOnlyJournal]":
+    file = _ReadOnlyJournal(place.database)
     shelf = Shelf(file, place.archive, _here)
-    return Desk(_Nothing(shelf), shelf, _here, _no_clock), file
+    return ReviewService(_NoOngoingRuns(shelf), shelf, _here, _no_clock), file
 
 
 async def _here(work: Callable[..., T], *args: Any) -> T:
@@ -137,7 +143,7 @@ def _no_clock() -> NoReturn:
     raise AssertionError("what is stored needs no clock to be read")
 
 
-class _File(FileReader):
+class _ReadOnlyJournal(FileReader):
     """The journal as a worker has it: what is to be kept is given to the runner."""
 
     def __init__(self, path: Path) -> None:
@@ -160,16 +166,16 @@ class _File(FileReader):
         return given
 
 
-class _Nothing:
+class _NoOngoingRuns:
     """Where nothing goes on: all that is known is stored."""
 
     def __init__(self, ledger: Ledger) -> None:
-        self.open: Mapping[str, Opened] = {}
+        self.open: Mapping[str, OngoingRun] = {}
         self.history = History(ledger)
 
     def next_number(self) -> int:
         """Nothing begins here."""
         raise NotImplementedError
 
-    def watch(self, watcher: Callable[[Opened], None]) -> None:
+    def watch(self, watcher: Callable[[OngoingRun], None]) -> None:
         """Nothing changes here."""

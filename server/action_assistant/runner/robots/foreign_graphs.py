@@ -5,7 +5,7 @@ from collections.abc import Collection
 from action_assistant.runner.links.port import Answer
 
 
-def strangers(answer: Answer, going: Collection[str]) -> list[str]:
+def foreign_graphs(answer: Answer, going: Collection[str]) -> list[str]:
     """The graphs that an engine runs and that are no runs of ours `going` on there: also those of
     which no action has begun yet, or none moves right now. Sub-graphs are named by their graph."""
     held = {each.graph for each in answer.graphs}

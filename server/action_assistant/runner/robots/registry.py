@@ -21,7 +21,7 @@ from action_assistant.runner.links.port import (
     Registration,
 )
 from action_assistant.runner.robots.engine import Index, KnownEngine
-from action_assistant.runner.robots.foreign_graphs import strangers
+from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registration import (
     STREAM,
@@ -34,8 +34,8 @@ from action_assistant.runner.robots.registration import (
 from action_assistant.runner.robots.robot_events import (
     Commanded,
     EngineBecame,
-    FlightRecorder,
     RobotEvent,
+    RobotLog,
 )
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import Ledger
@@ -70,7 +70,7 @@ class ForeignStops(Protocol):
 Note: TypeAlias = Callable[[str, RobotEvent, str], None]
 
 
-class Ground(msgspec.Struct, frozen=True):
+class RegistryContext(msgspec.Struct, frozen=True):
     """What the registry stands on. `foreign` hears of each command of somebody else,
     `shows` of all graphs that an engine shows; `stops` makes what stops foreign graphs."""
 
@@ -100,16 +100,16 @@ class Robots:
         self._registered: dict[str, Registration] = {}
         self._engines: dict[str, KnownEngine] = {}
         self._scopes: dict[str, anyio.CancelScope] = {}
-        self._ground: Ground | None = None
-        self._flight: FlightRecorder | None = None
-        self._silencing: ForeignStops | None = None
+        self._ground: RegistryContext | None = None
+        self._robot_log: RobotLog | None = None
+        self._foreign_stops: ForeignStops | None = None
 
-    def open(self, ground: Ground) -> None:
+    def open(self, ground: RegistryContext) -> None:
         """Watch what was given, and from now on whatever is added."""
         self._ground = ground
-        self._flight = FlightRecorder(ground.ledger, ground.tasks)
-        self._silencing = ground.stops(
-            ground.tasks, ground.wall, self._flight.note, lambda: ground.changed()
+        self._robot_log = RobotLog(ground.ledger, ground.tasks)
+        self._foreign_stops = ground.stops(
+            ground.tasks, ground.wall, self._robot_log.note, lambda: ground.changed()
         )
         if self.recordings is not None:
             ground.tasks.start_soon(self.recordings.run)
@@ -189,17 +189,17 @@ class Robots:
         with scope:
             await engine.watch()
 
-    def _standing(self) -> Ground:
+    def _standing(self) -> RegistryContext:
         if self._ground is None:
             raise RuntimeError("the registry is not open")
         return self._ground
 
     @property
-    def silencing(self) -> ForeignStops:
+    def foreign_stops(self) -> ForeignStops:
         """Stops of what others run there."""
-        if self._silencing is None:
+        if self._foreign_stops is None:
             raise RuntimeError("the registry is not open")
-        return self._silencing
+        return self._foreign_stops
 
     def silence(
         self, author: Author, going: Callable[[str], Collection[str]], name: str | None = None
@@ -212,8 +212,8 @@ class Robots:
         for robot, engine in self._engines.items():
             if name in {None, robot}:
                 answer = engine.answer
-                for graph in [] if answer is None else strangers(answer, going(robot)):
-                    self.silencing.stop(engine, graph, author)
+                for graph in [] if answer is None else foreign_graphs(answer, going(robot)):
+                    self.foreign_stops.stop(engine, graph, author)
                     told.append(f"{robot}: {graph}")
         return told
 
@@ -243,7 +243,7 @@ class Robots:
         )
         if engine is None:
             return plain
-        return seen(plain, engine, self.silencing.trouble)
+        return seen(plain, engine, self.foreign_stops.trouble)
 
     def heard(self) -> dict[str, int]:
         """When each robot last answered, microseconds UTC; those that never did are left out."""
@@ -313,21 +313,21 @@ class Robots:
         incarnation = engine.standing.incarnation
         at = self._standing().wall()
         became = EngineBecame(at=at, state=engine.state, why=engine.why, incarnation=incarnation)
-        self.flight.note(name, became, name)
+        self.robot_log.note(name, became, name)
 
     def _note_command(self, engine: KnownEngine, command: ForeignCommand) -> None:
         name = engine.registration.name
         if not command.targets or name in command.targets:
-            self.silencing.hear_of(name, command)
+            self.foreign_stops.hear_of(name, command)
             told = self._standing().foreign(engine, command)
-            self.flight.note(name, told, command.sender)
+            self.robot_log.note(name, told, command.sender)
 
     @property
-    def flight(self) -> FlightRecorder:
+    def robot_log(self) -> RobotLog:
         """What others told the robots."""
-        if self._flight is None:
+        if self._robot_log is None:
             raise RuntimeError("the registry is not open")
-        return self._flight
+        return self._robot_log
 
 
 def _path(service: str) -> str:

@@ -123,7 +123,7 @@ def event_of(stored: Event) -> RobotEvent | None:
     return None if known is None else msgspec.json.decode(stored.body, type=known)
 
 
-class FlightRecorder:
+class RobotLog:
     """Writes and reads the streams of robots."""
 
     def __init__(self, ledger: Ledger, tasks: TaskGroup) -> None:

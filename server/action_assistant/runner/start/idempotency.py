@@ -58,7 +58,7 @@ def booked(
     return requested, Order(run=ready.run, graph=graph, umrf=ready.umrf, targets=targets)
 
 
-class Stops:
+class StopOrder:
     """What was stopped, and in which order: a start that was asked for before does not leave after
     it. Robots and groups go by their names, and "" is everything."""
 
@@ -78,7 +78,7 @@ class Stops:
         return None if found is None or found[0] <= count else found[1:]
 
 
-class Book:
+class IdempotentStarts:
     """Where starts are written down."""
 
     def __init__(self, ledger: Ledger, tasks: TaskGroup, wall: Clock) -> None:

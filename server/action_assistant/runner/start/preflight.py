@@ -13,7 +13,7 @@ from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.links.observations import Snapshot, failed_in
 from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.robots.engine import Index
-from action_assistant.runner.robots.foreign_graphs import strangers
+from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import Admitted, Prepared
 from action_assistant.umrf.check import STRUCTURAL, check
@@ -298,7 +298,7 @@ def _listed(names: Sequence[str]) -> str:
 
 def _quiet(sight: Sight, graph: Graph) -> Item:
     """Nothing of somebody else runs there."""
-    moving = strangers(sight.answer, sight.open_runs)
+    moving = foreign_graphs(sight.answer, sight.open_runs)
     if graph.name in moving:
         text = (
             f"A graph called {graph.name} runs on {sight.name} already, started by somebody else: "

@@ -93,7 +93,7 @@ class Grouped(msgspec.Struct, frozen=True):
     fresh: bool
 
 
-class Starting:
+class StartChecks:
     """Looks before starts. `taken(engine)` is the run that an engine has from here, if any;
     `going(engine)` the ids of all that go on there; `settled(engine)` what somebody has seen at rest
     there."""
@@ -136,7 +136,7 @@ class Starting:
         ready = await self._aside(prepared, asked, robot.facts, secrets.token_urlsafe(9))
         free = preflight.of_taken(asked.engine, self._taken(asked.engine))
         preflight.check_items([free], ())
-        if self._robots.silencing.going(asked.engine):
+        if self._robots.foreign_stops.going(asked.engine):
             raise Conflict(
                 f"Something is being stopped on {asked.engine}; a start would be stopped with it.",
                 where={"path": "/engine", "item": "quiet"},

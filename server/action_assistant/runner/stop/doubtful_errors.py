@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from action_assistant.runner.links.observations import Snapshot, did_not_obey, failed_in
 
 
-class Doubts:
+class DoubtfulErrors:
     """Actions of one run whose code may go on although its engine calls them ERROR.
 
     `reached`: a stop or a pause may have reached the graph before anything of it was seen here.

@@ -22,8 +22,8 @@ from action_assistant.runner.robots.robot_events import (
     StopWasProven,
 )
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.stop.doubtful_errors import Doubts
-from action_assistant.runner.stop.proof import SET_GOING, Rest, send_stop
+from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
+from action_assistant.runner.stop.proof import SET_GOING, RestProof, send_stop
 
 _GAP_S: Final = 0.1
 _SLOWEST_S: Final = 1.0
@@ -32,7 +32,7 @@ _PATIENCE_S: Final = 60.0
 _LOUD_S: Final = 2.0
 
 
-class Silencing:
+class ForeignStopLoop:
     """All such stops that go on. `note` records; `changed` is told when people see something else."""
 
     def __init__(
@@ -94,7 +94,7 @@ class Silencing:
     async def _until_proven(self, engine: KnownEngine, graph: str, robot: str) -> RobotEvent:
         began, gap = anyio.current_time(), _GAP_S
         life = engine.answer.incarnation if engine.answer is not None else ""
-        rest, doubts = Rest(exact=False), Doubts(reached=True)
+        rest, doubts = RestProof(exact=False), DoubtfulErrors(reached=True)
         while True:
             why = await send_stop(engine, graph)
             asked = anyio.current_time()
@@ -133,7 +133,7 @@ async def _ask(engine: KnownEngine) -> Answer | None:
         return None
 
 
-def _at_rest(answer: Answer, graph: str, rest: Rest, asked: float) -> bool:
+def _at_rest(answer: Answer, graph: str, rest: RestProof, asked: float) -> bool:
     """Whether neither the graph nor a sub-graph of it moves, or will by itself."""
     shown = _shown(answer, graph)
     is_held = bool(shown) and shown[0].graph == graph

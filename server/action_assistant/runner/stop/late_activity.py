@@ -19,7 +19,7 @@ from action_assistant.runner.links.engine_text import run_in
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import ForeignCommand, NoAnswer
 from action_assistant.runner.robots.engine import KnownEngine
-from action_assistant.runner.robots.robot_events import Commanded, FlightRecorder
+from action_assistant.runner.robots.robot_events import Commanded, RobotLog
 from action_assistant.runner.runs.events import MovesAgain
 from action_assistant.runner.runs.history import History
 from action_assistant.runner.runs.run import Run
@@ -50,12 +50,12 @@ class RobotRecords(Protocol):
     """Where it is recorded what others told robots."""
 
     @property
-    def flight(self) -> FlightRecorder:
+    def robot_log(self) -> RobotLog:
         """The records."""
         ...
 
 
-class Stragglers:
+class LateActivity:
     """Watches what engines show for runs that are over. `open` are the runs that are not;
     `reopen` is given a run as stored, the seq of its last event, and what opens it again."""
 
@@ -153,7 +153,7 @@ class Stragglers:
             return self._ended.pop(run)
         while True:
             try:
-                told = await self._robots.flight.newest(robot, _TOLD)
+                told = await self._robots.robot_log.newest(robot, _TOLD)
                 found, seq = await self._history.followed(run)
             except NotFound:
                 return None

@@ -43,7 +43,7 @@ def hash_of(shown: Sequence[Snapshot]) -> str:
     return hashlib.sha256(msgspec.json.encode(list(shown))).hexdigest()
 
 
-class Rest:
+class RestProof:
     """Whether a graph will not move by itself.
 
     An engine that stops or finishes a graph passes by an action that it has triggered and that is

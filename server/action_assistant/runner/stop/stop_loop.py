@@ -36,7 +36,7 @@ class StopMonitor(Protocol):
         ...
 
 
-class Stopped(Protocol):
+class StoppableRun(Protocol):
     """The run that is stopped."""
 
     run: Run
@@ -63,7 +63,7 @@ class StopLoop:
     """Presses, and the messages that follow. `hung`: why its engine will not answer any more."""
 
     def __init__(
-        self, it: Stopped, link: Link, *, simulated: bool, wall: Callable[[], int]
+        self, it: StoppableRun, link: Link, *, simulated: bool, wall: Callable[[], int]
     ) -> None:
         self.hung = ""
         self._it = it

@@ -49,7 +49,7 @@ class SignedIn(msgspec.Struct, frozen=True):
     named: bool
 
 
-class Looking(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class InvitationQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A link that somebody wants to know more about before using it."""
 
     invitation: Annotated[str, msgspec.Meta(max_length=200)]
@@ -70,7 +70,7 @@ class Revocation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     session: str | None = None
 
 
-class Reception(Protocol):
+class InvitationRegistry(Protocol):
     """Knows invitations."""
 
     def look(self, proof: str) -> Invited:
@@ -80,14 +80,14 @@ class Reception(Protocol):
         """Remember who came in by it."""
 
 
-class Desk:
+class Sessions:
     """Where tokens and invitations are traded for sessions."""
 
     def __init__(
         self,
         keys: Keys,
         page_port: int,
-        reception: Callable[[], Reception],
+        reception: Callable[[], InvitationRegistry],
         *,
         addresses: Addresses | None,
         limits: bool,
@@ -168,14 +168,14 @@ def session_routes(
     keys: Keys,
     page_port: int,
     *,
-    reception: Callable[[], Reception],
+    reception: Callable[[], InvitationRegistry],
     revoked: Revoked,
     browsers: SignedInBrowsers,
     addresses: Addresses | None = None,
     limits: bool = True,
 ) -> list[ControllerRouterHandler]:
     """The routes under `/api/session`."""
-    desk = Desk(keys, page_port, reception, addresses=addresses, limits=limits)
+    sessions = Sessions(keys, page_port, reception, addresses=addresses, limits=limits)
 
     @get("/api/session", summary="Who is signed in")
     async def who(request: _Asking) -> SignedIn:
@@ -190,9 +190,9 @@ def session_routes(
         request_max_body_size=_BODY,
     )
     async def sign_in(data: JSONBody[SignIn], request: _Asking) -> Response[SignedIn]:
-        session = await desk.session(data, request)
+        session = await sessions.session(data, request)
         await to_thread.run_sync(browsers.note, session)
-        return desk.answer(session, request)
+        return sessions.answer(session, request)
 
     @post(
         "/api/session/invitation",
@@ -200,16 +200,16 @@ def session_routes(
         summary="What an invitation leads to",
         request_max_body_size=_BODY,
     )
-    async def look(data: JSONBody[Looking], request: _Asking) -> Invited:
-        return desk.look(data.invitation, request)
+    async def look(data: JSONBody[InvitationQuestion], request: _Asking) -> Invited:
+        return sessions.look(data.invitation, request)
 
     @delete("/api/session", status_code=204, summary="Sign out: this session ends, everywhere")
     async def sign_out(request: _Asking) -> Response[None]:
         try:
             await _end(revoked, request)
         except Unavailable as unwritten:
-            return desk.farewell(request, unwritten)
-        return desk.farewell(request)
+            return sessions.farewell(request, unwritten)
+        return sessions.farewell(request)
 
     return [who, sign_in, look, sign_out]
 
@@ -251,7 +251,7 @@ async def _end(revoked: Revoked, request: _Asking) -> None:
 
 
 async def _invited(
-    keys: Keys, reception: Reception, proof: str, name: str, request: _Asking
+    keys: Keys, reception: InvitationRegistry, proof: str, name: str, request: _Asking
 ) -> Session:
     """A session for who comes by a link. Who may do more already keeps that: a link takes nothing
     away."""
