@@ -19,8 +19,8 @@ from table import Table, seconds
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.runner.analysis import statistics as sums
-from action_assistant.runner.analysis.keyframes import APART, Reels
-from action_assistant.runner.analysis.replay import film
+from action_assistant.runner.analysis.keyframes import APART, KeyframeStore
+from action_assistant.runner.analysis.replay import run_replay
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.links.observations import NodeResult, NodeState
 from action_assistant.runner.robots.recordings import Recordings
@@ -195,22 +195,22 @@ async def _long_runs(folder: Path) -> Table:
 async def _opening(journal: Journal, run: str, size: int) -> list[str]:
     """The first time keyframes are made; after that they are in the journal."""
 
-    async def opened(reels: Reels) -> None:
-        key = (await reels.reel(run)).keys[-1]
+    async def opened(keyframe_store: KeyframeStore) -> None:
+        key = (await keyframe_store.keyframes(run)).keys[-1]
         msgspec.json.encode(views.whole(key.run, "{}"))
 
     started = time.perf_counter()
-    await opened(Reels(journal, _ASIDE))
+    await opened(KeyframeStore(journal, _ASIDE))
     first = seconds(time.perf_counter() - started)
-    known = Reels(journal, _ASIDE)
+    known = KeyframeStore(journal, _ASIDE)
     middle = size // 2 - size // 2 % APART
 
     async def page(after: int) -> None:
-        msgspec.json.encode(await film(known, run, after=after))
+        msgspec.json.encode(await run_replay(known, run, after=after))
 
     return [
         first,
-        await _took(lambda: opened(Reels(journal, _ASIDE))),  # as another process would
+        await _took(lambda: opened(KeyframeStore(journal, _ASIDE))),  # as another process would
         await _took(lambda: page(0)),
         await _took(lambda: page(middle)),
         await _took(lambda: known.at(run, size // 3 + 1)),
@@ -304,7 +304,7 @@ async def _stored(folder: Path, events: Sequence[Any]) -> int:
     for i in range(0, len(drafts), 500):
         await journal.append(events[0].stream, drafts[i : i + 500])
     end, stored = await journal.end(events[0].stream), await journal.read(events[0].stream)
-    file = archive_file.Bundle(folder / "one.jsonl.gz", events[0].stream, "one", end)
+    file = archive_file.ArchiveFile(folder / "one.jsonl.gz", events[0].stream, "one", end)
     file.add(stored)
     file.close()
     await journal.close()

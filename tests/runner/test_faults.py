@@ -7,7 +7,7 @@ from typing import Any
 import anyio
 import pytest
 
-from action_assistant.runner.archives.archive_store import Shelf
+from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.links.port import Answer, Order
 from action_assistant.runner.review.service import ReviewService
@@ -153,17 +153,17 @@ def test_a_recording_that_cannot_be_looked_at_does_not_end_what_puts_old_ones_aw
 async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_not() -> None:
     world = World()
     async with world.runner() as control, anyio.create_task_group() as tasks:
-        shelf = Shelf(world.ledger, Path("nowhere"), at_once)  # type: ignore[arg-type]
-        review_service = ReviewService(control, shelf, at_once, wall)
-        reel, failed = review_service.reels.reel, []
+        archive_store = ArchiveStore(world.ledger, Path("nowhere"), at_once)  # type: ignore[arg-type]
+        review_service = ReviewService(control, archive_store, at_once, wall)
+        keyframes, failed = review_service.keyframe_store.keyframes, []
 
         async def fails_once(run: str) -> Any:
             if not failed:
                 failed.append(run)
                 raise ZeroDivisionError
-            return await reel(run)
+            return await keyframes(run)
 
-        review_service.reels.reel = fails_once  # type: ignore[method-assign]
+        review_service.keyframe_store.keyframes = fails_once  # type: ignore[method-assign]
         tasks.start_soon(review_service.run)
         for _ in range(2):
             run = (await control.start(order(sequence(actions=1)), ANN)).run

@@ -7,7 +7,12 @@ from typing import Final, Literal
 import msgspec
 
 from action_assistant.commands.client import No, Server, print_json, refused, running
-from action_assistant.runner.analysis.expected_runs import Departure, Step, course, departure
+from action_assistant.runner.analysis.expected_runs import (
+    Departure,
+    ExpectedStep,
+    course,
+    departure,
+)
 from action_assistant.runner.review.service import Expectation
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
@@ -75,7 +80,7 @@ def _verdict(each: Expectation, umrf: bytes, against: Literal["then", "now"]) ->
     return Verdict(name=each.name, run=each.run, against=against, same=apart is None, why=why)
 
 
-def _unnamed(steps: "list[Step] | tuple[Step, ...]") -> list[Step]:
+def _unnamed(steps: "list[ExpectedStep] | tuple[ExpectedStep, ...]") -> list[ExpectedStep]:
     """Without the name of the top graph: a graph may be renamed and still do the same."""
     top = steps[0].graph if steps else ""
     return [
@@ -88,7 +93,7 @@ def _sentence(apart: Departure) -> str:
     return f"Step {apart.place + 1}: expected {_said(apart.expected)}, found {_said(apart.found)}."
 
 
-def _said(step: Step | None) -> str:
+def _said(step: ExpectedStep | None) -> str:
     if step is None:
         return "the end"
     if step.what == "ends":

@@ -18,7 +18,7 @@ from action_assistant.runner.api.caller import SMALL
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.api.runs import routes
 from action_assistant.runner.api.services import RunnerServices
-from action_assistant.runner.archives.archive_store import Shelf
+from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.clock import wall_clock
 from action_assistant.runner.execution.service import ExecutionService
@@ -55,18 +55,20 @@ async def open_services(
         on_disk = anyio.to_thread.run_sync  # threads wait for disks; what computes goes to workers
         folder, prunes = settings.data / "recordings", keep.raw is None
         recordings = Recordings(folder, on_disk, prunes=prunes)
-        shelf = Shelf(journal, keep.folder, on_disk)
+        archive_store = ArchiveStore(journal, keep.folder, on_disk)
         async with RunnerWorkers.opened() as workers:
             place = StoragePaths(_file(settings), keep.folder)
-            services.asked = WorkerQueries(workers.looks, place, shelf)
-            ours = WorkerQueries(workers.ours, place, shelf)  # what moves again waits behind nobody
+            services.asked = WorkerQueries(workers.looks, place, archive_store)
+            ours = WorkerQueries(
+                workers.ours, place, archive_store
+            )  # what moves again waits behind nobody
             services.aside = workers.looks
             reach = ros2_reach(wall_clock)
             robots = Robots(reach=reach, recordings=recordings)
             async with (
                 _kept(reach),
                 ExecutionService.opened(
-                    shelf,
+                    archive_store,
                     robots,
                     wall=wall_clock,
                     aside=workers.starts,
@@ -79,7 +81,7 @@ async def open_services(
                 services.crowd = Crowd(limits=settings.limits, keeps_one=True)
                 services.journal = journal
                 services.review_service = ReviewService(
-                    control, shelf, on_disk, wall_clock, services.asked
+                    control, archive_store, on_disk, wall_clock, services.asked
                 )
                 services.retention = Retention(
                     journal,

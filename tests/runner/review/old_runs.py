@@ -20,7 +20,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.runner import projection
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.archives import archive_file
-from action_assistant.runner.archives.archive_store import Shelf
+from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.links.observations import NodeState
 from action_assistant.runner.robots.recordings import Recordings
@@ -82,14 +82,14 @@ def retention(journal: Journal, data: Path, **more: Any) -> Retention:
     return Retention(journal, recordings, keep, aside=asyncio.to_thread, **(fields | more))
 
 
-def shelf(journal: Journal, data: Path) -> Shelf:
-    return Shelf(journal, data / "archive", asyncio.to_thread)
+def archive_store(journal: Journal, data: Path) -> ArchiveStore:
+    return ArchiveStore(journal, data / "archive", asyncio.to_thread)
 
 
 async def everything(journal: Journal, data: Path) -> dict[str, list[Event]]:
     """All runs, wherever they are kept; the journal has to be sound."""
     assert await journal.verify() == []
-    read = shelf(journal, data).read
+    read = archive_store(journal, data).read
     return {run: await read(stream_of(run)) for run in LENGTHS}
 
 
@@ -123,8 +123,8 @@ def put_away(data: Path, dies_at: int) -> None:
 
 
 _STEPS: Final[tuple[tuple[Any, str], ...]] = (
-    (archive_file.Bundle, "add"),
-    (archive_file.Bundle, "close"),
+    (archive_file.ArchiveFile, "add"),
+    (archive_file.ArchiveFile, "close"),
     (archive_file, "sha256_of"),
     (archive_file, "_settle"),
     (os, "fsync"),

@@ -61,10 +61,10 @@ def test_parameters_are_told_as_sent_and_as_executed(process: RunnerProcess, val
             for name, action in whole["actions"].items()
         }
         assert executed == {"Work_0": [{"arm::speed": "5"}], "Work_1": [{}]}
-        film = client.get(f"/api/runs/{run['id']}/film").json()
+        replay = client.get(f"/api/runs/{run['id']}/film").json()
         told = [
             visit["inputs"]
-            for frame in film["frames"]
+            for frame in replay["frames"]
             for visit in frame.get("actions", {}).get("Work_0", {}).get("visits", [])
         ]
         assert told

@@ -24,7 +24,7 @@ def chained(bodies: list[bytes]) -> tuple[list[Event], Head]:
 
 def written(path: Path, bodies: list[bytes]) -> list[Event]:
     events, end = chained(bodies)
-    file = archive_file.Bundle(path, "run/r1", "runs/one.jsonl.gz", end)
+    file = archive_file.ArchiveFile(path, "run/r1", "runs/one.jsonl.gz", end)
     file.add(events)
     file.close()
     return events
@@ -84,7 +84,7 @@ def test_a_file_that_somebody_put_together_is_refused(tmp_path: Path, change: ob
 def test_a_journal_that_does_not_keep_its_word_is_not_put_away(tmp_path: Path) -> None:
     path = tmp_path / "one.jsonl.gz"
     events, end = chained([b"{}"] * 6)
-    file = archive_file.Bundle(path, "run/r1", "runs/one.jsonl.gz", end)
+    file = archive_file.ArchiveFile(path, "run/r1", "runs/one.jsonl.gz", end)
     file.add(events[:5])
     with pytest.raises(archive_file.Damaged):
         file.close()

@@ -188,8 +188,8 @@ def test_sums_marks_and_archives_are_the_same_after_restarts(
         assert found(client, text="gripper") == [run["id"]]
         whole = client.get(f"/api/runs/{run['id']}").json()
         assert msgspec.json.encode(whole["actions"]) == msgspec.json.encode(run["actions"])
-        film = client.get(f"/api/runs/{run['id']}/film").json()
-        assert film["frames"][-1]["head"]["state"] == run["state"]
+        replay = client.get(f"/api/runs/{run['id']}/film").json()
+        assert replay["frames"][-1]["head"]["state"] == run["state"]
         assert whole["archived"] is None
         export = client.get(f"/api/runs/{run['id']}/export", params={"format": "jsonl"}).text
         assert client.post("/api/archive", json={"runs": 1}).json()["runs"] == 0
@@ -199,7 +199,7 @@ def test_sums_marks_and_archives_are_the_same_after_restarts(
         after = client.get(f"/api/runs/{run['id']}").json()
         assert after.pop("archived") is not None
         assert after == {name: value for name, value in whole.items() if name != "archived"}
-        assert client.get(f"/api/runs/{run['id']}/film").json() == film
+        assert client.get(f"/api/runs/{run['id']}/film").json() == replay
         path = f"/api/runs/{run['id']}/export"
         assert client.get(path, params={"format": "jsonl"}).text == export
         raw = client.get(f"/api/runs/{run['id']}/raw").json()

@@ -20,7 +20,7 @@ from action_assistant.runner.analysis import (
     exports,
     statistics,
 )
-from action_assistant.runner.archives.archive_store import Shelf
+from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.durations import Took, at_rank, took_us
@@ -218,7 +218,9 @@ def test_runs_that_an_older_version_has_summed_up_are_summed_up_again(tmp_path: 
         before = await ledger.query(statistics.sums_of([told.run.id]))
         assert [row.took for row in before if row.took] == [[[0, None]]]  # at least: it is no value
         async with told.place.world.runner() as control, anyio.create_task_group() as tasks:
-            review_service = ReviewService(control, Shelf(ledger, tmp_path, at_once), at_once, wall)
+            review_service = ReviewService(
+                control, ArchiveStore(ledger, tmp_path, at_once), at_once, wall
+            )
             tasks.start_soon(review_service.run)
             await anyio.sleep(5)
             tasks.cancel_scope.cancel()

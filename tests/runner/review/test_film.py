@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from action_assistant.journal.events import Draft
-from action_assistant.runner.analysis.keyframes import APART, Reels
-from action_assistant.runner.analysis.replay import Film, Frame, film
+from action_assistant.runner.analysis.keyframes import APART, KeyframeStore
+from action_assistant.runner.analysis.replay import ReplayFrame, RunReplay, run_replay
 from action_assistant.runner.links.observations import NodeResult, NodeState, Seen, Snapshot
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import (
@@ -68,23 +68,23 @@ async def stored(events: Sequence[RunEvent]) -> MemoryLedger:
     return ledger
 
 
-def played(film: Film, upto: int) -> dict[str, Any]:
+def played(run_replay: RunReplay, upto: int) -> dict[str, Any]:
     """The run as the page draws it after the event `upto`: base, then frames."""
     shown: dict[str, Any] = {"head": {}, "actions": {}}
-    if film.base is not None:
-        built = msgspec.to_builtins(film.base)
+    if run_replay.base is not None:
+        built = msgspec.to_builtins(run_replay.base)
         shown["head"] = built
         shown["actions"] = {
             name: {"state": action["state"], "older": action["older"], "visits": action["visits"]}
             for name, action in built["actions"].items()
         }
-    for frame in film.frames:
+    for frame in run_replay.frames:
         if frame.seq <= upto:
             _apply(shown, frame)
     return shown
 
 
-def _apply(shown: dict[str, Any], frame: Frame) -> None:
+def _apply(shown: dict[str, Any], frame: ReplayFrame) -> None:
     built = msgspec.to_builtins(frame)
     shown["head"] |= built.get("head", {})
     for name, change in built.get("actions", {}).items():
@@ -100,14 +100,14 @@ def test_replay_at_any_event_equals_the_fold_of_the_events_up_to_it(drawn: Any) 
     events = told(drawn)
 
     async def main() -> None:
-        reels = Reels(await stored(events), at_once)
-        reel = await film(reels, "r1", after=0)
-        assert [frame.seq for frame in reel.frames] == list(range(1, len(events) + 1))
+        keyframe_store = KeyframeStore(await stored(events), at_once)
+        keyframes = await run_replay(keyframe_store, "r1", after=0)
+        assert [frame.seq for frame in keyframes.frames] == list(range(1, len(events) + 1))
         for upto in range(1, len(events) + 1):
             run = replay(events[:upto])
             assert run is not None
             whole = msgspec.to_builtins(views.shown(run))
-            shown = played(reel, upto)
+            shown = played(keyframes, upto)
             assert shown["head"]["state"] == whole["state"]
             assert shown["head"].get("unknown_since") == whole["unknown_since"]
             assert shown["head"].get("ended_at") == whole["ended_at"]
@@ -130,10 +130,10 @@ def long_run(events: int) -> list[RunEvent]:
 @virtual
 async def test_the_pages_of_a_long_film_join_without_a_gap() -> None:
     events = long_run(2 * APART + 10)
-    reels = Reels(await stored(events), at_once)
-    first = await film(reels, "r1", after=0)
-    second = await film(reels, "r1", after=APART + 5)
-    third = await film(reels, "r1", after=2 * APART)
+    keyframe_store = KeyframeStore(await stored(events), at_once)
+    first = await run_replay(keyframe_store, "r1", after=0)
+    second = await run_replay(keyframe_store, "r1", after=APART + 5)
+    third = await run_replay(keyframe_store, "r1", after=2 * APART)
     assert [chapter.after for chapter in first.chapters] == [0, APART, 2 * APART]
     assert (first.after, second.after, third.after) == (0, APART, 2 * APART)
     seqs = [frame.seq for page in (first, second, third) for frame in page.frames]
@@ -147,28 +147,28 @@ async def test_the_pages_of_a_long_film_join_without_a_gap() -> None:
 async def test_keyframes_are_a_cache_that_may_vanish_or_be_of_another_fold() -> None:
     events = long_run(APART + 700)
     ledger = await stored(events)
-    whole = await Reels(ledger, at_once).reel("r1")
+    whole = await KeyframeStore(ledger, at_once).keyframes("r1")
     assert whole.keys[-1].run == replay(events)
     assert ledger.snapshots
-    again = await Reels(ledger, at_once).reel("r1")  # from the cache
+    again = await KeyframeStore(ledger, at_once).keyframes("r1")  # from the cache
     assert again == whole
     other = msgspec.structs.replace(whole, fold=-1)
     await ledger.keep_snapshot("run/r1", whole.keys[-1].seq, msgspec.msgpack.encode(other))
-    assert await Reels(ledger, at_once).reel("r1") == whole
+    assert await KeyframeStore(ledger, at_once).keyframes("r1") == whole
     await ledger.keep_snapshot("run/r1", whole.keys[-1].seq, b"nonsense")
-    assert await Reels(ledger, at_once).reel("r1") == whole
+    assert await KeyframeStore(ledger, at_once).keyframes("r1") == whole
 
 
 @virtual
 async def test_a_reel_that_was_made_early_goes_on_with_the_run() -> None:
     events = long_run(APART + 50)
     ledger = await stored(events[: APART // 2])
-    reels = Reels(ledger, at_once)
-    early = await reels.reel("r1")
+    keyframe_store = KeyframeStore(ledger, at_once)
+    early = await keyframe_store.keyframes("r1")
     assert early.keys[-1].seq == APART // 2
     rest = [Draft(each.kind, "x", encode(each)) for each in events[APART // 2 :]]
     await ledger.append("run/r1", rest)
-    late = await reels.reel("r1")
+    late = await keyframe_store.keyframes("r1")
     assert late.keys[-1].run == replay(events)
     run = replay(events[:1234])
-    assert await reels.at("r1", 1234) == run
+    assert await keyframe_store.at("r1", 1234) == run

@@ -6,8 +6,8 @@ from action_assistant.runner.analysis.causes import (
     ActionFailed,
     Cause,
     EngineRestarted,
-    Foreign,
-    Refused,
+    ForeignCause,
+    RefusalCause,
     Silence,
     Stalled,
     Unended,
@@ -38,13 +38,13 @@ def words(cause: Cause, run: Run) -> str:
             return f"{who} had not reported its end when {_stopper(run)} pressed Stop."
         case EngineRestarted():
             return f"The engine of {run.engine} was restarted; what happened after is unknown."
-        case Foreign():
+        case ForeignCause():
             return _command_in_words(cause)
         case ActionFailed(result=result, quote=quote):
             how = "in error" if result == "error" else "false"
             seen = " (inferred)" if cause.inferred else ""
             return f"{who} ended {how}{seen}" + (f": “{quote}”" if quote else ".")
-        case Refused(quote=quote):
+        case RefusalCause(quote=quote):
             return _refusal_in_words(run.engine, quote)
         case Silence(quote=quote):
             told = f" {quote}" if quote else ""
@@ -69,7 +69,7 @@ def _waits_in_words(cause: Waiting, run: Run, child: str) -> str:
     return f"{child} waits for {parent}, which never reported its end.{end}"
 
 
-def _command_in_words(cause: Foreign) -> str:
+def _command_in_words(cause: ForeignCause) -> str:
     if not cause.graph:
         return cause.quote
     deed: dict[str, str] = {

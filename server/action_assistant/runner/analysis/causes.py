@@ -68,7 +68,7 @@ class EngineRestarted(_Evidence, frozen=True, tag="engine_restarted", tag_field=
     """Another engine stands where the one before was."""
 
 
-class Foreign(_Evidence, frozen=True, tag="foreign", tag_field="kind"):
+class ForeignCause(_Evidence, frozen=True, tag="foreign", tag_field="kind"):
     """Somebody else told the robot something. `ended`: the run was over then, without a Stop from
     here."""
 
@@ -85,7 +85,7 @@ class ActionFailed(_Evidence, frozen=True, tag="action_failed", tag_field="kind"
     inferred: bool
 
 
-class Refused(_Evidence, frozen=True, tag="refused", tag_field="kind"):
+class RefusalCause(_Evidence, frozen=True, tag="refused", tag_field="kind"):
     """Nothing was begun: the runner or the engine said no."""
 
 
@@ -104,9 +104,9 @@ Cause: TypeAlias = (
     | Unended
     | Stalled
     | EngineRestarted
-    | Foreign
+    | ForeignCause
     | ActionFailed
-    | Refused
+    | RefusalCause
     | Silence
     | Warned
 )
@@ -156,7 +156,7 @@ def _commands(run: Run) -> Iterator[Cause]:
         code, _, command = alarm.code.partition("_")
         if code == "foreign":
             beside = command == "other"
-            yield Foreign(
+            yield ForeignCause(
                 at=alarm.at,
                 command="start" if beside else command,
                 graph="" if beside else run.graph_name,
@@ -183,9 +183,9 @@ def _refusals(run: Run, graph: Graph | None) -> Iterator[Cause]:
     lacking = [each for each in run.despite if each.code in _PROBLEMS]
     if line is None or _UNRESOLVED not in line.text or not lacking:
         if run.end == "refused":
-            yield Refused(at=run.ended_at or run.requested_at, quote=run.detail)
+            yield RefusalCause(at=run.ended_at or run.requested_at, quote=run.detail)
         elif line is not None:
-            yield Refused(at=line.at, quote=_first_line(line))
+            yield RefusalCause(at=line.at, quote=_first_line(line))
         return
     for each in lacking:
         name = _name_of(run, each.aid)

@@ -21,7 +21,7 @@ _NOTABLE_US: Final = 500_000  # and this much longer
 Relation: TypeAlias = Literal["same", "result", "only_a", "only_b", "unknown", "end"]
 
 
-class Step(msgspec.Struct, frozen=True, kw_only=True):
+class ComparedVisit(msgspec.Struct, frozen=True, kw_only=True):
     """The `visit`-th visit (from 1) of an action in both runs. `slower` names the run in which it
     took notably longer, whatever of its bounds is true."""
 
@@ -37,13 +37,13 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
 class Parting(msgspec.Struct, frozen=True, kw_only=True):
     """The earliest step in which the runs differ, in a sentence, with what the action said."""
 
-    step: Step
+    step: ComparedVisit
     text: str
     messages_a: list[str]
     messages_b: list[str]
 
 
-class Comparison(msgspec.Struct, frozen=True, kw_only=True):
+class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
     """Run `a` against run `b`. `graph` is the difference of what was sent; `parameters` those of its
     changes that touch the values of actions."""
 
@@ -53,18 +53,18 @@ class Comparison(msgspec.Struct, frozen=True, kw_only=True):
     same_engine: bool
     graph: Difference
     parameters: list[ActionChange]
-    steps: list[Step]
+    steps: list[ComparedVisit]
     left_out: int
     parting: Parting | None
     text: str
 
 
-def compare(a: Run, b: Run, umrf_a: str, umrf_b: str) -> Comparison:
+def compare(a: Run, b: Run, umrf_a: str, umrf_b: str) -> RunComparison:
     """Compare two runs that may be of different graphs. Total."""
     graph = difference((0, _graph(umrf_a)), (0, _graph(umrf_b)))
     steps = sorted(_steps(a, b), key=lambda step: _begun(step, a, b))
     parting = next((_parting(step, a, b) for step in steps if _parts(step)), None)
-    return Comparison(
+    return RunComparison(
         a=views.summary(a),
         b=views.summary(b),
         same_graph=a.digest == b.digest,
@@ -87,13 +87,13 @@ def _graph(umrf: str) -> Graph:
         return Graph(name="")
 
 
-def _steps(a: Run, b: Run) -> Iterator[Step]:
+def _steps(a: Run, b: Run) -> Iterator[ComparedVisit]:
     pairs = _pairs(a, b)
     for name, (left, right) in pairs.items():
         visits_a, visits_b = _visits(left), _visits(right)
         for number in sorted(visits_a.keys() | visits_b.keys()):
             one, other = visits_a.get(number), visits_b.get(number)
-            yield Step(
+            yield ComparedVisit(
                 action=name,
                 aid=(right or left or ActionRun()).aid,
                 visit=number,
@@ -149,7 +149,7 @@ def _longer(one: Visit, other: Visit) -> bool:
     return most is not None and one.least >= max(_SLOWER * most, most + _NOTABLE_US)
 
 
-def _begun(step: Step, a: Run, b: Run) -> tuple[float, str, int]:
+def _begun(step: ComparedVisit, a: Run, b: Run) -> tuple[float, str, int]:
     """When a step had begun, counted from the start of its run; the earlier of the two."""
     moments = [
         (shown.start - views.time(run.started_at or run.requested_at)).total_seconds()
@@ -159,17 +159,17 @@ def _begun(step: Step, a: Run, b: Run) -> tuple[float, str, int]:
     return (min(moments), step.action, step.visit)
 
 
-def _parts(step: Step) -> bool:
+def _parts(step: ComparedVisit) -> bool:
     return step.relation in {"result", "only_a", "only_b"}
 
 
-def _parting(step: Step, a: Run, b: Run) -> Parting:
+def _parting(step: ComparedVisit, a: Run, b: Run) -> Parting:
     said_a, said_b = _said(step, step.a, a), _said(step, step.b, b)
     text = f"{_named(step)}: {_did(step.a, a)}, {_did(step.b, b)}."
     return Parting(step=step, text=text, messages_a=said_a, messages_b=said_b)
 
 
-def _named(step: Step) -> str:
+def _named(step: ComparedVisit) -> str:
     return step.action if step.visit == 1 else f"visit {step.visit} of {step.action}"
 
 
@@ -191,7 +191,7 @@ def _did(shown: views.VisitShown | None, run: Run) -> str:
             return f"{shown.result} {where}"
 
 
-def _said(step: Step, shown: views.VisitShown | None, run: Run) -> list[str]:
+def _said(step: ComparedVisit, shown: views.VisitShown | None, run: Run) -> list[str]:
     """What the action said during that visit, or right after it."""
     action = run.actions.get(step.action)
     if action is None or shown is None:
@@ -209,7 +209,7 @@ def _of_values(change: ActionChange) -> bool:
     return any(field.field.startswith(("in/", "out/")) for field in change.fields)
 
 
-def _verdict(a: Run, b: Run, steps: list[Step], parting: Parting | None) -> str:
+def _verdict(a: Run, b: Run, steps: list[ComparedVisit], parting: Parting | None) -> str:
     if parting is not None:
         same = steps.index(parting.step)
         lead = "From the first step on they differ" if not same else f"{_count(same)} alike; then"

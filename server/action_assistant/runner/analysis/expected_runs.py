@@ -54,7 +54,7 @@ class Recorded(msgspec.Struct, frozen=True):
     doubts: list[Doubt]
 
 
-class Step(msgspec.Struct, frozen=True):
+class ExpectedStep(msgspec.Struct, frozen=True):
     """One step of a course: `what` happened to `node` (empty: the graph), and how."""
 
     graph: str
@@ -76,7 +76,7 @@ class Expected(msgspec.Struct, frozen=True, kw_only=True):
     graph_name: str
     umrf: str
     script: str
-    course: tuple[Step, ...]
+    course: tuple[ExpectedStep, ...]
 
 
 class Retired(msgspec.Struct, frozen=True):
@@ -93,8 +93,8 @@ class Departure(msgspec.Struct, frozen=True):
     """The first step in which a course is another one. None where a course has ended."""
 
     place: int
-    expected: Step | None
-    found: Step | None
+    expected: ExpectedStep | None
+    found: ExpectedStep | None
 
 
 def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
@@ -184,30 +184,30 @@ def _failing(how: Fault) -> dict[str, Any]:
             return {"after_s": 0.1, "result": f"on_{how}"}
 
 
-def course(graph: Graph, script: Script) -> tuple[Step, ...]:
+def course(graph: Graph, script: Script) -> tuple[ExpectedStep, ...]:
     """What happens when this graph runs under this script, without times. Deterministic."""
     traces = simulate(graph, script=script, facts=SIMULATED, until_ms=_DAY_MS, max_events=_MOST)
     return tuple(step for trace in traces if (step := _step(trace)) is not None)
 
 
-def _step(trace: Trace) -> Step | None:
+def _step(trace: Trace) -> ExpectedStep | None:
     match trace:
         case NodeResult():
-            return Step(trace.graph, trace.node, "result", trace.result)
+            return ExpectedStep(trace.graph, trace.node, "result", trace.result)
         case Dispatch():
-            return Step(trace.graph, trace.node, "runs", trace.response)
+            return ExpectedStep(trace.graph, trace.node, "runs", trace.response)
         case GraphResult():
-            return Step(trace.graph, "", "ends", trace.value)
+            return ExpectedStep(trace.graph, "", "ends", trace.value)
         case GraphState():
-            return Step(trace.graph, "", "state", trace.state)
+            return ExpectedStep(trace.graph, "", "state", trace.state)
         case Hazard(code=code):  # that it was cut off is no part of what was expected before
             is_cut = code == CUT_OFF
-            return None if is_cut else Step(trace.graph, trace.node or "", "hazard", code)
+            return None if is_cut else ExpectedStep(trace.graph, trace.node or "", "hazard", code)
         case _:
             return None
 
 
-def departure(expected: Sequence[Step], found: Sequence[Step]) -> Departure | None:
+def departure(expected: Sequence[ExpectedStep], found: Sequence[ExpectedStep]) -> Departure | None:
     """Where the second course first differs from the first; None when they are the same."""
     for place in range(max(len(expected), len(found))):
         one = expected[place] if place < len(expected) else None

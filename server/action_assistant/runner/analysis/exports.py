@@ -51,7 +51,7 @@ _LOG: Final = msgspec.json.encode(
 _INFO, _ERROR = 2, 4  # levels of foxglove.Log
 
 
-class Line(msgspec.Struct, frozen=True):
+class EventLine(msgspec.Struct, frozen=True):
     """One stored event on a line of its own."""
 
     run: str
@@ -66,7 +66,7 @@ def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
     """JSON lines: every event as it is stored."""
     for each in events:
         at = views.time(each.at).isoformat().replace("+00:00", "Z")
-        line = Line(run, each.seq, each.kind, each.author, at, msgspec.Raw(each.body))
+        line = EventLine(run, each.seq, each.kind, each.author, at, msgspec.Raw(each.body))
         yield msgspec.json.encode(line) + b"\n"
 
 

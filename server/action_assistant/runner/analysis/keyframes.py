@@ -55,7 +55,7 @@ class Keyframe(msgspec.Struct, frozen=True):
     run: Run
 
 
-class Mark(msgspec.Struct, frozen=True):
+class ReplayMark(msgspec.Struct, frozen=True):
     """An event that shows nothing of the engine: a wish, a message sent, a silence, a proof, an
     alarm. `at` and `since` are microseconds UTC; `by` is a person's name."""
 
@@ -67,13 +67,13 @@ class Mark(msgspec.Struct, frozen=True):
     since: int | None = None
 
 
-class Reel(msgspec.Struct, frozen=True):
+class RunKeyframes(msgspec.Struct, frozen=True):
     """Keyframes in order; the last one is the newest that was folded. `marks`: the first
     `MARKS` of the run."""
 
     fold: int
     keys: tuple[Keyframe, ...]
-    marks: tuple[Mark, ...] = ()
+    marks: tuple[ReplayMark, ...] = ()
 
     def before(self, seq: int) -> Keyframe | None:
         """The last keyframe at or before `seq`."""
@@ -86,7 +86,7 @@ class Reel(msgspec.Struct, frozen=True):
         return self.keys[place - 1] if place else None
 
 
-class Archive(Ledger, Protocol):
+class SnapshotJournal(Ledger, Protocol):
     """A ledger that also keeps what a stream adds up to."""
 
     async def snapshot(self, stream: str) -> Snapshot | None:
@@ -98,16 +98,16 @@ class Archive(Ledger, Protocol):
         ...
 
 
-class Reels:
+class KeyframeStore:
     """The reels of all runs."""
 
-    def __init__(self, ledger: Archive, aside: Aside) -> None:
+    def __init__(self, ledger: SnapshotJournal, aside: Aside) -> None:
         self.aside = aside
         self._ledger = ledger
-        self._known: OrderedDict[str, Reel] = OrderedDict()
+        self._known: OrderedDict[str, RunKeyframes] = OrderedDict()
         self._asking: dict[str, asyncio.Lock] = {}
 
-    async def reel(self, run: str) -> Reel:
+    async def keyframes(self, run: str) -> RunKeyframes:
         """The keyframes of a run, up to its newest event. Raises NotFound, Unavailable."""
         lock = self._asking.setdefault(run, asyncio.Lock())
         async with lock:
@@ -119,7 +119,7 @@ class Reels:
         """The run as its first `seq` events tell it. Raises NotFound, BadInput."""
         if seq < 1:
             raise BadInput("A run begins with its first event.", where={"path": "/seq"})
-        key = (await self.reel(run)).before(seq)
+        key = (await self.keyframes(run)).before(seq)
         if key is not None and key.seq == seq:
             return key.run
         events = await self._ledger.read(stream_of(run), after=key.seq if key else 0, upto=seq)
@@ -127,7 +127,7 @@ class Reels:
 
     async def seq_at(self, run: str, at: int) -> int:
         """The first event by which this moment had come. Raises NotFound, Unavailable."""
-        key = (await self.reel(run)).until(at - 1)
+        key = (await self.keyframes(run)).until(at - 1)
         events = await self.page(run, key.seq if key else 0)
 
         def found() -> int:
@@ -142,14 +142,14 @@ class Reels:
         """Events of one page, those with `seq > after`."""
         return await self._ledger.read(stream_of(run), after=after, limit=APART)
 
-    async def _wound(self, run: str) -> Reel:
+    async def _wound(self, run: str) -> RunKeyframes:
         stream = stream_of(run)
         newest = await self._ledger.newest(stream)
         if not newest:
             raise NotFound("There is no such run.")
-        reel = self._known.get(run) or await self._kept(stream)
-        keys = list(reel.keys) if reel is not None else []
-        marks = list(reel.marks) if reel is not None else []
+        keyframes = self._known.get(run) or await self._kept(stream)
+        keys = list(keyframes.keys) if keyframes is not None else []
+        marks = list(keyframes.marks) if keyframes is not None else []
         had = keys[-1].seq if keys else 0
         while not keys or keys[-1].seq < newest:
             last = keys[-1] if keys else None
@@ -165,31 +165,33 @@ class Reels:
             keys.append(key)
         if not keys:
             raise NotFound("There is no such run.")
-        found = Reel(FOLD, tuple(keys), tuple(marks[:MARKS]))
+        found = RunKeyframes(FOLD, tuple(keys), tuple(marks[:MARKS]))
         self._remember(run, found)
         if keys[-1].run.end is not None and keys[-1].seq > max(had, _WORTH):
             await self._keep(stream, found)
         return found
 
-    async def _kept(self, stream: str) -> Reel | None:
+    async def _kept(self, stream: str) -> RunKeyframes | None:
         kept = await self._ledger.snapshot(stream)
         if kept is None:
             return None
         try:
-            reel = await self.aside(lambda: msgspec.msgpack.decode(kept.state, type=Reel))
+            keyframes = await self.aside(
+                lambda: msgspec.msgpack.decode(kept.state, type=RunKeyframes)
+            )
         except msgspec.DecodeError:
             return None
-        return reel if reel.fold == FOLD and reel.keys else None
+        return keyframes if keyframes.fold == FOLD and keyframes.keys else None
 
-    async def _keep(self, stream: str, reel: Reel) -> None:
-        state = await self.aside(lambda: msgspec.msgpack.encode(reel))
+    async def _keep(self, stream: str, keyframes: RunKeyframes) -> None:
+        state = await self.aside(lambda: msgspec.msgpack.encode(keyframes))
         try:
-            await self._ledger.keep_snapshot(stream, reel.keys[-1].seq, state)
+            await self._ledger.keep_snapshot(stream, keyframes.keys[-1].seq, state)
         except Refused:
             return  # a cache: it is made again when the journal can be written
 
-    def _remember(self, run: str, reel: Reel) -> None:
-        self._known[run] = reel
+    def _remember(self, run: str, keyframes: RunKeyframes) -> None:
+        self._known[run] = keyframes
         self._known.move_to_end(run)
         while len(self._known) > _KEPT:
             self._known.popitem(last=False)
@@ -213,16 +215,18 @@ def fold(
     return run
 
 
-def marks_of(events: Sequence[Event]) -> list[Mark]:
+def marks_of(events: Sequence[Event]) -> list[ReplayMark]:
     """The marks among these events."""
-    marks: list[Mark] = []
+    marks: list[ReplayMark] = []
     for event in events:
         if event.kind == Observed.kind:
             continue
         told = decode(event.kind, event.body)
         by, text = words(told)
         since = told.since if isinstance(told, Silent) else None
-        marks.append(Mark(event.seq, getattr(told, "at", event.at), event.kind, by, text, since))
+        marks.append(
+            ReplayMark(event.seq, getattr(told, "at", event.at), event.kind, by, text, since)
+        )
     return marks
 
 

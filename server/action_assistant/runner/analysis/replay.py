@@ -11,7 +11,7 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.analysis.keyframes import APART, Mark, Reels, fold, words
+from action_assistant.runner.analysis.keyframes import APART, KeyframeStore, ReplayMark, fold, words
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import RunEvent
 from action_assistant.runner.runs.run import Run
@@ -41,7 +41,7 @@ class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
     aid: str | None = None
 
 
-class Frame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+class ReplayFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """One event: `head` has the fields of the run that changed, `actions` those that did."""
 
     seq: int
@@ -72,7 +72,7 @@ class MarkShown(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     since: datetime | None = None
 
 
-class Film(msgspec.Struct, frozen=True, kw_only=True):
+class RunReplay(msgspec.Struct, frozen=True, kw_only=True):
     """A page of a run's film. `base` is the run after `after` events, null at the very beginning;
     `newest` is the last event there is."""
 
@@ -80,35 +80,35 @@ class Film(msgspec.Struct, frozen=True, kw_only=True):
     after: int
     newest: int
     base: views.RunShown | None
-    frames: list[Frame]
+    frames: list[ReplayFrame]
     chapters: list[Chapter]
     marks: list[MarkShown]
 
 
-async def film(reels: Reels, run: str, *, after: int) -> Film:
+async def run_replay(keyframe_store: KeyframeStore, run: str, *, after: int) -> RunReplay:
     """The page that begins after `after` events, which is rounded down to a keyframe of the run.
 
     Raises NotFound, Unavailable.
     """
-    reel = await reels.reel(run)
+    keyframes = await keyframe_store.keyframes(run)
     start = after - after % APART
-    base = reel.before(start) if start else None
-    events = await reels.page(run, base.seq if base else 0)
-    frames = await reels.aside(lambda: _frames(base.run if base else None, events))
-    chapters = [Chapter(0, views.time(reel.keys[0].run.requested_at))]
-    chapters += [Chapter(key.seq, views.time(key.at)) for key in reel.keys[:-1]]
-    return Film(
+    base = keyframes.before(start) if start else None
+    events = await keyframe_store.page(run, base.seq if base else 0)
+    frames = await keyframe_store.aside(lambda: _frames(base.run if base else None, events))
+    chapters = [Chapter(0, views.time(keyframes.keys[0].run.requested_at))]
+    chapters += [Chapter(key.seq, views.time(key.at)) for key in keyframes.keys[:-1]]
+    return RunReplay(
         run=run,
         after=base.seq if base else 0,
-        newest=reel.keys[-1].seq,
+        newest=keyframes.keys[-1].seq,
         base=views.shown(base.run) if base else None,
         frames=frames,
         chapters=chapters,
-        marks=[_shown(mark) for mark in reel.marks],
+        marks=[_shown(mark) for mark in keyframes.marks],
     )
 
 
-def _shown(mark: Mark) -> MarkShown:
+def _shown(mark: ReplayMark) -> MarkShown:
     return MarkShown(
         seq=mark.seq,
         at=views.time(mark.at),
@@ -119,8 +119,8 @@ def _shown(mark: Mark) -> MarkShown:
     )
 
 
-def _frames(run: Run | None, events: Sequence[Event]) -> list[Frame]:
-    frames: list[Frame] = []
+def _frames(run: Run | None, events: Sequence[Event]) -> list[ReplayFrame]:
+    frames: list[ReplayFrame] = []
     at = 0
 
     def see(event: Event, told: RunEvent, before: Run | None, after: Run) -> None:
@@ -132,11 +132,11 @@ def _frames(run: Run | None, events: Sequence[Event]) -> list[Frame]:
     return frames
 
 
-def frame(event: Event, told: RunEvent, before: Run | None, after: Run, at: int) -> Frame:
+def frame(event: Event, told: RunEvent, before: Run | None, after: Run, at: int) -> ReplayFrame:
     """What one event changed."""
     by, text = words(told)
     old = before.alarms if before is not None else ()
-    return Frame(
+    return ReplayFrame(
         seq=event.seq,
         at=views.time(at),
         kind=event.kind,

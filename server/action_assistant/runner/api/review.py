@@ -14,13 +14,13 @@ from litestar.types import ControllerRouterHandler
 from action_assistant import paths
 from action_assistant.errors import BadInput
 from action_assistant.runner.analysis import annotations, expected_runs
-from action_assistant.runner.analysis.comparison import Comparison
-from action_assistant.runner.analysis.replay import Film
+from action_assistant.runner.analysis.comparison import RunComparison
+from action_assistant.runner.analysis.replay import RunReplay
 from action_assistant.runner.analysis.statistics import Statistics
 from action_assistant.runner.api.caller import LARGE, author_of, body_of
 from action_assistant.runner.api.openapi import FitOperation
 from action_assistant.runner.archives import examples
-from action_assistant.runner.archives.raw_messages import Raw
+from action_assistant.runner.archives.raw_messages import RawMessages
 from action_assistant.runner.archives.retention import Retention, Swept
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.review.service import (
@@ -96,8 +96,8 @@ def _archiving(services: ReviewServices) -> ControllerRouterHandler:
 
 def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
     @get("/api/runs/{run:str}/film", summary="What every event of a run changed, a page at a time")
-    async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Response[Film]:
-        return json_of(await services.asked.text(ReviewService.film, run, after), Film)
+    async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Response[RunReplay]:
+        return json_of(await services.asked.text(ReviewService.replay, run, after), RunReplay)
 
     @get("/api/runs/{run:str}/causes", summary="What is proven to be behind the end of a run")
     async def found_causes(run: str) -> Response[list[CauseShown]]:
@@ -150,12 +150,12 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
         return Response(content, media_type=_TYPES[form], headers=head)
 
     @get("/api/runs/{run:str}/raw", summary="Where the raw messages from the time of a run are")
-    async def raw(run: str) -> Response[Raw]:
+    async def raw(run: str) -> Response[RawMessages]:
         found = await services.control.find(run)
         kept = services.control.robots.recordings
         here = [] if found.simulated or kept is None else await kept.listed(found.engine)
         text = await services.asked.text(ReviewService.raw, run, here, time.time_ns() // 1000)
-        return json_of(text, Raw)
+        return json_of(text, RawMessages)
 
     return [film, found_causes, umrf, marks, mark, script, fit, export, raw]
 
@@ -168,8 +168,8 @@ async def _lines(asked: WorkerQueries, run: str, seq: int, page: bytes) -> Async
 
 def _of_many(services: ReviewServices) -> list[ControllerRouterHandler]:
     @get("/api/comparison", summary="Two runs side by side, and where they part")
-    async def comparison(a: str, b: str) -> Response[Comparison]:
-        return json_of(await services.asked.text(ReviewService.compare, a, b), Comparison)
+    async def comparison(a: str, b: str) -> Response[RunComparison]:
+        return json_of(await services.asked.text(ReviewService.compare, a, b), RunComparison)
 
     @get("/api/statistics", summary="The newest runs of a graph together")
     async def statistics(

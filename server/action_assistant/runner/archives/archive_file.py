@@ -49,7 +49,7 @@ class Title(msgspec.Struct, frozen=True, kw_only=True):
         return Head(self.events, bytes.fromhex(self.chain))
 
 
-class _Line(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+class _ArchiveLine(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     seq: int
     kind: str
     author: str
@@ -63,7 +63,7 @@ class _Foot(msgspec.Struct, frozen=True):
     sha256: str
 
 
-class Bundle:
+class ArchiveFile:
     """A bundle that is being written. Whatever interrupts it leaves nothing under its name."""
 
     def __init__(self, path: Path, stream: str, place: str, end: Head) -> None:
@@ -138,7 +138,7 @@ def read(path: Path) -> Iterator[Event]:
                     _check(not file.read(1), path, "something follows its end")
                     return
                 digest.update(text)
-                event = _event(title.stream, msgspec.json.decode(text, type=_Line))
+                event = _event(title.stream, msgspec.json.decode(text, type=_ArchiveLine))
                 _check(event.seq == number, path, f"event {number} is missing")
                 seen = Head(number, link(seen.chain, event))
                 yield event
@@ -202,7 +202,7 @@ def _check(holds: bool, path: Path, why: str) -> None:
         raise Damaged(f"{path.name} is damaged: {why}.")
 
 
-def _line(event: Event) -> _Line:
+def _line(event: Event) -> _ArchiveLine:
     body, base64 = msgspec.Raw(event.body), None
     try:
         msgspec.json.decode(event.body, type=msgspec.Raw)
@@ -211,7 +211,7 @@ def _line(event: Event) -> _Line:
         is_line = False
     if not is_line:
         body, base64 = msgspec.Raw(b"null"), b64encode(event.body).decode()
-    return _Line(
+    return _ArchiveLine(
         seq=event.seq,
         kind=event.kind,
         author=event.author,
@@ -222,6 +222,6 @@ def _line(event: Event) -> _Line:
     )
 
 
-def _event(stream: str, line: _Line) -> Event:
+def _event(stream: str, line: _ArchiveLine) -> Event:
     body = b64decode(line.base64) if line.base64 is not None else bytes(line.body)
     return Event(stream, line.seq, line.kind, line.author, line.at, body, line.position)

@@ -12,7 +12,7 @@ from action_assistant.errors import Refused
 from action_assistant.journal.chain import Head
 from action_assistant.journal.events import Addition, Draft, Event, Snapshot
 from action_assistant.journal.removal import Removed
-from action_assistant.runner.analysis.keyframes import Archive
+from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.runs import views
 from action_assistant.schema.runner_tables import run
@@ -28,7 +28,7 @@ class Archived(Refused):
     status = 410
 
 
-class Journaled(Archive, Protocol):
+class Journaled(SnapshotJournal, Protocol):
     """The journal itself."""
 
     async def end(self, stream: str) -> Head:
@@ -44,11 +44,11 @@ class Journaled(Archive, Protocol):
         ...
 
 
-class Shelf:
+class ArchiveStore:
     """Reads a run from its archive in `folder` once it stands there. Everything else is the
     journal's."""
 
-    def __init__(self, journal: Archive, folder: Path, aside: Aside) -> None:
+    def __init__(self, journal: SnapshotJournal, folder: Path, aside: Aside) -> None:
         self.folder = folder
         self._journal = journal
         self._aside = aside

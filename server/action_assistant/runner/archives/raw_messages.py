@@ -39,7 +39,7 @@ class RawHour(msgspec.Struct, frozen=True):
     file: str | None = None
 
 
-class Raw(msgspec.Struct, frozen=True):
+class RawMessages(msgspec.Struct, frozen=True):
     """The raw messages of `robot` from the hours of a run, the oldest first. `text`: what there is to
     say about it."""
 
@@ -48,10 +48,10 @@ class Raw(msgspec.Struct, frozen=True):
     text: str
 
 
-def raw_of(run: Run, here: Sequence[Recording], gone: Iterable[RawPut], until: int) -> Raw:
+def raw_of(run: Run, here: Sequence[Recording], gone: Iterable[RawPut], until: int) -> RawMessages:
     """What there is. `here` and `gone` are of its robot, `here` of its time alone."""
     if run.simulated:
-        return Raw(run.engine, [], "A simulated engine sends no messages.")
+        return RawMessages(run.engine, [], "A simulated engine sends no messages.")
     first, last = hours(run.started_at or run.requested_at, until)
     found = {
         put.name: RawHour(put.name, put.bytes, views.time(put.at), put.file)
@@ -60,7 +60,7 @@ def raw_of(run: Run, here: Sequence[Recording], gone: Iterable[RawPut], until: i
     }
     found |= {each.name: RawHour(each.name, each.bytes) for each in here}
     listed = [found[name] for name in sorted(found)]
-    return Raw(run.engine, listed, _text(listed))
+    return RawMessages(run.engine, listed, _text(listed))
 
 
 def _text(found: Sequence[RawHour]) -> str:

@@ -118,7 +118,7 @@ class Retention:
         end = await self._journal.end(stream)
         place = _place(row)
         path = self.keep.folder / place
-        written = await self._aside(lambda: archive_file.Bundle(path, stream, place, end))
+        written = await self._aside(lambda: archive_file.ArchiveFile(path, stream, place, end))
         try:
             after = 0
             while events := await self._journal.read(stream, after=after, limit=_PAGE):

@@ -15,12 +15,12 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
 from action_assistant.runner.analysis.cause_texts import words
 from action_assistant.runner.analysis.causes import causes
-from action_assistant.runner.analysis.comparison import Comparison, compare
-from action_assistant.runner.analysis.keyframes import Reels
-from action_assistant.runner.analysis.replay import Film, film
+from action_assistant.runner.analysis.comparison import RunComparison, compare
+from action_assistant.runner.analysis.keyframes import KeyframeStore
+from action_assistant.runner.analysis.replay import RunReplay, run_replay
 from action_assistant.runner.archives import examples
-from action_assistant.runner.archives.archive_store import Archived, Shelf
-from action_assistant.runner.archives.raw_messages import Raw, RawPut, raw_of, stream_of_raw
+from action_assistant.runner.archives.archive_store import Archived, ArchiveStore
+from action_assistant.runner.archives.raw_messages import RawMessages, RawPut, raw_of, stream_of_raw
 from action_assistant.runner.clock import Clock
 from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
@@ -69,7 +69,7 @@ class Expectation(msgspec.Struct, frozen=True, kw_only=True):
     author: Author
     umrf: msgspec.Raw
     script: msgspec.Raw
-    course: list[expected_runs.Step]
+    course: list[expected_runs.ExpectedStep]
 
 
 class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
@@ -131,12 +131,12 @@ class ReviewService:
     def __init__(
         self,
         control: OngoingRuns,
-        ledger: Shelf,
+        ledger: ArchiveStore,
         aside: Aside,
         wall: Clock,
         asked: ReviewQueries | None = None,
     ) -> None:
-        self.reels = Reels(ledger, aside)
+        self.keyframe_store = KeyframeStore(ledger, aside)
         self._asked = asked
         self._control = control
         self._ledger = ledger
@@ -209,7 +209,7 @@ class ReviewService:
 
     async def summed(self, run_id: str, now: int) -> annotations.SummedUp:
         """The sum of a run that is over. Raises NotFound."""
-        found = (await self.reels.reel(run_id)).keys[-1].run
+        found = (await self.keyframe_store.keyframes(run_id)).keys[-1].run
         good = found.end == "finished" and found.result == "on_true"
         graph = None if good else await self._graph(run_id)  # only failures have causes
         return await self._aside(lambda: annotations.sum_of(found, graph, now))
@@ -223,13 +223,17 @@ class ReviewService:
     async def followed(self, run_id: str, robots_too: bool) -> tuple[Run, int]:
         """A run and the seq of its last event; with few visits unless it has to go on exactly.
         Raises NotFound."""
-        key = (await self.reels.reel(run_id)).keys[-1]
+        key = (await self.keyframe_store.keyframes(run_id)).keys[-1]
         return (key.run if robots_too else views.thinned(key.run)), key.seq
 
     async def known(self, run_id: str) -> Run:
         """A run, open or over. Raises NotFound."""
         opened = self._control.open.get(run_id)
-        return opened.run if opened is not None else (await self.reels.reel(run_id)).keys[-1].run
+        return (
+            opened.run
+            if opened is not None
+            else (await self.keyframe_store.keyframes(run_id)).keys[-1].run
+        )
 
     # --- one run ------------------------------------------------------------------------------
 
@@ -245,7 +249,7 @@ class ReviewService:
                     kind=str(each.__struct_config__.tag),
                     text=words(each, found),
                     at=views.time(each.at),
-                    seq=await self.reels.seq_at(run_id, each.at),
+                    seq=await self.keyframe_store.seq_at(run_id, each.at),
                     action=each.action,
                     aid=action.aid if action is not None else None,
                     quote=each.quote,
@@ -269,7 +273,7 @@ class ReviewService:
         """Where the events of a run are, when they are in an archive."""
         return await self._ledger.place(stream_of(run_id))
 
-    async def raw(self, run_id: str, recordings: Sequence[Recording], now: int) -> Raw:
+    async def raw(self, run_id: str, recordings: Sequence[Recording], now: int) -> RawMessages:
         """The raw messages of its robot from its time; `recordings` are all of it that are here.
         Raises NotFound."""
         run_ = await self.known(run_id)
@@ -284,9 +288,9 @@ class ReviewService:
         gone = (msgspec.json.decode(event.body, type=RawPut) for event in told)
         return raw_of(run_, here, gone, until)
 
-    async def film(self, run_id: str, after: int) -> Film:
+    async def replay(self, run_id: str, after: int) -> RunReplay:
         """A page of the run's film. Raises NotFound."""
-        return await film(self.reels, run_id, after=after)
+        return await run_replay(self.keyframe_store, run_id, after=after)
 
     async def umrf(self, run_id: str) -> bytes:
         """The graph as it was sent. Raises NotFound."""
@@ -308,7 +312,7 @@ class ReviewService:
         pinned, note = (rows[0].pinned, rows[0].note) if rows else (False, "")
         return RunMarks(bool(pinned), note, [row.label for row in labels])
 
-    async def compare(self, a: str, b: str) -> Comparison:
+    async def compare(self, a: str, b: str) -> RunComparison:
         """Two runs side by side. Raises NotFound."""
         one, other = await self.known(a), await self.known(b)
         umrf_a = await self._control.history.umrf(a)
@@ -450,7 +454,7 @@ class ReviewService:
         await self._ledger.append(expected_runs.STREAM, [draft])
 
 
-def _check_alike(found: Run, course: tuple[expected_runs.Step, ...]) -> None:
+def _check_alike(found: Run, course: tuple[expected_runs.ExpectedStep, ...]) -> None:
     """A run that the simulator cannot repeat is no expectation: it would fail by itself."""
     simulated: dict[str, list[str]] = {}
     for step in course:

@@ -18,8 +18,8 @@ from litestar import MediaType, Response
 from action_assistant.errors import Refused, Unavailable
 from action_assistant.journal.events import Draft, Snapshot
 from action_assistant.journal.reader import FileReader
-from action_assistant.runner.analysis.keyframes import Archive
-from action_assistant.runner.archives.archive_store import Shelf
+from action_assistant.runner.analysis.keyframes import SnapshotJournal
+from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.review.service import OngoingRun, ReviewService
 from action_assistant.runner.runs.history import History, Ledger
 from action_assistant.runner.runs.recorder import stream_of
@@ -47,7 +47,7 @@ class StoragePaths(msgspec.Struct, frozen=True):
 class WorkerQueries:
     """Asks a worker. `opened` are the runs that go on, once that is known."""
 
-    def __init__(self, aside: Aside, place: StoragePaths, ledger: Archive) -> None:
+    def __init__(self, aside: Aside, place: StoragePaths, ledger: SnapshotJournal) -> None:
         self.opened: Mapping[str, OngoingRun] = {}
         self._aside = aside
         self._place = place
@@ -131,8 +131,8 @@ async def _asked(
 @lru_cache(maxsize=1)
 def _reading(place: StoragePaths) -> "tuple[ReviewService, _ReadOnlyJournal]":
     file = _ReadOnlyJournal(place.database)
-    shelf = Shelf(file, place.archive, _here)
-    return ReviewService(_NoOngoingRuns(shelf), shelf, _here, _no_clock), file
+    archive_store = ArchiveStore(file, place.archive, _here)
+    return ReviewService(_NoOngoingRuns(archive_store), archive_store, _here, _no_clock), file
 
 
 async def _here(work: Callable[..., T], *args: Any) -> T:
