@@ -28,8 +28,8 @@ from rclpy.context import Context
 from temoto_msgs.msg import UmrfGraphFeedback, UmrfGraphStart, UmrfGraphStop
 
 from action_assistant.errors import Refused
-from action_assistant.runner.emulator.messages import Quirks
-from action_assistant.runner.emulator.node import StandInNode
+from action_assistant.runner.emulator.messages import EngineTraits
+from action_assistant.runner.emulator.node import EmulatorNode
 from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
@@ -106,8 +106,8 @@ class Story:
         self.chance = random.Random(seed)
         self.domain = domain
         self.script = self.chance.choice(SCRIPTS)
-        self.quirks = Quirks(loading_ms=self.chance.choice([1.0, 60.0, 400.0]))
-        self.robots: list[tuple[StandInNode, ExitStack]] = []
+        self.quirks = EngineTraits(loading_ms=self.chance.choice([1.0, 60.0, 400.0]))
+        self.robots: list[tuple[EmulatorNode, ExitStack]] = []
         self.false: list[str] = []
         self.judged: set[str] = set()
         self.still: set[str] = set()

@@ -24,7 +24,7 @@ pytest.importorskip(
 
 from websockets.sync.client import connect
 
-from action_assistant.runner.emulator.messages import Line, Said
+from action_assistant.runner.emulator.messages import LogMessage, Said
 from ros.robots import robot
 from runner.process import body
 from runner.world import order, sequence
@@ -44,7 +44,7 @@ class Robot:
 
     def told(self, said: Said) -> None:
         """Something that he says."""
-        if isinstance(said, Line) and said.text.startswith("Received request to stop"):
+        if isinstance(said, LogMessage) and said.text.startswith("Received request to stop"):
             self.heard.append(time.time_ns())
 
 

@@ -10,13 +10,13 @@ from typing import Any
 
 import anyio
 
-from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import (
     NODE,
-    Answer,
-    Feedback,
+    FeedbackMessage,
+    GetResponse,
     Gone,
-    Line,
+    LogMessage,
     Message,
     Modify,
     Pause,
@@ -48,7 +48,7 @@ def now() -> float:
     return asyncio.get_running_loop().time()
 
 
-def run_of(robot: StandIn, graph: str) -> str:
+def run_of(robot: EmulatedEngine, graph: str) -> str:
     """The run that the graph of this running name is marked with now; "" for none of ours."""
     plan = robot._view.plans.get(graph.partition("__")[0])
     marks = list(plan.attributes.values()) if plan is not None else []
@@ -58,7 +58,7 @@ def run_of(robot: StandIn, graph: str) -> str:
 class Node:
     """An engine node in the air: a stand-in and what discovery knows of it."""
 
-    def __init__(self, air: "Air", robot: StandIn, path: str, lag_s: float) -> None:
+    def __init__(self, air: "Air", robot: EmulatedEngine, path: str, lag_s: float) -> None:
         air.born += 1
         self.air = air
         self.robot = robot
@@ -168,13 +168,15 @@ class Air:
         self.sent: list[tuple[float, Message]] = []
         self.delivered: list[tuple[float, Message]] = []
         self._ears = Ears[Sound]()
-        self._asked: dict[int, tuple[anyio.Event, list[Answer]]] = {}
+        self._asked: dict[int, tuple[anyio.Event, list[GetResponse]]] = {}
         self._tickets = 0
         self._handles: set[asyncio.TimerHandle] = set()
 
     # --- nodes --------------------------------------------------------------------------------
 
-    def join(self, robot: StandIn, path: str = "/umrf_graph_get", lag_s: float = 0.0) -> Node:
+    def join(
+        self, robot: EmulatedEngine, path: str = "/umrf_graph_get", lag_s: float = 0.0
+    ) -> Node:
         """A node comes up."""
         node = Node(self, robot, path, lag_s)
         self.nodes.append(node)
@@ -216,18 +218,18 @@ class Air:
 
     def _hear(self, node: Node, said: object) -> None:
         match said:
-            case Answer(ticket=ticket):
+            case GetResponse(ticket=ticket):
                 if ticket in self._asked:
                     event, got = self._asked[ticket]
                     self._later(self.chance.random() * self.old_s, lambda: _put(event, got, said))
-            case Feedback(actor=actor, history=history):
+            case FeedbackMessage(actor=actor, history=history):
                 late = self.chance.random() * self.feedback_s
                 self._shown_at = max(self._shown_at, now() + late)  # one after the other
                 if late:
                     self._at(self._shown_at, self.show, actor, history)
                 else:
                     self.show(actor, history)
-            case Line(text=text):
+            case LogMessage(text=text):
                 self.tell(LogLine(NODE, text))
             case Gone():
                 node.unseen_at = min(node.unseen_at, now())
@@ -289,7 +291,7 @@ class Air:
         """The first answer of whoever serves a path."""
         asked_at = wall()
         self._tickets += 1
-        ticket, event, got = self._tickets, anyio.Event(), list[Answer]()
+        ticket, event, got = self._tickets, anyio.Event(), list[GetResponse]()
         self._asked[ticket] = event, got
         for node in self.nodes:
             if node.path == path and self.chance.random() >= self.loss.get("get", 0.0):
@@ -337,6 +339,6 @@ class Air:
         return self._ears.listening(ear)
 
 
-def _put(event: anyio.Event, got: list[Answer], answer: Answer) -> None:
+def _put(event: anyio.Event, got: list[GetResponse], answer: GetResponse) -> None:
     got.append(answer)
     event.set()

@@ -5,8 +5,8 @@ from typing import Any
 import anyio
 import msgspec
 
-from action_assistant.runner.emulator.engine import StandIn
-from action_assistant.runner.emulator.messages import Quirks, index_of
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, index_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, EXIT, Conditions, Graph, Relation
@@ -73,11 +73,11 @@ async def _lived(graph: Graph, script: dict[str, Any], air: Air, stop: float | N
     place.air.chance.seed(air.seed)
     place.air.loss["get"] = air.get_loss
     place.air.old_s, place.air.feedback_s = air.old_s, air.feedback_s
-    robot = StandIn(
+    robot = EmulatedEngine(
         "Robin",
         script=script_from({"behaviours": script}),
         index=index_of([], []),
-        quirks=Quirks(loss=air.loss),
+        quirks=EngineTraits(loss=air.loss),
         seed=air.seed,
         born_ms=now_ms(),
         epoch_ms=world.EPOCH // 1000,

@@ -17,8 +17,8 @@ import msgspec
 
 from action_assistant.paths import examples
 from action_assistant.runner.archives import examples as recorded_runs
-from action_assistant.runner.emulator.engine import StandIn
-from action_assistant.runner.emulator.messages import Quirks, Start, index_of
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, Start, index_of
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.events import Author, Override
@@ -99,11 +99,11 @@ class Stage:
 
     def robot(self) -> Node:
         """The engine comes up."""
-        robot = StandIn(
+        robot = EmulatedEngine(
             ROBOT,
             script=self.script,
             index=self.index,
-            quirks=Quirks(loss=0.0),
+            quirks=EngineTraits(loss=0.0),
             born_ms=now_ms(),
             epoch_ms=world.EPOCH // 1000,
         )

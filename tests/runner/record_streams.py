@@ -19,8 +19,8 @@ import anyio
 import msgspec
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.emulator.engine import StandIn
-from action_assistant.runner.emulator.messages import Quirks, Start, index_of
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, Start, index_of
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs import views
@@ -58,11 +58,11 @@ class Place:
 
     def robot(self, name: str) -> None:
         """An engine comes up."""
-        engine = StandIn(
+        engine = EmulatedEngine(
             name,
             script=self.script,
             index=index_of([], []),
-            quirks=Quirks(loss=0.2),
+            quirks=EngineTraits(loss=0.2),
             born_ms=now_ms(),
             epoch_ms=world.EPOCH // 1000,
         )

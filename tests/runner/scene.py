@@ -7,8 +7,8 @@ from typing import Any
 
 import anyio
 
-from action_assistant.runner.emulator.engine import StandIn
-from action_assistant.runner.emulator.messages import Quirks, Start
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, Start
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs import views
 from action_assistant.umrf.semantics import script_from
@@ -32,7 +32,7 @@ class Scene:
         self,
         seed: int,
         *names: str,
-        quirks: Quirks = Quirks(),  # noqa: B008 - frozen
+        quirks: EngineTraits = EngineTraits(),  # noqa: B008 - frozen
         script: dict[str, Any] = SCRIPT,
     ) -> None:
         self.chance = random.Random(seed)
@@ -47,7 +47,7 @@ class Scene:
 
     def robot(self, name: str) -> Node:
         """An engine comes up."""
-        stand_in = StandIn(
+        stand_in = EmulatedEngine(
             name,
             script=script_from({"behaviours": self.script}),
             quirks=self.quirks,

@@ -18,8 +18,8 @@ import anyio
 import pytest
 
 from action_assistant.errors import Refused
-from action_assistant.runner.emulator.engine import StandIn
-from action_assistant.runner.emulator.messages import Pause, Quirks, Start, Stop
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, Pause, Start, Stop
 from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
@@ -124,7 +124,7 @@ class Story:
         self.seed = seed
         self.air = Air(self.chance)
         self.script = script_from({"behaviours": self.chance.choice(SCRIPTS)})
-        self.quirks = Quirks(loading_ms=self.chance.choice(LOADING_MS))
+        self.quirks = EngineTraits(loading_ms=self.chance.choice(LOADING_MS))
         self.world = World({NAME: link(self.air)})
         self.false: list[str] = []
         self.still: dict[str, float] = {}
@@ -137,7 +137,7 @@ class Story:
 
     def robot(self, name: str = NAME) -> Node:
         """One more engine comes up."""
-        robot = StandIn(
+        robot = EmulatedEngine(
             name,
             script=self.script,
             quirks=self.quirks,

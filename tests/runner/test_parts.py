@@ -6,7 +6,7 @@ import anyio
 import msgspec
 import pytest
 
-from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import index_of
 from action_assistant.runner.execution.sub_graphs import SubGraphs
 from action_assistant.runner.links.observations import Snapshot
@@ -34,7 +34,7 @@ class WithSub(Scene):
 
     def robot(self, name: str) -> Node:
         """An engine comes up."""
-        stand_in = StandIn(
+        stand_in = EmulatedEngine(
             name,
             index=index_of([], [codec.write(self.sub)]),
             script=script_from({"behaviours": self.script}),

@@ -7,8 +7,8 @@ import anyio
 import msgspec
 import pytest
 
-from action_assistant.runner.emulator.engine import StandIn
-from action_assistant.runner.emulator.messages import Index, Quirks, Start
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EmulatedIndex, EngineTraits, Start
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.refusals import StartLog, why_refused
@@ -29,9 +29,9 @@ class Knowing(Scene):
 
     def robot(self, name: str) -> Node:
         """An engine comes up."""
-        stand_in = StandIn(
+        stand_in = EmulatedEngine(
             name,
-            index=Index(actions={"Wave": Signature()}),
+            index=EmulatedIndex(actions={"Wave": Signature()}),
             script=script_from({"behaviours": self.script}),
             quirks=self.quirks,
             seed=self.chance.getrandbits(32),
@@ -116,7 +116,7 @@ async def test_a_broken_graph_that_stays_in_the_engine_is_refused_with_the_words
 @virtual
 async def test_without_a_word_an_engine_that_does_not_show_the_run_has_refused_nothing() -> None:
     """The start may still be under way: unknown, and Stop stays."""
-    scene = Knowing(5, quirks=Quirks(narrates=False))
+    scene = Knowing(5, quirks=EngineTraits(narrates=False))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run
         await anyio.sleep(20)

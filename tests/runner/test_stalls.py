@@ -114,9 +114,9 @@ async def test_a_run_in_which_something_moves_raises_no_such_alarm() -> None:
 
 @virtual
 async def test_a_pause_between_two_actions_is_no_standstill() -> None:
-    from action_assistant.runner.emulator.messages import Quirks
+    from action_assistant.runner.emulator.messages import EngineTraits
 
-    scene = Scene(4, quirks=Quirks(loading_ms=3_000.0), script=QUICK)
+    scene = Scene(4, quirks=EngineTraits(loading_ms=3_000.0), script=QUICK)
     async with scene.played() as control:
         run = (await control.start(asked(sequence("patrol", 3)), ANN)).run.id
         assert await ended(control, run) == "finished"

@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import (
-    Answer,
-    Feedback,
+    EngineTraits,
+    FeedbackMessage,
+    GetResponse,
     Gone,
-    Line,
+    LogMessage,
     Modify,
     Pause,
-    Quirks,
     Resume,
     Said,
     Start,
@@ -32,12 +32,16 @@ from runner.world import sequence
 
 WORK = json.dumps({"name": "Work", "type": "sync", "instance_id": 0})
 ENDLESS = {"*": [{"never": True}]}
-CALM = Quirks(loss=0.0)
+CALM = EngineTraits(loss=0.0)
 DAVID = ("David",)
 
 
-def robot(script: dict[str, Any] | None = None, quirks: Quirks = CALM, **more: Any) -> StandIn:
-    return StandIn("David", script=script_from({"behaviours": script or {}}), quirks=quirks, **more)
+def robot(
+    script: dict[str, Any] | None = None, quirks: EngineTraits = CALM, **more: Any
+) -> EmulatedEngine:
+    return EmulatedEngine(
+        "David", script=script_from({"behaviours": script or {}}), quirks=quirks, **more
+    )
 
 
 def start(graph: Graph | str, targets: tuple[str, ...] = DAVID, run: str = "r1") -> Start:
@@ -48,18 +52,18 @@ def start(graph: Graph | str, targets: tuple[str, ...] = DAVID, run: str = "r1")
 
 
 def told(said: Iterable[Said]) -> list[str]:
-    return [each.text for each in said if isinstance(each, Line)]
+    return [each.text for each in said if isinstance(each, LogMessage)]
 
 
 def answers(said: Iterable[Said]) -> dict[int, dict[str, Any]]:
     return {
         each.ticket: {json.loads(text)["graph_name"]: json.loads(text) for text in each.running}
         for each in said
-        if isinstance(each, Answer)
+        if isinstance(each, GetResponse)
     }
 
 
-def asked(david: StandIn, at: float) -> dict[str, Any]:
+def asked(david: EmulatedEngine, at: float) -> dict[str, Any]:
     david.ask(99, at)
     return answers(david.advance(at + 2))[99]
 
@@ -73,7 +77,7 @@ def history(said: Iterable[Said]) -> list[tuple[str, dict[str, str]]]:
     return [
         (json.loads(text)["graph_state"], states(json.loads(text)))
         for each in said
-        if isinstance(each, Feedback)
+        if isinstance(each, FeedbackMessage)
         for text in reversed(each.history)
     ]
 
@@ -92,7 +96,7 @@ def test_the_newest_command_of_a_topic_wins_and_the_lost_one_leaves_no_trace() -
 
 
 def test_with_deeper_topics_nothing_is_overwritten() -> None:
-    david = robot(ENDLESS, Quirks(loss=0.0, depth=0))
+    david = robot(ENDLESS, EngineTraits(loss=0.0, depth=0))
     for name in ("one", "two", "three"):
         david.hear(start(sequence(name)), 0)
     david.advance(10)
@@ -113,7 +117,7 @@ def test_it_is_deaf_while_an_action_does_not_stop_and_then_answers_everything_at
     shown = answers(said)
     assert sorted(shown) == [0, 1, 2, 3]
     assert all(each["patrol"]["graph_state"] == "ERROR" for each in shown.values())
-    times = [each.at_ms for each in said if isinstance(each, Answer)]
+    times = [each.at_ms for each in said if isinstance(each, GetResponse)]
     assert max(times) - min(times) < 5
 
 
@@ -128,7 +132,7 @@ def test_a_start_of_a_running_graph_stops_it_and_only_the_log_says_so() -> None:
 
 
 def test_without_that_it_is_only_refused() -> None:
-    david = robot(ENDLESS, Quirks(loss=0.0, restart_stops=False))
+    david = robot(ENDLESS, EngineTraits(loss=0.0, restart_stops=False))
     david.hear(start(sequence("patrol")), 0)
     david.hear(start(sequence("patrol")), 1000)
     assert any("already active" in line for line in told(david.advance(2000)))
@@ -138,7 +142,7 @@ def test_without_that_it_is_only_refused() -> None:
 def test_feedback_comes_twice_a_second_newest_first_and_only_when_there_is_any() -> None:
     david = robot({"*": [{"after_s": 0.3}]}, born_ms=0)
     david.hear(start(sequence("patrol", 2)), 1210)
-    batches = [each for each in david.advance(10_000) if isinstance(each, Feedback)]
+    batches = [each for each in david.advance(10_000) if isinstance(each, FeedbackMessage)]
     assert [each.at_ms for each in batches] == [1500, 2000]
     assert history(batches[:1]) == [("RUNNING", {"Work_0": "RUNNING", "Work_1": "UNINITIALIZED"})]
     assert history(batches[1:]) == [
@@ -150,9 +154,9 @@ def test_feedback_comes_twice_a_second_newest_first_and_only_when_there_is_any()
 
 
 def test_the_ring_keeps_the_newest_snapshots() -> None:
-    david = robot({"*": [{"after_s": 0.01}]}, Quirks(loss=0.0, ring=3, loading_ms=0.1))
+    david = robot({"*": [{"after_s": 0.01}]}, EngineTraits(loss=0.0, ring=3, loading_ms=0.1))
     david.hear(start(sequence("patrol", 20)), 0)
-    (batch,) = [each for each in david.advance(600) if isinstance(each, Feedback)]
+    (batch,) = [each for each in david.advance(600) if isinstance(each, FeedbackMessage)]
     assert len(batch.history) == 3
     assert json.loads(batch.history[0])["graph_state"] == "FINISHED"
 
@@ -160,7 +164,7 @@ def test_the_ring_keeps_the_newest_snapshots() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_snapshots_get_lost_at_random_but_the_same_way_for_the_same_seed(seed: int) -> None:
     def lived() -> list[tuple[str, dict[str, str]]]:
-        david = robot({"*": [{"after_s": 0.1}]}, Quirks(loss=0.5), seed=seed)
+        david = robot({"*": [{"after_s": 0.1}]}, EngineTraits(loss=0.5), seed=seed)
         david.hear(start(sequence("patrol", 30)), 0)
         return history(david.advance(20_000))
 
@@ -190,7 +194,7 @@ def test_pausing_and_resuming_bring_no_feedback() -> None:
 
 def test_graphs_that_have_ended_are_listed_unless_that_is_switched_off() -> None:
     for keeps in (True, False):
-        david = robot({"*": [{"after_s": 0.1}]}, Quirks(loss=0.0, keeps_ended=keeps))
+        david = robot({"*": [{"after_s": 0.1}]}, EngineTraits(loss=0.0, keeps_ended=keeps))
         david.hear(start(sequence("patrol")), 0)
         david.advance(2000)
         assert ("patrol" in asked(david, 2000)) == keeps
@@ -211,10 +215,10 @@ def test_graphs_that_have_ended_are_listed_unless_that_is_switched_off() -> None
 def test_refusals_are_known_to_the_log_only(message: Start, words: str) -> None:
     index = index_of([WORK.replace("Work", "Other")], [])
     for narrates in (True, False):
-        david = robot(ENDLESS, Quirks(loss=0.0, narrates=narrates), index=index)
+        david = robot(ENDLESS, EngineTraits(loss=0.0, narrates=narrates), index=index)
         david.hear(message, 0)
         said = david.advance(3000)
-        assert not [each for each in said if not isinstance(each, Line)]
+        assert not [each for each in said if not isinstance(each, LogMessage)]
         assert any(words in line for line in told(said)) == narrates
         assert asked(david, 3000) == {}
 
@@ -222,7 +226,9 @@ def test_refusals_are_known_to_the_log_only(message: Start, words: str) -> None:
 def test_what_it_shows_is_what_the_engine_gives_back_and_carries_the_identity_of_the_run() -> None:
     sent = sequence("patrol")
     for drops in (True, False):
-        david = robot(ENDLESS, Quirks(loss=0.0, drops_fields=drops), index=index_of([WORK], []))
+        david = robot(
+            ENDLESS, EngineTraits(loss=0.0, drops_fields=drops), index=index_of([WORK], [])
+        )
         david.hear(start(sent), 0)
         shown = asked(david, 100)["patrol"]
         back = codec.read(json.dumps(shown)).graph
@@ -246,15 +252,15 @@ def test_sub_graphs_come_from_its_index_and_are_named_after_their_node() -> None
 
 def test_it_answers_to_its_wake_words_and_the_first_extra_one_becomes_its_name() -> None:
     for quirk, actor in ((True, "all"), (False, "David")):
-        quirks = Quirks(loss=0.0, extra_is_actor=quirk)
+        quirks = EngineTraits(loss=0.0, extra_is_actor=quirk)
         david = robot(ENDLESS, quirks, extra_wake_words=("all", "kitchen"))
         david.hear(start(sequence("patrol"), targets=("kitchen",)), 0)
-        (batch, *_) = [each for each in david.advance(600) if isinstance(each, Feedback)]
+        (batch, *_) = [each for each in david.advance(600) if isinstance(each, FeedbackMessage)]
         assert batch.actor == actor
 
 
 def test_a_stop_passes_by_an_action_that_is_just_being_loaded() -> None:
-    david = robot(ENDLESS, Quirks(loss=0.0, loading_ms=400))
+    david = robot(ENDLESS, EngineTraits(loss=0.0, loading_ms=400))
     david.hear(start(sequence("patrol")), 0)
     david.hear(Stop(graph_name="patrol", targets=DAVID), 100)
     david.advance(200)

@@ -14,16 +14,16 @@ from typing import Any
 
 import pytest
 
-from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import (
-    Answer,
-    Feedback,
-    Index,
-    Line,
+    EmulatedIndex,
+    EngineTraits,
+    FeedbackMessage,
+    GetResponse,
+    LogMessage,
     Message,
     Modify,
     Pause,
-    Quirks,
     Resume,
     Said,
     Start,
@@ -63,7 +63,7 @@ def recordings(shared: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def index(recordings: Path) -> Index:
+def index(recordings: Path) -> EmulatedIndex:
     """What the recorded engine had indexed: the only recording with the texts is the first."""
     for line in (recordings / "seq3.jsonl").read_text().splitlines():
         told = json.loads(line)
@@ -100,7 +100,7 @@ def behaviours(graph: dict[str, Any]) -> Iterator[tuple[str, list[dict[str, Any]
 class Replay:
     """One recording, and the stand-in that was given the same."""
 
-    def __init__(self, file: Path, index: Index) -> None:
+    def __init__(self, file: Path, index: EmulatedIndex) -> None:
         self.lines = [json.loads(line) for line in file.read_text().splitlines()]
         self.folder, self.name = file.parent, file.name.removesuffix(".jsonl")
         self.index = index
@@ -115,15 +115,15 @@ class Replay:
         self.robot = self._robot(-720.0)
         self._live()
 
-    def _robot(self, born_ms: float) -> StandIn:
+    def _robot(self, born_ms: float) -> EmulatedEngine:
         shown = (each for each in self.lines if each["kind"] == "feedback")
         # its feedback keeps time from its start on, which shows in the first message after it
         phase = next((each["t_ms"] for each in shown if each["t_ms"] > born_ms), born_ms)
-        robot = StandIn(
+        robot = EmulatedEngine(
             "David",
             index=self.index,
             script=self.script,
-            quirks=Quirks(loss=0.0, loading_ms=LOADING_MS.get(self.name, 3.0)),
+            quirks=EngineTraits(loss=0.0, loading_ms=LOADING_MS.get(self.name, 3.0)),
             born_ms=born_ms,
         )
         robot._tick = phase % 500 - 1000
@@ -204,7 +204,7 @@ class Replay:
         self.said += self.robot.advance(at)
 
 
-def _graph_of(name: str, index: Index) -> dict[str, Any]:
+def _graph_of(name: str, index: EmulatedIndex) -> dict[str, Any]:
     graph = index.graphs[name].graph
     return {
         "graph_name": name,
@@ -234,7 +234,7 @@ def log_lines(lines: Iterator[tuple[float, str]]) -> list[tuple[str, float]]:
 
 
 @pytest.fixture(params=[f"{name}{run}" for name in NAMES for run in ("", ".2")])
-def replay(request: pytest.FixtureRequest, recordings: Path, index: Index) -> Replay:
+def replay(request: pytest.FixtureRequest, recordings: Path, index: EmulatedIndex) -> Replay:
     return Replay(recordings / f"{request.param}.jsonl", index)
 
 
@@ -242,14 +242,16 @@ def test_the_log_says_the_same_lines_at_the_same_times(replay: Replay) -> None:
     recorded = log_lines(
         (line["t_ms"], line["msg"]) for line in replay.lines if line["kind"] == "rosout"
     )
-    said = log_lines((each.at_ms, each.text) for each in replay.said if isinstance(each, Line))
+    said = log_lines(
+        (each.at_ms, each.text) for each in replay.said if isinstance(each, LogMessage)
+    )
     assert [text for text, _ in said] == [text for text, _ in recorded]
     for (text, at), (_, at_there) in zip(said, recorded, strict=True):
         assert abs(at - at_there) < SLACK_MS, text
 
 
 def test_each_get_shows_what_the_real_one_showed_or_is_not_answered_either(replay: Replay) -> None:
-    answers = {each.ticket: each for each in replay.said if isinstance(each, Answer)}
+    answers = {each.ticket: each for each in replay.said if isinstance(each, GetResponse)}
     shown: list[str] = []
     for line in replay.lines:
         if line["kind"] not in {"get", "get_extra_reply"}:
@@ -288,7 +290,7 @@ def test_the_snapshots_that_came_are_among_those_that_the_stand_in_sends_in_the_
             [
                 [json.loads(text) for text in each.history]
                 for each in replay.said
-                if isinstance(each, Feedback)
+                if isinstance(each, FeedbackMessage)
             ],
         )
     )
@@ -301,6 +303,6 @@ def test_the_snapshots_that_came_are_among_those_that_the_stand_in_sends_in_the_
 
 def test_feedback_keeps_its_own_time(replay: Replay) -> None:
     recorded = [line["t_ms"] for line in replay.lines if line["kind"] == "feedback"]
-    ticks = [each.at_ms for each in replay.said if isinstance(each, Feedback)]
+    ticks = [each.at_ms for each in replay.said if isinstance(each, FeedbackMessage)]
     for at in recorded:
         assert any(abs((at - tick + 250) % 500 - 250) < 40 for tick in ticks), (at, ticks)

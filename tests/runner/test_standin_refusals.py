@@ -11,14 +11,14 @@ from typing import Any
 
 import pytest
 
-from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import (
-    Answer,
-    Feedback,
+    EngineTraits,
+    FeedbackMessage,
+    GetResponse,
     Gone,
-    Line,
+    LogMessage,
     Modify,
-    Quirks,
     Start,
     Stop,
     index_of,
@@ -60,7 +60,9 @@ class Life:
 
     def __init__(self, script: Mapping[str, Any] | None = None) -> None:
         behaviours = script_from({"behaviours": {**SCRIPT, **(script or {})}})
-        self.node = StandIn("David", index=INDEX, script=behaviours, quirks=Quirks(loss=0.0))
+        self.node = EmulatedEngine(
+            "David", index=INDEX, script=behaviours, quirks=EngineTraits(loss=0.0)
+        )
         self.at = 0.0
         self.alive = True
         self.lines: list[str] = []
@@ -95,11 +97,11 @@ class Life:
         self.at += wait
         for said in self.node.advance(self.at):
             match said:
-                case Line(text=text) if "Received" not in text:
+                case LogMessage(text=text) if "Received" not in text:
                     self.lines.append(text)
-                case Feedback(history=history):
+                case FeedbackMessage(history=history):
                     self.shown += [json.loads(text)["graph_state"] for text in history]
-                case Answer(running=running):
+                case GetResponse(running=running):
                     graphs = [json.loads(text) for text in running]
                     self.held = {
                         each["graph_name"]: (

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from action_assistant.errors import Conflict, Refused
-from action_assistant.runner.emulator.messages import Quirks, Start, index_of
+from action_assistant.runner.emulator.messages import EngineTraits, Start, index_of
 from action_assistant.runner.links.port import Order
 from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.facts import PINNED
@@ -51,7 +51,7 @@ class Indexed(Scene):
 
 
 def scene() -> Indexed:
-    return Indexed(1, quirks=Quirks(loss=0.0), script={"*": [{"after_s": 0.2}]})
+    return Indexed(1, quirks=EngineTraits(loss=0.0), script={"*": [{"after_s": 0.2}]})
 
 
 async def run(control: Any, graph: Graph) -> str:
@@ -119,7 +119,9 @@ async def test_a_name_that_somebody_else_has_used_is_held_as_well() -> None:
 
 @virtual
 async def test_nothing_of_a_group_starts_when_one_of_its_engines_would_not_survive() -> None:
-    air = Indexed(1, "David", "Carol", quirks=Quirks(loss=0.0), script={"*": [{"after_s": 0.2}]})
+    air = Indexed(
+        1, "David", "Carol", quirks=EngineTraits(loss=0.0), script={"*": [{"after_s": 0.2}]}
+    )
     async with air.played() as control:
         assert await run(control, nested()) == "finished"
         with pytest.raises(Conflict, match=r"David: .*does not look up Inner_0"):

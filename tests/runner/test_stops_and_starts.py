@@ -14,7 +14,7 @@ import anyio
 import pytest
 
 from action_assistant.errors import Refused
-from action_assistant.runner.emulator.messages import Message, Quirks, Start, Stop
+from action_assistant.runner.emulator.messages import EngineTraits, Message, Start, Stop
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.files import codec
@@ -160,7 +160,7 @@ async def test_a_killed_engine_is_shown_as_unknown_and_its_stop_as_unconfirmed()
 async def test_an_action_that_begins_after_the_stop_keeps_the_run_from_being_called_stopped() -> (
     None
 ):
-    scene = Scene(7, quirks=Quirks(loading_ms=700.0))
+    scene = Scene(7, quirks=EngineTraits(loading_ms=700.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await anyio.sleep(0.3)

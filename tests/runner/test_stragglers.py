@@ -9,7 +9,7 @@ from typing import Any
 
 import anyio
 
-from action_assistant.runner.emulator.messages import Quirks
+from action_assistant.runner.emulator.messages import EngineTraits
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Ended, MovesAgain, Proof, StopSent
@@ -17,7 +17,7 @@ from runner.air import now_ms
 from runner.scene import Scene, asked, shown
 from runner.world import ANN, BEN, until, virtual
 
-SLOW = Quirks(loading_ms=3_000.0)
+SLOW = EngineTraits(loading_ms=3_000.0)
 TWO_SECONDS = {"*": [{"after_s": 2.0}]}
 
 
@@ -69,7 +69,7 @@ async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
 
 @virtual
 async def test_answers_show_it_where_all_feedback_is_lost() -> None:
-    here = scene(quirks=Quirks(loading_ms=3_000.0, loss=1.0))
+    here = scene(quirks=EngineTraits(loading_ms=3_000.0, loss=1.0))
     async with here.played() as control:
         run = await proven_stopped(control)
         await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
@@ -157,7 +157,7 @@ async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_o
 
 @virtual
 async def test_feedback_that_an_answer_contradicts_opens_nothing() -> None:
-    here = scene(quirks=Quirks(), script={"*": [{"never": True}]})
+    here = scene(quirks=EngineTraits(), script={"*": [{"never": True}]})
     async with here.played() as control:
         run = await proven_stopped(control)
         _made_up(here)
@@ -167,7 +167,7 @@ async def test_feedback_that_an_answer_contradicts_opens_nothing() -> None:
 
 @virtual
 async def test_feedback_that_nobody_can_contradict_is_believed_until_somebody_does() -> None:
-    here = scene(quirks=Quirks(), script={"*": [{"never": True}]})
+    here = scene(quirks=EngineTraits(), script={"*": [{"never": True}]})
     async with here.played() as control:
         run = await proven_stopped(control)
         here.nodes["David"].robot.freeze(now_ms())
@@ -182,7 +182,7 @@ async def test_feedback_that_nobody_can_contradict_is_believed_until_somebody_do
 
 @virtual
 async def test_a_start_of_ours_that_somebody_plays_again_is_theirs() -> None:
-    here = scene(quirks=Quirks(), script={"*": [{"never": True}]})
+    here = scene(quirks=EngineTraits(), script={"*": [{"never": True}]})
     async with here.played() as control:
         run = await proven_stopped(control)
         here.air.carry(here.starts()[0], "bag")

@@ -6,8 +6,8 @@ import anyio
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from action_assistant.runner.emulator.engine import StandIn
-from action_assistant.runner.emulator.messages import Quirks, index_of
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, index_of
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import Feedback, Report
 from action_assistant.runner.runs import views
@@ -61,11 +61,11 @@ async def lived(calls: list[dict[str, Any]], loss: float, seed: int, stop: float
     witness = Witness(place)
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(place.air.blow)
-        robot = StandIn(
+        robot = EmulatedEngine(
             "Robin",
             script=place.script,
             index=index_of([], []),
-            quirks=Quirks(loss=loss),
+            quirks=EngineTraits(loss=loss),
             seed=seed,
             born_ms=now_ms(),
             epoch_ms=world.EPOCH // 1000,

@@ -4,7 +4,7 @@ that it concerns. In virtual time."""
 import anyio
 import msgspec
 
-from action_assistant.runner.emulator.messages import Quirks, Start
+from action_assistant.runner.emulator.messages import EngineTraits, Start
 from action_assistant.runner.links.port import Answer, Feedback, Order
 from action_assistant.umrf.files import codec
 from runner.fleet import Open
@@ -57,7 +57,7 @@ async def test_an_answer_from_before_the_start_ends_no_run_that_was_shown_meanwh
 async def test_each_run_that_is_open_on_a_robot_hears_what_others_start_there() -> None:
     scene = Scene(
         11,
-        quirks=Quirks(loading_ms=3_000.0),
+        quirks=EngineTraits(loading_ms=3_000.0),
         script={"*": [{"after_s": 20.0, "ignores_stop": True}]},
     )
     async with scene.played() as control:

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound
-from action_assistant.runner.emulator.messages import Quirks, Start, Stop
+from action_assistant.runner.emulator.messages import EngineTraits, Start, Stop
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.engine_process import EngineProcess, has_ended, process
@@ -48,7 +48,7 @@ THROWS: dict[str, Any] = {"*": [{"after_s": 60, "ignores_stop": True, "stop_erro
 @asynccontextmanager
 async def stopped(script: dict[str, Any]) -> AsyncIterator[tuple[Scene, ExecutionService, str]]:
     """A run that somebody wants stopped, 8 seconds later."""
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = Scene(5, script=script, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -109,7 +109,7 @@ def _listed() -> Any:
 
 @virtual
 async def test_the_block_outlives_the_runner_the_engine_and_what_strangers_start() -> None:
-    scene = Scene(5, script=STUBBORN, quirks=Quirks(loss=0.0))
+    scene = Scene(5, script=STUBBORN, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -153,7 +153,9 @@ async def test_after_that_the_engine_s_own_error_of_this_run_stands_in_nobody_s_
 async def test_an_action_that_had_thrown_by_itself_does_not_keep_a_confirmed_run_in_doubt() -> None:
     thrower = {"patrol/Work_0": [{"after_s": 1, "result": "on_error"}]}
     stubborn = {"patrol/Work_1": [{"never": True, "ignores_stop": True}]}
-    scene = Scene(5, script=thrower | stubborn | {"*": [{"after_s": 1}]}, quirks=Quirks(loss=0.0))
+    scene = Scene(
+        5, script=thrower | stubborn | {"*": [{"after_s": 1}]}, quirks=EngineTraits(loss=0.0)
+    )
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: "Work_1" in control.open[run].run.active)
@@ -167,7 +169,9 @@ async def test_an_action_that_had_thrown_by_itself_does_not_keep_a_confirmed_run
 
 @virtual
 async def test_what_a_stranger_s_graph_left_blocks_a_start_until_somebody_answers_for_it() -> None:
-    scene = Scene(5, script=STUBBORN | {"patrol/Work_0": [{"after_s": 1}]}, quirks=Quirks(loss=0.0))
+    scene = Scene(
+        5, script=STUBBORN | {"patrol/Work_0": [{"after_s": 1}]}, quirks=EngineTraits(loss=0.0)
+    )
     async with scene.played() as control:
         text = codec.write(sequence("other"))
         scene.air.carry(Start(graph_name="other", targets=("David",), graph_json=text), "terminal")
@@ -183,7 +187,7 @@ async def test_what_a_stranger_s_graph_left_blocks_a_start_until_somebody_answer
 
 @virtual
 async def test_a_stranger_s_stop_that_is_not_obeyed_leaves_the_run_unknown() -> None:
-    scene = Scene(5, script=STUBBORN, quirks=Quirks(loss=0.0))
+    scene = Scene(5, script=STUBBORN, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -209,7 +213,7 @@ async def test_a_stop_inside_the_graph_that_is_not_obeyed_is_no_end_either() -> 
     )
     graph = msgspec.structs.replace(graph, relations=(*graph.relations, arrow))
     script = {"Work_0": [{"after_s": 2}], "Work_1": [{"after_s": 30, "ignores_stop": True}]}
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = Scene(5, script=script, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         over = Override(codes=("H3", "H4", "H8", "H12"), reason="practice")
         run = (await control.start(order(graph, engine="David", override=over), ANN)).run.id
@@ -222,7 +226,7 @@ async def test_a_stop_inside_the_graph_that_is_not_obeyed_is_no_end_either() -> 
 @virtual
 async def test_an_action_that_threw_by_itself_is_over() -> None:
     script = {"Work_0": [{"after_s": 1, "result": "on_error"}], "*": [{"after_s": 2}]}
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = Scene(5, script=script, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: run not in control.open)
@@ -402,7 +406,7 @@ async def test_who_saw_rest_while_the_engine_was_silent_did_not_see_the_error_th
     None
 ):
     script = {"patrol/Work_0": [{"never": True, "ignores_stop": True}], "*": [{"after_s": 1}]}
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = Scene(5, script=script, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -428,7 +432,7 @@ async def test_a_start_that_was_played_again_while_nobody_listened_is_not_what_s
 ):
     late, stubborn = {"never": True, "stop_s": 40.0}, {"never": True, "ignores_stop": True}
     script = {"patrol/Work_0": [late, stubborn], "*": [{"after_s": 1}]}
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = Scene(5, script=script, quirks=EngineTraits(loss=0.0))
     async with anyio.create_task_group() as wind:
         wind.start_soon(scene.air.blow)
         async with scene.world.runner() as control:
@@ -454,7 +458,7 @@ async def test_a_start_that_was_played_again_while_nobody_listened_is_not_what_s
 @virtual
 async def test_a_run_that_moves_again_is_stopped_at_once_however_vain_stops_had_become() -> None:
     script = {"patrol/Work_0": [{"never": True, "stop_s": 110.0}, {"never": True}]}
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = Scene(5, script=script, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -470,7 +474,7 @@ async def test_a_run_that_moves_again_is_stopped_at_once_however_vain_stops_had_
 
 @virtual
 async def test_a_run_of_which_an_event_cannot_be_read_still_holds_its_robot() -> None:
-    scene = Scene(5, script=STUBBORN, quirks=Quirks(loss=0.0))
+    scene = Scene(5, script=STUBBORN, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -502,7 +506,7 @@ async def test_a_run_that_moves_again_while_a_start_is_looked_at_stands_in_its_w
 
     monkeypatch.setattr(KnownEngine, "index", index)
     for wait in range(0, 30, 3):
-        quirks = Quirks(loading_ms=3_000.0, loss=0.0)
+        quirks = EngineTraits(loading_ms=3_000.0, loss=0.0)
         scene = Scene(11, quirks=quirks, script={"*": [{"after_s": 20.0}]})
         async with scene.played() as control:
             run = (await control.start(asked(), ANN)).run.id
@@ -518,7 +522,7 @@ async def test_a_run_that_moves_again_while_a_start_is_looked_at_stands_in_its_w
 
 @virtual
 async def test_a_mark_of_a_run_that_is_not_here_is_asked_for_once() -> None:
-    scene = Scene(11, quirks=Quirks(loss=0.0), script={"*": [{"never": True}]})
+    scene = Scene(11, quirks=EngineTraits(loss=0.0), script={"*": [{"never": True}]})
     asked_for: list[str] = []
 
     async def past(run: str, _: bool) -> Any:

@@ -12,8 +12,15 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.runner.emulator.engine import StandIn
-from action_assistant.runner.emulator.messages import Gone, Index, Line, Quirks, Said, index_of
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import (
+    EmulatedIndex,
+    EngineTraits,
+    Gone,
+    LogMessage,
+    Said,
+    index_of,
+)
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.facts import PINNED, facts_for
 from action_assistant.umrf.semantics import Script, script_from
@@ -58,7 +65,9 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
 
 
 def _known() -> str:
-    return ", ".join(f"{name}={value}" for name, value in msgspec.structs.asdict(Quirks()).items())
+    return ", ".join(
+        f"{name}={value}" for name, value in msgspec.structs.asdict(EngineTraits()).items()
+    )
 
 
 def _domain(text: str) -> int:
@@ -72,7 +81,7 @@ def _quirk(text: str) -> tuple[str, Any]:
     name, _, value = text.partition("=")
     said = {"on": True, "off": False}.get(value)
     found: tuple[str, Any] = name, json.loads(value) if said is None else said
-    msgspec.convert(dict([found]), Quirks)
+    msgspec.convert(dict([found]), EngineTraits)
     return found
 
 
@@ -81,16 +90,16 @@ def _simulate_robot(options: argparse.Namespace) -> int:
 
     if missing := why_not():
         raise CannotStart(missing)
-    from action_assistant.runner.emulator.node import StandInNode
+    from action_assistant.runner.emulator.node import EmulatorNode
 
     facts = facts_for(options.facts) if options.facts else PINNED
-    quirks = msgspec.convert(dict(options.quirk), Quirks)
+    quirks = msgspec.convert(dict(options.quirk), EngineTraits)
     script, index = _script(options.script), _index(options.actions)
     extra = tuple(word for word in options.wake_words.split(",") if word)
     domain = int(os.environ.get("ROS_DOMAIN_ID", "0")) if options.domain is None else options.domain
 
-    def robot(epoch_ms: int) -> StandIn:
-        return StandIn(
+    def robot(epoch_ms: int) -> EmulatedEngine:
+        return EmulatedEngine(
             options.name,
             index=index,
             script=script,
@@ -102,7 +111,7 @@ def _simulate_robot(options: argparse.Namespace) -> int:
         )
 
     try:
-        node = StandInNode(
+        node = EmulatorNode(
             robot, domain=domain, facts=facts, namespace=options.namespace, told=_tell
         )
     except RuntimeError as error:
@@ -117,7 +126,7 @@ def _simulate_robot(options: argparse.Namespace) -> int:
 
 def _tell(said: Said) -> None:
     match said:
-        case Line(at_ms=at, text=text):
+        case LogMessage(at_ms=at, text=text):
             print(f"{at / 1000:10.3f} s  {one_line(text.rstrip())}", flush=True)
         case Gone(why=why):
             print(f"The engine has ended: {why}.", file=sys.stderr, flush=True)
@@ -134,9 +143,9 @@ def _script(path: Path | None) -> Script:
         raise CannotStart(f"{path} is no script: {error}.") from error
 
 
-def _index(folder: Path | None) -> Index:
+def _index(folder: Path | None) -> EmulatedIndex:
     if folder is None:
-        return Index()
+        return EmulatedIndex()
     if not folder.is_dir():
         raise CannotStart(f"There is no folder {folder}.")
     return index_of(_texts(folder, "umrf.json"), _texts(folder, "graph.json"))

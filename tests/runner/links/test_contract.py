@@ -7,7 +7,7 @@ from typing import Any
 import anyio
 import pytest
 
-from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import Stop
 from action_assistant.runner.links.observations import NodeState, Snapshot
 from action_assistant.runner.links.port import (
@@ -66,7 +66,7 @@ async def simulator() -> AsyncIterator[Link]:
 async def stand_in() -> AsyncIterator[Link]:
     """A stand-in robot, over messages that take their time and with all of its quirks."""
     air = Air()
-    air.join(StandIn("David", script=script_from({"behaviours": SCRIPT}), born_ms=now_ms()))
+    air.join(EmulatedEngine("David", script=script_from({"behaviours": SCRIPT}), born_ms=now_ms()))
     async with blowing(air), alive(AirLink(air, "David")) as link:
         await anyio.sleep(0.1)
         yield link

@@ -17,15 +17,15 @@ from typing import Final, TypeAlias, assert_never
 
 from action_assistant.runner.emulator.messages import (
     TOPICS,
-    Answer,
-    Feedback,
+    EmulatedIndex,
+    EngineTraits,
+    FeedbackMessage,
+    GetResponse,
     Gone,
-    Index,
-    Line,
+    LogMessage,
     Message,
     Modify,
     Pause,
-    Quirks,
     Refusal,
     Resume,
     Said,
@@ -33,11 +33,11 @@ from action_assistant.runner.emulator.messages import (
     Stop,
     active,
     asked_for,
-    plan_of,
+    graph_plan_of,
     refusal,
     unknown,
 )
-from action_assistant.runner.emulator.view import View
+from action_assistant.runner.emulator.view import PublishedGraphs
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.semantics import Engine, EngineRefused, Execution, Script, Trace
 
@@ -50,7 +50,7 @@ _BUSY: Final = frozenset({"RUNNING", "PAUSED", "STOPPING", "CLEARING"})
 _Deed: TypeAlias = Callable[[str, float], list[Trace]]
 
 
-class StandIn:
+class EmulatedEngine:
     """One life of one engine. `hear` and `ask` bring messages, `advance` gives what it has to say.
 
     `born_ms` is the moment of its start, which its feedback keeps time with; `epoch_ms` is 0 ms as
@@ -61,10 +61,10 @@ class StandIn:
         self,
         name: str,
         *,
-        index: Index = Index(),  # noqa: B008 - frozen
+        index: EmulatedIndex = EmulatedIndex(),  # noqa: B008 - frozen
         script: Script = Script(),  # noqa: B008 - frozen
         facts: EngineFacts = PINNED,
-        quirks: Quirks = Quirks(),  # noqa: B008 - frozen
+        quirks: EngineTraits = EngineTraits(),  # noqa: B008 - frozen
         extra_wake_words: Sequence[str] = (),
         seed: int = 0,
         born_ms: float = 0.0,
@@ -89,7 +89,7 @@ class StandIn:
         self._out: list[Said] = []
         self._tasks: list[tuple[float, int, Callable[[], None]]] = []
         self._order = count()
-        self._view = View(self._engine, index, quirks, random.Random(seed), epoch_ms)
+        self._view = PublishedGraphs(self._engine, index, quirks, random.Random(seed), epoch_ms)
         self._drains = False
         self._waiting: dict[str, deque[Message]] = {topic: deque() for topic in TOPICS}
         self._gets: deque[int] = deque(maxlen=_GETS)
@@ -332,7 +332,7 @@ class StandIn:
         self._log(f"Modifying UMRF graph '{message.graph_name}' ...")
         why = ""
         try:
-            plan = plan_of(message.modified_graph)
+            plan = graph_plan_of(message.modified_graph)
             name = plan.graph.name
             self._take(self._engine.modify(plan.graph, self._now, message.continue_from))
         except Refusal as refused:
@@ -354,7 +354,7 @@ class StandIn:
     def _answer(self, ticket: int) -> None:
         view = self._view
         self._take(self._engine.asked())
-        self._say(Answer(self._now, ticket, self._index.texts, view.indexed, view.running()))
+        self._say(GetResponse(self._now, ticket, self._index.texts, view.indexed, view.running()))
 
     # --- what its graphs do -------------------------------------------------------------------
 
@@ -382,7 +382,7 @@ class StandIn:
     def _drain(self) -> None:
         self._drains = False
         if history := self._view.drained():
-            self._say(Feedback(self._now, self.actor, history))
+            self._say(FeedbackMessage(self._now, self.actor, history))
 
     # --- words --------------------------------------------------------------------------------
 
@@ -392,7 +392,7 @@ class StandIn:
 
     def _log(self, text: str) -> None:
         if self.quirks.narrates:
-            self._say(Line(self._now, text))
+            self._say(LogMessage(self._now, text))
 
     def _leave_if_idle(self) -> None:
         if self._deaf and not self.gone and not any(g.active for g in self._engine.graphs.values()):

@@ -16,7 +16,7 @@ from action_assistant.umrf.signatures import signature_of
 NODE: Final = "action_engine_node"
 
 
-class Quirks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class EngineTraits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """In which ways a stand-in behaves as a real engine does; every one can be switched off.
 
     `depth`: commands of one topic that wait, the newest win (0: all wait). `blocks`: a stop, pause or
@@ -107,7 +107,7 @@ TOPICS: Final = tuple(kind.topic for kind in (Start, Stop, Pause, Resume, Modify
 # --- out --------------------------------------------------------------------------------------------
 
 
-class Feedback(msgspec.Struct, frozen=True):
+class FeedbackMessage(msgspec.Struct, frozen=True):
     """One message of feedback; index 0 is the newest snapshot."""
 
     at_ms: float
@@ -115,7 +115,7 @@ class Feedback(msgspec.Struct, frozen=True):
     history: tuple[str, ...]
 
 
-class Answer(msgspec.Struct, frozen=True):
+class GetResponse(msgspec.Struct, frozen=True):
     """The answer to the get with this ticket: what it has indexed, and every graph it holds."""
 
     at_ms: float
@@ -125,7 +125,7 @@ class Answer(msgspec.Struct, frozen=True):
     running: tuple[str, ...]
 
 
-class Line(msgspec.Struct, frozen=True):
+class LogMessage(msgspec.Struct, frozen=True):
     """A line of its log, which goes to /rosout."""
 
     at_ms: float
@@ -139,13 +139,13 @@ class Gone(msgspec.Struct, frozen=True):
     why: str
 
 
-Said: TypeAlias = Feedback | Answer | Line | Gone
+Said: TypeAlias = FeedbackMessage | GetResponse | LogMessage | Gone
 
 
 # --- what it has read -------------------------------------------------------------------------------
 
 
-class Plan(msgspec.Struct, frozen=True):
+class GraphPlan(msgspec.Struct, frozen=True):
     """A graph as a message or a file gave it. `attributes`: `gui_attributes` by full name; `states`:
     those that the text carries, which real engines believe."""
 
@@ -158,7 +158,7 @@ class Refusal(Exception):
     """The parser of the engine refuses a text; its words, as they stand in its log."""
 
 
-def plan_of(text: str) -> Plan:
+def graph_plan_of(text: str) -> GraphPlan:
     """The graph of a text. Raises Refusal."""
     try:
         tree = json.loads(text)
@@ -184,7 +184,7 @@ def plan_of(text: str) -> Plan:
         for each in tree.get("actions", ())
         if isinstance(each, dict) and "gui_attributes" in each
     }
-    return Plan(reading.graph, attributes, reading.states)
+    return GraphPlan(reading.graph, attributes, reading.states)
 
 
 def _syntax(why: str) -> str:
@@ -194,16 +194,16 @@ def _syntax(why: str) -> str:
     )
 
 
-class Index(msgspec.Struct, frozen=True):
+class EmulatedIndex(msgspec.Struct, frozen=True):
     """The actions and graphs that an engine has found in its folder. Without actions a stand-in has
     every action with any parameters."""
 
     texts: tuple[str, ...] = ()
     actions: dict[str, Signature] = {}
-    graphs: dict[str, Plan] = {}
+    graphs: dict[str, GraphPlan] = {}
 
 
-def index_of(actions: Iterable[str], graphs: Iterable[str]) -> Index:
+def index_of(actions: Iterable[str], graphs: Iterable[str]) -> EmulatedIndex:
     """The index of files with these texts; what cannot be read is left out, as engines do."""
     texts: list[str] = []
     found: dict[str, Signature] = {}
@@ -214,17 +214,17 @@ def index_of(actions: Iterable[str], graphs: Iterable[str]) -> Index:
             continue
         texts.append(printed_action(action))
         found.setdefault(action.name, signature_of(action))
-    plans: dict[str, Plan] = {}
+    plans: dict[str, GraphPlan] = {}
     for text in graphs:
         try:
-            plan = plan_of(text)
+            plan = graph_plan_of(text)
         except Refusal:
             continue
         plans.setdefault(plan.graph.name, plan)
-    return Index(tuple(texts), found, plans)
+    return EmulatedIndex(tuple(texts), found, plans)
 
 
-def asked_for(message: Start, index: Index, held: Container[str]) -> Plan:
+def asked_for(message: Start, index: EmulatedIndex, held: Container[str]) -> GraphPlan:
     """The graph that a start means. `held`: the names that the engine holds, which it does not look
     for in its index. Raises Refusal."""
     if not message.graph_json:
@@ -232,7 +232,7 @@ def asked_for(message: Start, index: Index, held: Container[str]) -> Plan:
         if plan is None:
             raise Refusal(unknown("stop", message.graph_name))  # sic
         return plan
-    plan = plan_of(message.graph_json)
+    plan = graph_plan_of(message.graph_json)
     if plan.graph.name in index.graphs and plan.graph.name not in held:
         raise Refusal(
             f"origin [in startGraphA]: Cannot execute UMRF graph '{plan.graph.name}' because it "

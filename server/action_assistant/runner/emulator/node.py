@@ -25,13 +25,13 @@ from temoto_msgs.msg import (
 )
 from temoto_msgs.srv import UmrfGraphGet
 
-from action_assistant.runner.emulator.engine import StandIn
+from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import (
     NODE,
-    Answer,
-    Feedback,
+    FeedbackMessage,
+    GetResponse,
     Gone,
-    Line,
+    LogMessage,
     Message,
     Modify,
     Pause,
@@ -49,7 +49,7 @@ _LONGEST_S: Final = 0.5  # between two looks at whether it shall end
 _WAITING: Final = 100  # commands that wait on the wire when the quirk of one is switched off
 
 
-class StandInNode:
+class EmulatorNode:
     """A node for one life of a stand-in. `make(epoch_ms)` gives it, at 0 ms of the node's own clock.
 
     `told` hears of everything that it says. Raises RuntimeError when the domain cannot be joined.
@@ -57,7 +57,7 @@ class StandInNode:
 
     def __init__(
         self,
-        make: Callable[[int], StandIn],
+        make: Callable[[int], EmulatedEngine],
         *,
         domain: int,
         facts: EngineFacts,
@@ -165,7 +165,7 @@ class StandInNode:
         ticket, answered = self._asked, Future(executor=self._executor)
         self._tickets[ticket] = answered
         self.robot.ask(ticket, self._now())
-        answer: Answer = await answered
+        answer: GetResponse = await answered
         response.umrf_jsons = list(answer.umrfs)
         response.graph_jsons_indexed = list(answer.indexed)
         response.graph_jsons_running = list(answer.running)
@@ -173,11 +173,11 @@ class StandInNode:
 
     def _say(self, said: Said) -> None:
         match said:
-            case Feedback(actor=actor, history=history):
+            case FeedbackMessage(actor=actor, history=history):
                 self._feedback.publish(UmrfGraphFeedback(actor=actor, history=list(history)))
-            case Answer(ticket=ticket):
+            case GetResponse(ticket=ticket):
                 self._tickets.pop(ticket).set_result(said)
-            case Line(text=text):
+            case LogMessage(text=text):
                 seconds, nanoseconds = divmod(time.time_ns(), 10**9)
                 at = Time(sec=seconds, nanosec=nanoseconds)
                 self._log.publish(Log(stamp=at, level=_INFO, name=NODE, msg=text))

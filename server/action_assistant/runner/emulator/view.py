@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from action_assistant.runner.emulator.messages import Index, Plan, Quirks
+from action_assistant.runner.emulator.messages import EmulatedIndex, EngineTraits, GraphPlan
 from action_assistant.umrf.semantics import Engine, GraphState, NodeResult, NodeState, Trace
 from action_assistant.umrf.semantics.parts import Running, build
 from action_assistant.umrf.semantics.printing import Sheet
@@ -31,17 +31,22 @@ class _Held:
         return self.sheet.text(self.state, self.states, self.messages)
 
 
-class View:
+class PublishedGraphs:
     """The graphs of an engine as feedback and answers show them, and the ring of snapshots.
 
     `taken`: somebody holds the map of graphs, so that every snapshot is lost.
     """
 
     def __init__(
-        self, engine: Engine, index: Index, quirks: Quirks, chance: random.Random, epoch_ms: int
+        self,
+        engine: Engine,
+        index: EmulatedIndex,
+        quirks: EngineTraits,
+        chance: random.Random,
+        epoch_ms: int,
     ) -> None:
         self.taken = False
-        self.plans: dict[str, Plan] = dict(index.graphs)
+        self.plans: dict[str, GraphPlan] = dict(index.graphs)
         self.indexed = tuple(map(_printed, index.graphs.values()))
         self._engine = engine
         self._index = index
@@ -94,12 +99,12 @@ class View:
         self._ring.clear()
         return history if self._quirks.newest_first else history[::-1]
 
-    def modified(self, name: str, plan: Plan) -> None:
+    def modified(self, name: str, plan: GraphPlan) -> None:
         """A graph has another structure now."""
         held, known = self._held.get(name), self.plans.get(name)
         if held is not None:
             before = known.attributes if known is not None else {}
-            self.plans[name] = Plan(plan.graph, before | plan.attributes)
+            self.plans[name] = GraphPlan(plan.graph, before | plan.attributes)
             held.sheet = self._sheet(held.running)
 
     def _node(self, trace: NodeState, crowd: int) -> None:
@@ -155,7 +160,7 @@ def _as_threads_do(traces: Sequence[Trace]) -> list[Trace]:
     return [e for e in traces if not begins(e)] + [e for e in traces if begins(e)]
 
 
-def _printed(plan: Plan) -> str:
+def _printed(plan: GraphPlan) -> str:
     """An indexed graph, which keeps its description."""
     running = Running(plan.graph.name, plan.graph, None, None)
     build(running, {action.key: (DEFAULT,) for action in plan.graph.actions})

@@ -46,7 +46,7 @@ T = TypeVar("T")
 Aside = Callable[..., Awaitable[T]]
 
 
-class Index(msgspec.Struct, frozen=True, kw_only=True):
+class EngineIndex(msgspec.Struct, frozen=True, kw_only=True):
     """What an engine can do: actions and graphs that it has indexed, by name. `unread`: texts of its
     index that cannot be read."""
 
@@ -95,7 +95,10 @@ class KnownEngine:
         self._tried_at = -_IDLE_S
         self._restarted: float | None = None
         self._close_until = 0.0
-        self._index: tuple[tuple[tuple[str, ...], tuple[str, ...]], Index] = ((), ()), Index()
+        self._index: tuple[tuple[tuple[str, ...], tuple[str, ...]], EngineIndex] = (
+            ((), ()),
+            EngineIndex(),
+        )
 
     # --- the link -----------------------------------------------------------------------------
 
@@ -276,18 +279,18 @@ class KnownEngine:
             self._became(self)
         self._changed()
 
-    async def index(self, aside: "Aside[Index]") -> Index:
+    async def index(self, aside: "Aside[EngineIndex]") -> EngineIndex:
         """What the engine has indexed, as its last answer says; read when it has changed."""
         answer = self.answer
         if answer is None:
-            return Index()
+            return EngineIndex()
         texts = answer.known_actions, answer.known_graphs
         if texts != self._index[0]:
             self._index = texts, await aside(read_index, *texts)
         return self._index[1]
 
 
-def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> Index:
+def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex:
     """The index of an engine from its texts. What cannot be read is counted."""
     known: dict[str, Signature] = {}
     whole: dict[str, Graph] = {}
@@ -306,7 +309,7 @@ def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> Index:
             unread += 1
         else:
             whole.setdefault(graph.name, graph)
-    return Index(actions=known, graphs=whole, unread=unread)
+    return EngineIndex(actions=known, graphs=whole, unread=unread)
 
 
 def _held(answer: Answer) -> list[tuple[str, str, str | None, bool]]:

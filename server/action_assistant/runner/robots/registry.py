@@ -20,7 +20,7 @@ from action_assistant.runner.links.port import (
     Reach,
     Registration,
 )
-from action_assistant.runner.robots.engine import Index, KnownEngine
+from action_assistant.runner.robots.engine import EngineIndex, KnownEngine
 from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registration import (
@@ -273,11 +273,11 @@ class Robots:
         """The engine of a robot, if there is a link."""
         return self._engines.get(name)
 
-    async def index(self, name: str) -> Index:
+    async def index(self, name: str) -> EngineIndex:
         """What a robot can do, as far as is known. Raises NotFound."""
         self.registration(name)
         engine = self._engines.get(name)
-        return Index() if engine is None else await engine.index(self._standing().aside)
+        return EngineIndex() if engine is None else await engine.index(self._standing().aside)
 
     def held(self, name: str, graph: str) -> str:
         """A graph as the engine wrote it in its last answer. Raises NotFound."""

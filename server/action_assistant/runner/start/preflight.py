@@ -12,7 +12,7 @@ import msgspec
 from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.links.observations import Snapshot, failed_in
 from action_assistant.runner.links.port import Answer, Standing
-from action_assistant.runner.robots.engine import Index
+from action_assistant.runner.robots.engine import EngineIndex
 from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import Admitted, Prepared
@@ -74,7 +74,7 @@ class Sight(msgspec.Struct, frozen=True, kw_only=True):
     facts: EngineFacts
     standing: Standing
     answer: Answer
-    index: Index
+    index: EngineIndex
     took_ms: float
     open_runs: Collection[str] = ()
     settled: tuple[Settled, ...] = ()
@@ -264,7 +264,7 @@ def _again(sight: Sight, graph: Graph) -> Item:
 
 
 def not_matched(
-    graph: Graph, facts: EngineFacts, index: Index, held: Collection[str]
+    graph: Graph, facts: EngineFacts, index: EngineIndex, held: Collection[str]
 ) -> tuple[str, ...]:
     """The full names of what an engine cannot build when it takes a graph without looking anything up
     in its index (a start of a name that it holds, a modify): sub-graphs, and what it does not know.
@@ -285,7 +285,7 @@ def not_matched(
 
 
 def not_matched_in(
-    umrf: str, facts: EngineFacts, index: Index, held: Collection[str]
+    umrf: str, facts: EngineFacts, index: EngineIndex, held: Collection[str]
 ) -> tuple[str, ...]:
     """As `not_matched`, of a graph as it will be sent. For workers."""
     return not_matched(codec.read(umrf).graph, facts, index, held)
