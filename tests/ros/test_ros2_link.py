@@ -30,7 +30,7 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.ros2.reach import Ros2
-from action_assistant.runner.links.unreachable import AbsentLink
+from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from ros.echo_engine import EchoEngine, graph_text
@@ -330,7 +330,7 @@ async def test_another_middleware_is_refused_with_what_to_do(domain: int) -> Non
         link = ros2.link(
             Registration(name="robot", domain=domain, rmw="rmw_cyclonedds_cpp"), PINNED
         )
-        assert isinstance(link, AbsentLink)
+        assert isinstance(link, UnreachableLink)
         with pytest.raises(NotSent, match="RMW_IMPLEMENTATION"):
             await link.start(placed())
 

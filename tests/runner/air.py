@@ -25,10 +25,16 @@ from action_assistant.runner.emulator.messages import (
     Stop,
 )
 from action_assistant.runner.links.engine_text import name_of, snapshot
-from action_assistant.runner.links.listeners import Ears
+from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import Command
 from action_assistant.runner.links.port import Feedback as Shown
-from action_assistant.runner.links.ros2.ros_values import Endpoint, Got, Heard, LogLine, Sound
+from action_assistant.runner.links.ros2.ros_values import (
+    Endpoint,
+    GetResult,
+    LogLine,
+    OverheardCommand,
+    RosValue,
+)
 from runner.world import wall
 
 LEASE_S = 10.0  # until discovery knows of a death that nobody announced
@@ -167,7 +173,7 @@ class Air:
         self.nodes: list[Node] = []
         self.sent: list[tuple[float, Message]] = []
         self.delivered: list[tuple[float, Message]] = []
-        self._ears = Ears[Sound]()
+        self._subscribers = Listeners[RosValue]()
         self._asked: dict[int, tuple[anyio.Event, list[GetResponse]]] = {}
         self._tickets = 0
         self._handles: set[asyncio.TimerHandle] = set()
@@ -262,7 +268,7 @@ class Air:
         command: Command = message.topic  # type: ignore[assignment]
         text = getattr(message, "graph_json", "") or getattr(message, "modified_graph", "")
         self.tell(
-            Heard(
+            OverheardCommand(
                 command=command,
                 graph=name_of(text) or message.graph_name,
                 umrf=text,
@@ -278,16 +284,16 @@ class Air:
         seen = tuple(snapshot(text, at=at, source="feedback") for text in reversed(history))
         self.tell(Shown(actor=actor, snapshots=seen))
 
-    def tell(self, sound: Sound) -> None:
+    def tell(self, sound: RosValue) -> None:
         """Everybody who listens hears it."""
-        self._ears.tell(sound)
+        self._subscribers.tell(sound)
 
     def _later(self, wait_s: float, work: Callable[[], None]) -> None:
         self._at(now() + wait_s, work)
 
     # --- what a link asks of a domain ---------------------------------------------------------
 
-    async def ask(self, path: str) -> Got:
+    async def ask(self, path: str) -> GetResult:
         """The first answer of whoever serves a path."""
         asked_at = wall()
         self._tickets += 1
@@ -306,7 +312,7 @@ class Air:
             shown = snapshot(text, at=at, source="get", asked_at=asked_at)
             graphs.append(shown)
             texts[shown.graph] = text
-        return Got(
+        return GetResult(
             graphs=tuple(graphs),
             texts=texts,
             known_actions=got[0].umrfs,
@@ -334,9 +340,9 @@ class Air:
         """Every path that somebody serves."""
         return tuple(sorted({each.path for each in self.nodes if each.seen}))
 
-    def hearing(self, ear: Callable[[Sound], None]) -> AbstractContextManager[None]:
+    def hearing(self, ear: Callable[[RosValue], None]) -> AbstractContextManager[None]:
         """Be told what comes by itself."""
-        return self._ears.listening(ear)
+        return self._subscribers.listening(ear)
 
 
 def _put(event: anyio.Event, got: list[GetResponse], answer: GetResponse) -> None:

@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 import anyio
 
 from action_assistant.runner.emulator.messages import Modify, Pause, Resume, Start
-from action_assistant.runner.links.listeners import Ears
+from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -19,7 +19,7 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
-from action_assistant.runner.links.ros2.ros_values import Heard, LogLine
+from action_assistant.runner.links.ros2.ros_values import LogLine, OverheardCommand
 from runner.air import HASH, Air
 from runner.world import wall
 
@@ -36,7 +36,7 @@ class AirLink:
         self._name = name
         self._path = path
         self._known = ""
-        self._ears = Ears[Report]()
+        self._subscribers = Listeners[Report]()
         self._told: tuple[str, str] = ("", "")
 
     @property
@@ -115,7 +115,7 @@ class AirLink:
                 now = self.standing
                 if self._told != (now.state, now.incarnation):
                     self._told = now.state, now.incarnation
-                    self._ears.tell(
+                    self._subscribers.tell(
                         EngineChanged(
                             at=wall(), state=now.state, incarnation=now.incarnation, why=now.why
                         )
@@ -125,9 +125,9 @@ class AirLink:
     def _hear(self, sound: object) -> None:
         match sound:
             case Feedback():
-                self._ears.tell(sound)
-            case Heard() if self._name in sound.targets:
-                self._ears.tell(
+                self._subscribers.tell(sound)
+            case OverheardCommand() if self._name in sound.targets:
+                self._subscribers.tell(
                     ForeignCommand(
                         at=wall(),
                         command=sound.command,
@@ -138,13 +138,13 @@ class AirLink:
                     )
                 )
             case LogLine(text=text) if len(self._air.publishers("feedback")) <= 1:
-                self._ears.tell(EngineLog(at=wall(), text=text))
+                self._subscribers.tell(EngineLog(at=wall(), text=text))
             case _:
                 pass
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Everything that concerns this robot."""
-        return self._ears.listening(hear)
+        return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
         """Nothing of its own."""

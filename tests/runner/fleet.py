@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from action_assistant.runner.links.listeners import Ears
+from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
     Candidate,
@@ -37,7 +37,7 @@ class Open(Robot):
         self.known_actions: tuple[str, ...] = (WORK,)
         self.known_graphs: tuple[str, ...] = ()
         self.texts: dict[str, str] = {}
-        self._ears = Ears[Report]()
+        self._subscribers = Listeners[Report]()
 
     @property
     def standing(self) -> Standing:
@@ -57,11 +57,11 @@ class Open(Robot):
 
     def listen(self, hear: Callable[[Report], None]) -> Any:
         """Everything that `tell` is given."""
-        return self._ears.listening(hear)
+        return self._subscribers.listening(hear)
 
     def tell(self, report: Report) -> None:
         """Report something."""
-        self._ears.tell(report)
+        self._subscribers.tell(report)
 
     def command(self, command: Command, graph: str, umrf: str = "") -> None:
         """Somebody else publishes something."""

@@ -16,7 +16,7 @@ import anyio
 
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.engine_text import snapshot
-from action_assistant.runner.links.listeners import Ears
+from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
@@ -101,7 +101,7 @@ class Recording:
             each["t_ms"] for each in self.sent if each["op"] == "start" and each is not start
         ]
         self._gets = list(self._answers())
-        self._ears = Ears[Report]()
+        self._subscribers = Listeners[Report]()
 
     def _answers(self) -> Iterator[tuple[float, float, list[Any] | None]]:
         """Asked and answered at (ms), and the graphs; None for no answer."""
@@ -174,14 +174,14 @@ class Recording:
                 continue
             await anyio.sleep(max(0.0, line["t_ms"] - self.now_ms()) / 1_000)
             if line["kind"] == "rosout":
-                self._ears.tell(EngineLog(at=wall(), text=str(line.get("msg", ""))))
+                self._subscribers.tell(EngineLog(at=wall(), text=str(line.get("msg", ""))))
                 continue
             shown = tuple(self._snapshot(each, "feedback") for each in reversed(line["history"]))
-            self._ears.tell(Feedback(actor=line["actor"], snapshots=shown))
+            self._subscribers.tell(Feedback(actor=line["actor"], snapshots=shown))
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Everything that came by itself."""
-        return self._ears.listening(hear)
+        return self._subscribers.listening(hear)
 
     async def start(self, order: Order) -> None:
         """It was."""

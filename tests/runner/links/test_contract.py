@@ -20,7 +20,7 @@ from action_assistant.runner.links.port import (
     Report,
     Transitions,
 )
-from action_assistant.runner.links.unreachable import AbsentLink
+from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
 from runner.air import Air, now_ms
@@ -162,7 +162,7 @@ async def test_an_engine_that_is_switched_off_answers_nothing() -> None:
 
 @virtual
 async def test_a_link_that_is_not_there_says_so_whatever_it_is_asked() -> None:
-    link = AbsentLink("no link")
+    link = UnreachableLink("no link")
     with pytest.raises(NotSent, match="no link"):
         await link.stop("patrol")
     with pytest.raises(NotSent, match="no link"):

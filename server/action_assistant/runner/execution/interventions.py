@@ -6,7 +6,13 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.links.port import SIMULATOR, EngineRefused, NotSent, Order, Outline
+from action_assistant.runner.links.port import (
+    SIMULATOR,
+    EngineRefused,
+    GraphOutline,
+    NotSent,
+    Order,
+)
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.run import Run
@@ -87,7 +93,7 @@ async def modify(
             where={"path": "/umrf/graph_name"},
         )
     targets = () if run.simulated else (run.engine,)
-    graph = Outline(ready.name, ready.actions)
+    graph = GraphOutline(ready.name, ready.actions)
     order = Order(run=run.id, graph=graph, umrf=ready.umrf, targets=targets)
     try:
         await opened.modify(author, order, asked.version, ready.digest, asked.continue_from)

@@ -27,7 +27,7 @@ from action_assistant.runner.links.port import (
     Order,
     Report,
     Transitions,
-    outline,
+    graph_outline,
 )
 from action_assistant.runner.robots.robot_events import alarm_of
 from action_assistant.runner.runs.events import (
@@ -140,7 +140,7 @@ class OpenRun:
             author=author,
             version=version,
             digest=digest,
-            actions=outline(order.graph).actions,
+            actions=graph_outline(order.graph).actions,
             umrf=order.umrf,
             continue_from=continue_from,
         )

@@ -19,7 +19,7 @@ from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, Order, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
-from action_assistant.runner.links.unreachable import AbsentLink
+from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.robots.registry import RegistryContext, Robots
@@ -448,13 +448,17 @@ class ExecutionService:
 
     def _reopen(self, run: Run, seq: int, event: MovesAgain) -> None:
         """A run that was over and stored moves again."""
-        link = self.robots.link(run.engine) or AbsentLink("there is no link to this robot any more")
+        link = self.robots.link(run.engine) or UnreachableLink(
+            "there is no link to this robot any more"
+        )
         opened = self._opened(run, link, own=False, seq=seq)
         opened.tell(event)
         self._tasks.start_soon(self._drive, opened, None)
 
     def _adopt(self, run: Run, seq: int, *, is_whole: bool) -> None:
-        link = self.robots.link(run.engine) or AbsentLink("there is no link to this robot any more")
+        link = self.robots.link(run.engine) or UnreachableLink(
+            "there is no link to this robot any more"
+        )
         opened = self._opened(run, link, own=False, seq=seq)
         if run.simulated:
             opened.tell(Ended(self._wall(), "lost", None, _LOST))

@@ -7,7 +7,7 @@ import msgspec
 Verdict: TypeAlias = Literal["fine", "note", "wrong"]
 
 
-class Finding(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Diagnostic(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One thing that was looked at. `note` may matter or not; `wrong` does. `advice` is a sentence
     on what to do, or empty."""
 

@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 _News = TypeVar("_News")
 
 
-class Ears(Generic[_News]):
+class Listeners(Generic[_News]):
     """Listeners of a link or of a domain. They are called at once and must not wait."""
 
     def __init__(self) -> None:

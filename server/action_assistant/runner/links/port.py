@@ -40,19 +40,19 @@ class NoAnswer(Exception):
     """The engine did not answer a get in time, or cannot; the text says what is known."""
 
 
-class Outline(msgspec.Struct, frozen=True):
+class GraphOutline(msgspec.Struct, frozen=True):
     """What the runner itself knows of a graph: its name, and the aid of each action by full name."""
 
     name: str
     actions: dict[str, str]
 
 
-def outline(graph: Graph | Outline) -> Outline:
+def graph_outline(graph: Graph | GraphOutline) -> GraphOutline:
     """What the runner needs to know of a graph."""
-    if isinstance(graph, Outline):
+    if isinstance(graph, GraphOutline):
         return graph
     named = {each.full_name: each.key for each in graph.actions if not each.missing}
-    return Outline(graph.name, named)
+    return GraphOutline(graph.name, named)
 
 
 class Order(msgspec.Struct, frozen=True, kw_only=True):
@@ -60,7 +60,7 @@ class Order(msgspec.Struct, frozen=True, kw_only=True):
     graph reads the text, beside the runner; where it is at hand it may be given along."""
 
     run: str
-    graph: Graph | Outline
+    graph: Graph | GraphOutline
     umrf: str
     targets: tuple[str, ...] = ()
 

@@ -22,7 +22,7 @@ import msgspec
 from anyio import to_thread
 
 from action_assistant.errors import TooMany
-from action_assistant.runner.links.listeners import Ears
+from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -96,7 +96,7 @@ class SimulatedLink:
         self._wall = wall
         self._take = take
         self._incarnation = secrets.token_hex(8)
-        self._ears = Ears[Report]()
+        self._subscribers = Listeners[Report]()
         self._numbers = itertools.count(1)
         self._asked: dict[int, asyncio.Future[Any]] = {}
         self._writer: asyncio.StreamWriter | None = None
@@ -160,7 +160,7 @@ class SimulatedLink:
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Every transition from now on."""
-        return self._ears.listening(hear)
+        return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
         """End the engine, and its process."""
@@ -226,7 +226,7 @@ class SimulatedLink:
     def _hear(self, report: Report) -> None:
         if isinstance(report, EngineChanged):
             self._state, self._why = report.state, report.why
-        self._ears.tell(report)
+        self._subscribers.tell(report)
 
     def _end(self, why: str) -> None:
         """The engine is no more; whoever waits for it is told."""
@@ -240,7 +240,7 @@ class SimulatedLink:
             if not future.done():
                 future.set_exception(NoAnswer(self._why))
         if why == _DIED and (fresh or was != "gone"):
-            self._ears.tell(EngineChanged(at=self._wall(), state="gone", why=self._why))
+            self._subscribers.tell(EngineChanged(at=self._wall(), state="gone", why=self._why))
 
 
 def _born(theirs: socket.socket, facts: EngineFacts, script: str) -> Any:

@@ -13,7 +13,7 @@ from typing import Final, TypeAlias, assert_never
 import anyio
 import msgspec
 
-from action_assistant.runner.links.listeners import Ears
+from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.observations import (
     Exact,
     GraphResult,
@@ -77,7 +77,7 @@ class SimulatorLink:
         self._origin_wall = wall()
         self._incarnation = secrets.token_hex(8)
         self._runs: dict[str, str] = {}  # graph name -> run
-        self._ears = Ears[Report]()
+        self._subscribers = Listeners[Report]()
         self._wake = anyio.Event()
         self._dead: str | None = None
 
@@ -169,7 +169,7 @@ class SimulatorLink:
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Every transition from now on."""
-        return self._ears.listening(hear)
+        return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
         """End the engine."""
@@ -207,7 +207,7 @@ class SimulatorLink:
             if seen is not None and run is not None:
                 per_run.setdefault(run, []).append(seen)
         for run, changes in per_run.items():
-            self._ears.tell(Transitions(run=run, changes=tuple(changes)))
+            self._subscribers.tell(Transitions(run=run, changes=tuple(changes)))
         for trace in traces:
             if isinstance(trace, semantics.Hazard) and trace.effect in {"crash", "hang"}:
                 self._fail(trace)
@@ -233,7 +233,7 @@ class SimulatorLink:
         why = f"The simulated engine {what} ({hazard.code}). {hazard.message}".rstrip()
         self._dead = why
         state: EngineState = "gone" if hazard.effect == "crash" else "busy"
-        self._ears.tell(EngineChanged(at=self._at(hazard.t_ms), state=state, why=why))
+        self._subscribers.tell(EngineChanged(at=self._at(hazard.t_ms), state=state, why=why))
 
     def _at(self, t_ms: float) -> int:
         return self._origin_wall + round(t_ms * 1000)

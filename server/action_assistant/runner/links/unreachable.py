@@ -9,7 +9,7 @@ import anyio
 from action_assistant.runner.links.port import Answer, NoAnswer, NotSent, Order, Report, Standing
 
 
-class AbsentLink:
+class UnreachableLink:
     """Stands in where a run is known but its robot is out of reach."""
 
     simulated: Final = False

@@ -16,7 +16,14 @@ from action_assistant.runner.links.observations import (
     Snapshot,
 )
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.runs.visits import ActionRun, Sight, changed, heard, resulted, shown
+from action_assistant.runner.runs.visits import (
+    ActionRun,
+    SnapshotEvidence,
+    changed,
+    heard,
+    resulted,
+    shown,
+)
 
 #: An answer that took longer was given up.
 _ASKED_US: Final = 1_000_000
@@ -68,7 +75,7 @@ def _shown(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> Run:
     for node, state in item.nodes.items():
         name = key_of(run, item.graph, node)
         action = actions.get(name, ActionRun())
-        sight = Sight(
+        sight = SnapshotEvidence(
             at=item.at,
             asked=asked,
             looked=looked,

@@ -82,7 +82,7 @@ class Visit(msgspec.Struct, frozen=True, kw_only=True):
         return None if self.not_after is None else self.not_after - self.not_before
 
 
-class Sight(msgspec.Struct, frozen=True, kw_only=True):
+class SnapshotEvidence(msgspec.Struct, frozen=True, kw_only=True):
     """A snapshot as evidence. `asked`: when it was asked for; None for feedback. `looked`: when the
     newest answer was asked for that showed the graph as it was known until now. `begun`: when nothing
     can have happened before. `once`: the action runs at most once. `stoppable`: somebody or something
@@ -105,7 +105,7 @@ class Message(msgspec.Struct, frozen=True):
     text: str
 
 
-class Rests(msgspec.Struct, frozen=True, array_like=True):
+class RestEvidence(msgspec.Struct, frozen=True, array_like=True):
     """When answers were asked for that showed an action at rest: the newest, and two older ones that
     lie at least `_OLD_US` apart."""
 
@@ -113,13 +113,13 @@ class Rests(msgspec.Struct, frozen=True, array_like=True):
     older: int = 0
     oldest: int = 0
 
-    def and_at(self, asked: int) -> "Rests":
+    def and_at(self, asked: int) -> "RestEvidence":
         """With one more."""
         if asked <= self.newest:
             return self
         if asked - self.older >= _OLD_US:
-            return Rests(asked, asked, self.older)
-        return Rests(asked, self.older, self.oldest)
+            return RestEvidence(asked, asked, self.older)
+        return RestEvidence(asked, self.older, self.oldest)
 
     def by(self, moment: int) -> int:
         """The newest of these that is not later than `moment`."""
@@ -149,7 +149,7 @@ class ActionRun(msgspec.Struct, frozen=True, kw_only=True):
     by: Literal["", "get", "feedback"] = ""
     changed_at: int = 0
     held: bool = False
-    rests: Rests = Rests()
+    rests: RestEvidence = RestEvidence()
 
 
 def changed(
@@ -200,7 +200,7 @@ def paused(action: ActionRun) -> ActionRun:
 
 
 def shown(
-    action: ActionRun, state: str, sight: Sight, inputs: dict[str, str] | None = None
+    action: ActionRun, state: str, sight: SnapshotEvidence, inputs: dict[str, str] | None = None
 ) -> ActionRun:
     """After a snapshot, which says how things are but not when they became so."""
     if state == action.state:
@@ -239,7 +239,7 @@ def is_open(action: ActionRun) -> bool:
     return bool(action.visits) and action.visits[-1].until is None
 
 
-def _looked_at(action: ActionRun, sight: Sight) -> ActionRun:
+def _looked_at(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
     """Once answers have shown it in its present state: what that proves."""
     if sight.looked <= action.since:
         return action
@@ -251,7 +251,7 @@ def _looked_at(action: ActionRun, sight: Sight) -> ActionRun:
     return replace(action, going=going, since=sight.looked)
 
 
-def _is_no_news(action: ActionRun, state: str, sight: Sight) -> bool:
+def _is_no_news(action: ActionRun, state: str, sight: SnapshotEvidence) -> bool:
     """Whether this may be older than what is known, and so changes nothing."""
     if sight.once and _goes_back(action, state):
         return sight.asked is None or sight.asked < action.changed_at
@@ -266,7 +266,7 @@ def _goes_back(action: ActionRun, state: str) -> bool:
     return FAR.get(state, 0) < FAR.get(action.state, 0)
 
 
-def _confirmed(action: ActionRun, sight: Sight) -> ActionRun:
+def _confirmed(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
     """An answer shows running what only feedback has shown so far: it is the visit of that answer
     from now on, which began after the last answer that showed rest."""
     if sight.asked is None or not awaits_answer(action) or sight.asked < action.changed_at:
@@ -277,14 +277,14 @@ def _confirmed(action: ActionRun, sight: Sight) -> ActionRun:
     return replace(action, visits=(*action.visits[:-1], anchored), by="get", going=before)
 
 
-def _opened(action: ActionRun, sight: Sight, inputs: dict[str, str] | None) -> ActionRun:
+def _opened(action: ActionRun, sight: SnapshotEvidence, inputs: dict[str, str] | None) -> ActionRun:
     before = _not_before(action, sight)
     visit = Visit(start=sight.at + MOMENT_US, not_before=before, inputs=inputs)
     visits, older = _kept(action.visits, action.older, visit)
     return replace(action, visits=visits, older=older, going=before, held=False)
 
 
-def _closed(action: ActionRun, state: str, sight: Sight) -> ActionRun:
+def _closed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
     last = action.visits[-1]
     if (
         action.by == "get" and sight.asked is None and not sight.once
@@ -305,13 +305,13 @@ def _closed(action: ActionRun, state: str, sight: Sight) -> ActionRun:
     return replace(action, visits=(*action.visits[:-1], ended))
 
 
-def _ran_meanwhile(action: ActionRun, sight: Sight) -> bool:
+def _ran_meanwhile(action: ActionRun, sight: SnapshotEvidence) -> bool:
     """Whether one state of rest after another says that it ran in between. Feedback that was older
     than an answer may have told the first."""
     return sight.once or action.by != "feedback" or FAR.get(action.state, 0) == 0
 
 
-def _missed(action: ActionRun, state: str, sight: Sight) -> ActionRun:
+def _missed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
     """It has ended, and was never seen going on."""
     before = _not_before(action, sight)
     visit = Visit(
@@ -326,14 +326,14 @@ def _missed(action: ActionRun, state: str, sight: Sight) -> ActionRun:
     return replace(action, visits=visits, older=older)
 
 
-def _not_before(action: ActionRun, sight: Sight) -> int:
+def _not_before(action: ActionRun, sight: SnapshotEvidence) -> int:
     """Since when it may have begun."""
     told = sight.once or sight.asked is not None
     rest = action.rests.newest if told else action.rests.by(sight.at - _OLD_US)
     return min(sight.at, max(rest, sight.begun))
 
 
-def _not_after(state: str, sight: Sight) -> int | None:
+def _not_after(state: str, sight: SnapshotEvidence) -> int | None:
     """When its code had ended; None of one that was told to stop and failed, which may go on."""
     return None if state == "ERROR" and sight.stoppable else sight.at
 

@@ -10,7 +10,7 @@ from anyio.abc import TaskGroup
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.runner.clock import Clock
-from action_assistant.runner.links.port import Order, Outline
+from action_assistant.runner.links.port import GraphOutline, Order
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, Requested, encode
 from action_assistant.runner.runs.fold import begin
@@ -54,7 +54,7 @@ def booked(
         laps=ready.laps,
     )
     targets = () if cleared.own else (asked.engine,)
-    graph = Outline(ready.name, ready.actions)
+    graph = GraphOutline(ready.name, ready.actions)
     return requested, Order(run=ready.run, graph=graph, umrf=ready.umrf, targets=targets)
 
 

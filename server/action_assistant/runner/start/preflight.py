@@ -66,7 +66,7 @@ class Settled(msgspec.Struct, frozen=True):
     places: frozenset[tuple[str, str]]
 
 
-class Sight(msgspec.Struct, frozen=True, kw_only=True):
+class EngineSight(msgspec.Struct, frozen=True, kw_only=True):
     """An engine at the moment of a pre-flight. `took_ms`: until it answered a get sent for it;
     `open_runs`: runs of ours that go on there; `settled`: those that somebody has seen at rest."""
 
@@ -132,7 +132,7 @@ def of_taken(engine: str, other: Run | None) -> Item:
     return Item(code="free", verdict="blocked", text=text)
 
 
-def of_answer(sight: Sight) -> Item:
+def of_answer(sight: EngineSight) -> Item:
     """It has answered a get sent now."""
     return Item(
         code="answers",
@@ -147,7 +147,7 @@ def of_silence(engine: str, why: str) -> Item:
     return Item(code="answers", verdict="blocked", text=text.rstrip())
 
 
-def of_robot(sight: Sight, graph: Graph) -> tuple[Item, ...]:
+def of_robot(sight: EngineSight, graph: Graph) -> tuple[Item, ...]:
     """All that an answering robot is looked at for."""
     return (
         of_answer(sight),
@@ -161,7 +161,7 @@ def of_robot(sight: Sight, graph: Graph) -> tuple[Item, ...]:
     )
 
 
-def of_text(sight: Sight, umrf: str) -> tuple[Item, ...]:
+def of_text(sight: EngineSight, umrf: str) -> tuple[Item, ...]:
     """As `of_robot`, of a graph as it will be sent. For workers."""
     return of_robot(sight, codec.read(umrf).graph)
 
@@ -180,7 +180,7 @@ def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
         )
 
 
-def _proof(sight: Sight) -> Item:
+def _proof(sight: EngineSight) -> Item:
     """A stop can be proven, and the messages are those that we speak."""
     standing, name = sight.standing, sight.name
     if standing.generation == "older":
@@ -209,7 +209,7 @@ def _proof(sight: Sight) -> Item:
     return Item(code="proof", verdict="passed", text="A stop can be proven: one engine answers.")
 
 
-def _actions(sight: Sight, graph: Graph) -> Item:
+def _actions(sight: EngineSight, graph: Graph) -> Item:
     """It has the actions, with the same parameters."""
     index = sight.index
     if graph.name in index.graphs:
@@ -242,7 +242,7 @@ def _actions(sight: Sight, graph: Graph) -> Item:
     )
 
 
-def _again(sight: Sight, graph: Graph) -> Item:
+def _again(sight: EngineSight, graph: Graph) -> Item:
     """The engine does not hold a graph of this name already, or survives that it is started again.
 
     Whoever started that one, and however it ended: the name is held until the engine is restarted.
@@ -296,7 +296,7 @@ def _listed(names: Sequence[str]) -> str:
     return shown if len(names) <= 3 else f"{shown} and {len(names) - 3} more"
 
 
-def _quiet(sight: Sight, graph: Graph) -> Item:
+def _quiet(sight: EngineSight, graph: Graph) -> Item:
     """Nothing of somebody else runs there."""
     moving = foreign_graphs(sight.answer, sight.open_runs)
     if graph.name in moving:
@@ -312,7 +312,7 @@ def _quiet(sight: Sight, graph: Graph) -> Item:
     return Item(code="quiet", verdict="passed", text=f"Nothing else runs on {sight.name}.")
 
 
-def _rest(sight: Sight) -> Item:
+def _rest(sight: EngineSight) -> Item:
     """Nothing there may still move that its engine calls ERROR. Runs of ours stand in the way as runs,
     until somebody has seen them at rest."""
     doubted = sorted(
@@ -332,7 +332,7 @@ def _rest(sight: Sight) -> Item:
     return Item(code="rest", verdict="blocked", text=text, codes=("rest",), overridable=True)
 
 
-def _is_settled(sight: Sight, shown: Snapshot) -> bool:
+def _is_settled(sight: EngineSight, shown: Snapshot) -> bool:
     """Whether somebody has seen at rest just what is in doubt here: the graph of that run or a part of
     it, in the same life of the engine, with no other action in ERROR."""
     marks = {each.graph: each.run for each in sight.answer.graphs if each.run is not None}
@@ -345,7 +345,7 @@ def _is_settled(sight: Sight, shown: Snapshot) -> bool:
     return False
 
 
-def _others(sight: Sight) -> Item:
+def _others(sight: EngineSight) -> Item:
     """Nobody else publishes starts."""
     others = sight.standing.others
     if others == 0:
@@ -355,7 +355,7 @@ def _others(sight: Sight) -> Item:
     return Item(code="others", verdict="blocked", text=text, codes=("others",), overridable=True)
 
 
-def _actors(sight: Sight, graph: Graph) -> Item:
+def _actors(sight: EngineSight, graph: Graph) -> Item:
     """The actions are this robot's, or the engines synchronise."""
     named = {action.actor for action in graph.actions if not action.missing} - {""}
     foreign = sorted(named - {sight.name, sight.standing.actor})

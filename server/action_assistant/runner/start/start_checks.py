@@ -18,7 +18,7 @@ from action_assistant.runner.runs.events import Overridden, Override
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
-from action_assistant.runner.start.preflight import Item, Preflight, Settled, Sight
+from action_assistant.runner.start.preflight import EngineSight, Item, Preflight, Settled
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.web.workers.lanes import Aside
 
@@ -225,7 +225,7 @@ class StartChecks:
             return [preflight.of_answer(sight)]
         return list(await self._aside(preflight.of_text, sight, ready.umrf))
 
-    async def _sight(self, robot: KnownEngine) -> Sight:
+    async def _sight(self, robot: KnownEngine) -> EngineSight:
         """The engine as it answers a get sent now, on the path that would confirm a stop. Raises
         NoAnswer."""
         name, began = robot.registration.name, anyio.current_time()
@@ -237,7 +237,7 @@ class StartChecks:
         except TimeoutError as late:
             raise NoAnswer(f"Asked for {_PREFLIGHT_S:.0f} s. {robot.standing.why}") from late
         took = 1000 * (anyio.current_time() - began)
-        return Sight(
+        return EngineSight(
             name=name,
             facts=robot.facts,
             standing=robot.standing,

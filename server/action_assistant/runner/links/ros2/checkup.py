@@ -12,7 +12,7 @@ from typing import Final
 import anyio
 
 from action_assistant import ros_workspace
-from action_assistant.runner.links.diagnostics import Finding, Verdict
+from action_assistant.runner.links.diagnostics import Diagnostic, Verdict
 from action_assistant.runner.links.port import (
     Candidate,
     EngineChanged,
@@ -34,15 +34,15 @@ _SAYS_FASTRTPS: Final = "FASTDDS_BUILTIN_TRANSPORTS"
 
 async def look(
     robots: Sequence[Registration], wall: Callable[[], int], environ: Mapping[str, str] = os.environ
-) -> list[Finding]:
+) -> list[Diagnostic]:
     """Everything there is to say, the ground first. Takes some seconds; never raises for trouble."""
     found = environment(environ)
     reach = ros2_reach(wall, environ)
     if isinstance(reach, str):
         verdict: Verdict = "wrong" if robots else "note"  # a computer without robots needs none
-        return [*found, Finding(topic="rclpy", verdict=verdict, what=reach)]
+        return [*found, Diagnostic(topic="rclpy", verdict=verdict, what=reach)]
     found.append(
-        Finding(
+        Diagnostic(
             topic="rclpy",
             verdict="fine",
             what=f"rclpy of {_origin('rclpy')} speaks {reach.rmw}, with the temoto_msgs of "
@@ -54,7 +54,7 @@ async def look(
         found += _seen(await reach.candidates(), robots)
     except RuntimeError as error:
         found.append(
-            Finding(
+            Diagnostic(
                 topic="domain",
                 verdict="wrong",
                 what=f"The middleware cannot be started: {error}.",
@@ -66,15 +66,15 @@ async def look(
     return found
 
 
-def environment(environ: Mapping[str, str]) -> list[Finding]:
+def environment(environ: Mapping[str, str]) -> list[Diagnostic]:
     """What the environment sets, and what follows."""
     return [*_sourced(environ), *_domain(environ), *_shared_memory(environ)]
 
 
-def _sourced(environ: Mapping[str, str]) -> list[Finding]:
+def _sourced(environ: Mapping[str, str]) -> list[Diagnostic]:
     if environ.get("ROS_VERSION") == "1":
         return [
-            Finding(
+            Diagnostic(
                 topic="environment",
                 verdict="wrong",
                 what="ROS 1 is sourced in this shell.",
@@ -83,15 +83,17 @@ def _sourced(environ: Mapping[str, str]) -> list[Finding]:
         ]
     distro = environ.get("ROS_DISTRO")
     what = f"ROS 2 {distro} is sourced." if distro else "No ROS 2 is sourced."
-    return [Finding(topic="environment", verdict="fine", what=what)]
+    return [Diagnostic(topic="environment", verdict="fine", what=what)]
 
 
-def _domain(environ: Mapping[str, str]) -> list[Finding]:
+def _domain(environ: Mapping[str, str]) -> list[Diagnostic]:
     number = environ.get("ROS_DOMAIN_ID", "0")
-    found = [Finding(topic="domain", verdict="fine", what=f"The domain of this shell is {number}.")]
+    found = [
+        Diagnostic(topic="domain", verdict="fine", what=f"The domain of this shell is {number}.")
+    ]
     if number.isdigit() and int(number) > _SAFE_DOMAIN:
         found.append(
-            Finding(
+            Diagnostic(
                 topic="domain",
                 verdict="note",
                 what=f"Domain {number} uses ports that Linux also hands out to other programs.",
@@ -103,7 +105,7 @@ def _domain(environ: Mapping[str, str]) -> list[Finding]:
     if local or scope == "OFF":
         sees = "only engines on this computer" if local else "no engine by itself"
         found.append(
-            Finding(
+            Diagnostic(
                 topic="domain",
                 verdict="note",
                 what=f"Discovery is restricted, so this process sees {sees}.",
@@ -114,11 +116,11 @@ def _domain(environ: Mapping[str, str]) -> list[Finding]:
     return found
 
 
-def _shared_memory(environ: Mapping[str, str]) -> list[Finding]:
-    found: list[Finding] = []
+def _shared_memory(environ: Mapping[str, str]) -> list[Diagnostic]:
+    found: list[Diagnostic] = []
     if not os.access(_SHM, os.W_OK):
         found.append(
-            Finding(
+            Diagnostic(
                 topic="shared memory",
                 verdict="note",
                 what=f"{_SHM} cannot be written, so messages go over the network stack.",
@@ -126,7 +128,7 @@ def _shared_memory(environ: Mapping[str, str]) -> list[Finding]:
         )
     if any(each.exists() for each in _CONTAINER) and _SAYS_FASTRTPS not in environ:
         found.append(
-            Finding(
+            Diagnostic(
                 topic="shared memory",
                 verdict="note",
                 what="This is a container. Where it shares the host's network but not its memory, "
@@ -139,7 +141,7 @@ def _shared_memory(environ: Mapping[str, str]) -> list[Finding]:
     if strangers:
         runs = "runs" if len(strangers) == 1 else "run"
         found.append(
-            Finding(
+            Diagnostic(
                 topic="shared memory",
                 verdict="note",
                 what=f"{' and '.join(strangers)} {runs} nodes of Fast DDS too. Nodes of different "
@@ -173,15 +175,15 @@ def _origin(module: str) -> str:
     return ros_workspace.prefix_of(place) if place else "an unknown place"
 
 
-async def _robots(reach: Reach, robots: Sequence[Registration]) -> list[Finding]:
+async def _robots(reach: Reach, robots: Sequence[Registration]) -> list[Diagnostic]:
     """Whether each registered robot answers, all at once."""
     links: list[tuple[Registration, Link]] = []
-    found: list[Finding] = []
+    found: list[Diagnostic] = []
     for each in robots:
         try:
             links.append((each, reach.link(each, facts_of(each.profile))))
         except BadProfile as bad:
-            found.append(Finding(topic=each.name, verdict="wrong", what=f"Its profile: {bad}"))
+            found.append(Diagnostic(topic=each.name, verdict="wrong", what=f"Its profile: {bad}"))
     async with anyio.create_task_group() as tasks:
         for _, link in links:
             tasks.start_soon(link.run)
@@ -206,28 +208,28 @@ async def _answering(link: Link) -> None:
             await answers.wait()
 
 
-def _robot(robot: Registration, standing: Standing) -> Finding:
+def _robot(robot: Registration, standing: Standing) -> Diagnostic:
     """What one robot's standing means."""
     if standing.generation == "older":
-        return Finding(
+        return Diagnostic(
             topic=robot.name,
             verdict="wrong",
             what="Its temoto_msgs are another generation than the ones here; starts are refused.",
             advice="Build its engine with temoto_msgs of March 2025 or later.",
         )
     if standing.state != "answering":
-        return Finding(
+        return Diagnostic(
             topic=robot.name, verdict="wrong", what=standing.why, advice=_advice(standing)
         )
     deaf = [name for name in ("start", "stop") if not standing.listeners.get(name)]
     if deaf:
-        return Finding(
+        return Diagnostic(
             topic=robot.name,
             verdict="wrong",
             what=f"It answers, but nobody listens to {' and '.join(deaf)}.",
             advice="Compare the topics in its profile with `ros2 topic list`.",
         )
-    return Finding(
+    return Diagnostic(
         topic=robot.name,
         verdict="fine",
         what=f"It answers on {robot.get_service}, domain {robot.domain}, and listens.",
@@ -248,17 +250,17 @@ def _advice(standing: Standing) -> str:
     )
 
 
-def _seen(candidates: Sequence[Candidate], robots: Sequence[Registration]) -> list[Finding]:
+def _seen(candidates: Sequence[Candidate], robots: Sequence[Registration]) -> list[Diagnostic]:
     """Engines that nobody registered, and what is odd about any."""
     known = {(each.domain, f"/{each.get_service.lstrip('/')}") for each in robots}
-    found: list[Finding] = []
+    found: list[Diagnostic] = []
     for each in candidates:
         if each.problem:
             found.append(_odd(each))
         elif (each.domain, each.get_service) not in known:
             name = f" of {each.actor}" if each.actor else ""
             found.append(
-                Finding(
+                Diagnostic(
                     topic="engines",
                     verdict="note",
                     what=f"An engine{name} on {each.get_service}, domain {each.domain}, is not "
@@ -266,12 +268,12 @@ def _seen(candidates: Sequence[Candidate], robots: Sequence[Registration]) -> li
                 )
             )
     return found or [
-        Finding(
+        Diagnostic(
             topic="engines", verdict="fine", what="No engine that is not registered is in sight."
         )
     ]
 
 
-def _odd(candidate: Candidate) -> Finding:
+def _odd(candidate: Candidate) -> Diagnostic:
     place = f"{candidate.get_service}, domain {candidate.domain}"
-    return Finding(topic="engines", verdict="wrong", what=f"On {place}: {candidate.problem}")
+    return Diagnostic(topic="engines", verdict="wrong", what=f"On {place}: {candidate.problem}")

@@ -33,10 +33,16 @@ from temoto_msgs.msg import (
 from temoto_msgs.srv import UmrfGraphGet
 
 from action_assistant.runner.links.engine_text import NotAGraph, name_of, snapshot
-from action_assistant.runner.links.listeners import Ears
+from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import Command, Feedback
 from action_assistant.runner.links.ros2.outlets import Message, Outlet, Outlets, Topics, qos
-from action_assistant.runner.links.ros2.ros_values import Endpoint, Got, Heard, LogLine, Sound
+from action_assistant.runner.links.ros2.ros_values import (
+    Endpoint,
+    GetResult,
+    LogLine,
+    OverheardCommand,
+    RosValue,
+)
 
 log: Final = logging.getLogger(__name__)
 
@@ -53,7 +59,7 @@ M = TypeVar("M", bound=Message)
 Clock: TypeAlias = Callable[[], int]
 
 
-Ear: TypeAlias = Callable[[Sound], None]
+Ear: TypeAlias = Callable[[RosValue], None]
 
 
 class Domain:
@@ -69,8 +75,8 @@ class Domain:
         self.settled_at = time.monotonic() + DISCOVERY_S
         self._loop = loop
         self._wall = wall
-        self._ears = Ears[Sound]()
-        self._waiting: deque[Sound] = deque(maxlen=_KEPT)
+        self._subscribers = Listeners[RosValue]()
+        self._waiting: deque[RosValue] = deque(maxlen=_KEPT)
         self._called = False
         self._dropped = 0
         self._leaving = False
@@ -108,14 +114,14 @@ class Domain:
 
     # --- the one question ---------------------------------------------------------------------
 
-    async def ask(self, path: str) -> Got:
+    async def ask(self, path: str) -> GetResult:
         """Ask whoever serves a path. Waits for as long as the caller likes; the answer to a question
         that was given up goes nowhere. Raises NotAGraph, RuntimeError."""
         loop = asyncio.get_running_loop()
-        answered: asyncio.Future[Got] = loop.create_future()
+        answered: asyncio.Future[GetResult] = loop.create_future()
         client, asked_at = self.client(path), self._wall()
 
-        def hand_over(got: Got | Exception) -> None:
+        def hand_over(got: GetResult | Exception) -> None:
             if answered.done():
                 return
             if isinstance(got, Exception):
@@ -128,7 +134,7 @@ class Domain:
             if future.cancelled():
                 return
             try:
-                got: Got | Exception = _read(future.result(), asked_at, self._wall())
+                got: GetResult | Exception = _read(future.result(), asked_at, self._wall())
             except (NotAGraph, RuntimeError) as error:
                 got = error
             self._to_loop(lambda: hand_over(got))
@@ -189,7 +195,7 @@ class Domain:
 
     def hearing(self, ear: Ear) -> AbstractContextManager[None]:
         """Be told, on the event loop, what comes by itself."""
-        return self._ears.listening(ear)
+        return self._subscribers.listening(ear)
 
     def _listen(self) -> None:
         topics, node, out = self.topics, self._node, self.outlets
@@ -206,7 +212,7 @@ class Domain:
             if ours.sent(message, info.get("source_timestamp")):
                 return
             graph, umrf = _named(message)
-            sound = Heard(
+            sound = OverheardCommand(
                 command=command,
                 graph=graph,
                 umrf=umrf,
@@ -236,7 +242,7 @@ class Domain:
     def _log_line(self, message: Log) -> None:
         self._tell(LogLine(message.name, message.msg))
 
-    def _tell(self, sound: Sound) -> None:
+    def _tell(self, sound: RosValue) -> None:
         if len(self._waiting) == _KEPT:
             self._dropped += 1
         self._waiting.append(sound)
@@ -252,7 +258,7 @@ class Domain:
             self._dropped = 0
         while self._waiting:
             sound = self._waiting.popleft()
-            self._ears.tell(sound)
+            self._subscribers.tell(sound)
 
     def _to_loop(self, work: Callable[[], None]) -> None:
         try:
@@ -292,14 +298,14 @@ def _named(message: Message) -> tuple[str, str]:
             return message.umrf_graph_name, ""
 
 
-def _read(response: UmrfGraphGet.Response, asked_at: int, at: int) -> Got:
+def _read(response: UmrfGraphGet.Response, asked_at: int, at: int) -> GetResult:
     """Raises NotAGraph: an answer that is not wholly understood proves nothing."""
     texts, graphs = {}, []
     for text in response.graph_jsons_running:
         shown = snapshot(text, at=at, source="get", asked_at=asked_at)
         graphs.append(shown)
         texts[shown.graph] = text
-    return Got(
+    return GetResult(
         graphs=tuple(graphs),
         texts=texts,
         known_actions=tuple(response.umrf_jsons),

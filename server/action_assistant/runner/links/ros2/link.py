@@ -16,7 +16,7 @@ from temoto_msgs.msg import UmrfGraphModify, UmrfGraphPause, UmrfGraphResume, Um
 
 from action_assistant.runner.links.engine_process import engine_process
 from action_assistant.runner.links.engine_text import NotAGraph
-from action_assistant.runner.links.listeners import Ears
+from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -41,7 +41,12 @@ from action_assistant.runner.links.ros2.peers import (
     topics_of,
     two_servers,
 )
-from action_assistant.runner.links.ros2.ros_values import Endpoint, Heard, LogLine, Sound
+from action_assistant.runner.links.ros2.ros_values import (
+    Endpoint,
+    LogLine,
+    OverheardCommand,
+    RosValue,
+)
 from action_assistant.umrf.facts import EngineFacts
 
 _LOOK_S: Final = 1.0
@@ -71,7 +76,7 @@ class Ros2Link:
         self._facts = facts
         self._topics = topics_of(facts)
         self._wall = wall
-        self._ears = Ears[Report]()
+        self._subscribers = Listeners[Report]()
         self._domain: Domain | None = None
         self._runs: set[str] = set()
         self._known_since = 0.0  # when this incarnation was first seen, by the monotonic clock
@@ -235,7 +240,7 @@ class Ros2Link:
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Everything that concerns this robot, from now on."""
-        return self._ears.listening(hear)
+        return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
         """Nothing of its own: the domain is shared."""
@@ -307,7 +312,7 @@ class Ros2Link:
     def _become(self, now: Standing) -> None:
         before, self._standing = self._standing, now
         if (before.state, before.incarnation) != (now.state, now.incarnation):
-            self._ears.tell(
+            self._subscribers.tell(
                 EngineChanged(
                     at=self._wall(), state=now.state, incarnation=now.incarnation, why=now.why
                 )
@@ -326,13 +331,13 @@ class Ros2Link:
 
     # --- what is heard ------------------------------------------------------------------------
 
-    def _hear(self, sound: Sound) -> None:
+    def _hear(self, sound: RosValue) -> None:
         match sound:
             case Feedback():
                 self._hear_feedback(sound)
-            case Heard():
+            case OverheardCommand():
                 if self._name in sound.targets:
-                    self._ears.tell(
+                    self._subscribers.tell(
                         ForeignCommand(
                             at=self._wall(),
                             command=sound.command,
@@ -345,7 +350,9 @@ class Ros2Link:
             case LogLine():
                 if self._said(sound.logger):
                     text = sound.text.strip()
-                    self._ears.tell(EngineLog(at=self._wall(), text=text, graph=_graph_in(text)))
+                    self._subscribers.tell(
+                        EngineLog(at=self._wall(), text=text, graph=_graph_in(text))
+                    )
             case _:
                 assert_never(sound)
 
@@ -360,7 +367,7 @@ class Ros2Link:
             if not ours:
                 return
             sound = Feedback(actor=sound.actor, snapshots=ours)
-        self._ears.tell(sound)
+        self._subscribers.tell(sound)
 
     def _said(self, logger: str) -> bool:
         """Whether a line can only be this engine's: nodes of one name cannot be told apart."""

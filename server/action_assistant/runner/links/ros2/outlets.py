@@ -50,7 +50,7 @@ def qos(depth: int) -> QoSProfile:
     )
 
 
-class _Sent:
+class _SentMessage:
     """A message of ours and the time, in nanoseconds UTC, within which it was published."""
 
     def __init__(self, message: Message) -> None:
@@ -64,7 +64,7 @@ class Outlet(Generic[M]):
 
     def __init__(self, publisher: "Publisher[M]") -> None:
         self._publisher = publisher
-        self._sent: deque[_Sent] = deque(maxlen=256)
+        self._sent: deque[_SentMessage] = deque(maxlen=256)
         self._turn = anyio.Lock()
         self._free_at = 0.0
 
@@ -75,7 +75,7 @@ class Outlet(Generic[M]):
             message = make()
             if message is None:
                 return
-            mark = _Sent(message)
+            mark = _SentMessage(message)
             self._sent.append(mark)
             try:
                 self._publisher.publish(message)

@@ -16,7 +16,7 @@ from action_assistant.runner.links.ros2.domain import Domain
 from action_assistant.runner.links.ros2.link import Ros2Link
 from action_assistant.runner.links.ros2.outlets import Topics
 from action_assistant.runner.links.ros2.peers import OLDER, generation_of, topics_of, two_servers
-from action_assistant.runner.links.unreachable import AbsentLink
+from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.umrf.facts import PINNED, EngineFacts
 
 
@@ -38,7 +38,7 @@ class Ros2:
     def link(self, registration: Registration, facts: EngineFacts) -> Link:
         """A link to a robot; one that says why, if it is on another middleware."""
         if registration.rmw not in {"", self.rmw}:
-            return AbsentLink(
+            return UnreachableLink(
                 f"{registration.name} is registered with {registration.rmw}, but this runner speaks "
                 f"{self.rmw}, and two of them cannot ask each other anything. A process has one: "
                 "start the runner with RMW_IMPLEMENTATION set to the robot's"

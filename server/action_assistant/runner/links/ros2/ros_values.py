@@ -22,7 +22,7 @@ class Endpoint(msgspec.Struct, frozen=True):
     type_hash: str
 
 
-class Heard(msgspec.Struct, frozen=True, kw_only=True):
+class OverheardCommand(msgspec.Struct, frozen=True, kw_only=True):
     """A command that somebody else published. `graph` is the name that engines go by."""
 
     command: Command
@@ -39,10 +39,10 @@ class LogLine(msgspec.Struct, frozen=True):
     text: str
 
 
-Sound: TypeAlias = Feedback | Heard | LogLine
+RosValue: TypeAlias = Feedback | OverheardCommand | LogLine
 
 
-class Got(msgspec.Struct, frozen=True, kw_only=True):
+class GetResult(msgspec.Struct, frozen=True, kw_only=True):
     """What a server answered. `graphs` and `texts` are what it runs or has run; `known_…` its index."""
 
     graphs: tuple[Snapshot, ...]
