@@ -37,7 +37,7 @@ from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.schema.runner_tables import action_sum, review, run_label
 from action_assistant.schema.runner_tables import run as runs
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
@@ -50,7 +50,7 @@ SIZES: Final = (1_000, 10_000, 100_000)
 TIMES: Final = 5
 _GRAPHS: Final = 20
 _ANN: Final = Author("ann", "Ann")
-_ASIDE: Final[Aside] = anyio.to_thread.run_sync
+_ASIDE: Final[RunInWorker] = anyio.to_thread.run_sync
 
 
 def tables() -> Iterator[Table]:

@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser(asked[0] if asked else "").parse_args(asked)
     try:
         check_environment()
-        code: int = options.deed(options)
+        code: int = options.handler(options)
     except CannotStart as error:
         print(f"action-assistant: {error}", file=sys.stderr)
         return 2

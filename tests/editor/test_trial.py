@@ -35,9 +35,11 @@ class Troubled:
 
 
 @asynccontextmanager
-async def edited(journal: Journal, aside: Troubled | Lane, update: bytes) -> AsyncIterator[Member]:
+async def edited(
+    journal: Journal, run_in_worker: Troubled | Lane, update: bytes
+) -> AsyncIterator[Member]:
     """Somebody's socket after such an update, and somebody else who goes on."""
-    rooms = Rooms(journal, linger=60, window=0, tried=aside)
+    rooms = Rooms(journal, linger=60, window=0, tried=run_in_worker)
     ada, eve = Client("ada"), Client("eve")
     async with rooms.enter("graph/g") as room:
         ada.join(room)
@@ -62,27 +64,27 @@ def large() -> bytes:
 async def test_whose_edit_finds_the_machine_busy_may_send_it_again(
     journal: Journal, large: bytes, trouble: Exception
 ) -> None:
-    aside = Troubled(trouble)
-    async with edited(journal, aside, large) as member:
+    run_in_worker = Troubled(trouble)
+    async with edited(journal, run_in_worker, large) as member:
         assert await member.ended() == messages.TOO_SLOW
         assert "busy" in (member.said or "")
-    assert aside.asked == 1
+    assert run_in_worker.asked == 1
 
 
 async def test_one_process_that_dies_is_not_taken_for_the_edits_fault(
     journal: Journal, large: bytes
 ) -> None:
-    aside = Troubled(Crashed("killed"))
-    async with edited(journal, aside, large) as member:
+    run_in_worker = Troubled(Crashed("killed"))
+    async with edited(journal, run_in_worker, large) as member:
         assert not member.refused
-    assert aside.asked == 2
+    assert run_in_worker.asked == 2
 
 
 async def test_an_edit_that_ends_two_processes_is_refused(journal: Journal, large: bytes) -> None:
-    aside = Troubled(Crashed("killed"), Crashed("killed"))
-    async with edited(journal, aside, large) as member:
+    run_in_worker = Troubled(Crashed("killed"), Crashed("killed"))
+    async with edited(journal, run_in_worker, large) as member:
         assert await member.ended() == messages.MALFORMED
-    assert aside.asked == 2
+    assert run_in_worker.asked == 2
 
 
 async def test_an_edit_that_would_take_minutes_costs_seconds(journal: Journal) -> None:

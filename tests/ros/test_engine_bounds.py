@@ -50,7 +50,7 @@ pytestmark = [
 ]
 
 
-def wall() -> int:
+def clock_us() -> int:
     """Microseconds UTC."""
     return time.time_ns() // 1000
 
@@ -110,12 +110,12 @@ class Driven:
             self.log.close()
 
     async def _drive(self, runs: int) -> None:
-        reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(self.domain)})
+        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(self.domain)})
         assert not isinstance(reach, str), reach
         robots = Robots(reach=reach)
         try:
             async with ExecutionService.opened(
-                self.ledger, robots, wall=wall, aside=at_once
+                self.ledger, robots, clock_us=clock_us, run_in_worker=at_once
             ) as control:
                 await robots.register(Registration(name="David", domain=self.domain), ANN)
                 for n in range(runs):

@@ -61,7 +61,7 @@ STILL = ENDED - {"lost", "refused"}
 KNOWINGLY = Override(codes=("proof", "quiet", "others"), reason="it is a test")
 
 
-def wall() -> int:
+def clock_us() -> int:
     """Microseconds UTC."""
     return time.time_ns() // 1000
 
@@ -125,13 +125,13 @@ class Story:
     async def live(self) -> None:
         """All steps; then somebody stops everything."""
         await anyio.to_thread.run_sync(self.robot)
-        reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(self.domain)})
+        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(self.domain)})
         assert not isinstance(reach, str), reach
         stranger = await anyio.to_thread.run_sync(Stranger, self.domain)
         try:
             robots = Robots(reach=reach)
             async with ExecutionService.opened(
-                self.ledger, robots, wall=wall, aside=at_once
+                self.ledger, robots, clock_us=clock_us, run_in_worker=at_once
             ) as control:
                 control.watch(self.judge)
                 await robots.register(Registration(name="David", domain=self.domain), ANN)

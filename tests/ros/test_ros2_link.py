@@ -37,7 +37,7 @@ from ros.echo_engine import EchoEngine, graph_text
 from runner.world import sequence
 
 
-def wall() -> int:
+def clock_us() -> int:
     return time.time_ns() // 1000
 
 
@@ -52,7 +52,7 @@ def engine(domain: int, **options: Any) -> Iterator[EchoEngine]:
 
 @asynccontextmanager
 async def reach() -> AsyncIterator[Ros2]:
-    found = ros2_reach(wall)
+    found = ros2_reach(clock_us)
     assert isinstance(found, Ros2), found
     try:
         yield found
@@ -118,9 +118,9 @@ async def test_an_answer_holds_what_the_engine_holds_under_our_identity(domain: 
         node.running = [graph_text(), graph_text("other", "FINISHED", None, Work="FINISHED")]
         async with robot(domain) as link:
             await answering(link)
-            before = wall()
+            before = clock_us()
             answer = await link.get()
-            assert before <= answer.asked_at <= answer.at <= wall()
+            assert before <= answer.asked_at <= answer.at <= clock_us()
             ours, other = answer.graphs
             assert (ours.graph, ours.run, ours.source, ours.active) == ("patrol", "r1", "get", True)
             assert ours.nodes == {"Work_0": "RUNNING"}

@@ -35,7 +35,7 @@ from action_assistant.runner.links.ros2.ros_values import (
     OverheardCommand,
     RosValue,
 )
-from runner.world import wall
+from runner.world import clock_us
 
 LEASE_S = 10.0  # until discovery knows of a death that nobody announced
 GRAIN_MS = 0.01  # clocks are not finer: what is due so soon is due now
@@ -279,7 +279,7 @@ class Air:
 
     def show(self, actor: str, history: Sequence[str]) -> None:
         """Feedback, of a node or of somebody who only says so."""
-        at = wall()
+        at = clock_us()
         self.actors.add(actor)
         seen = tuple(snapshot(text, at=at, source="feedback") for text in reversed(history))
         self.tell(Shown(actor=actor, snapshots=seen))
@@ -295,7 +295,7 @@ class Air:
 
     async def ask(self, path: str) -> GetResult:
         """The first answer of whoever serves a path."""
-        asked_at = wall()
+        asked_at = clock_us()
         self._tickets += 1
         ticket, event, got = self._tickets, anyio.Event(), list[GetResponse]()
         self._asked[ticket] = event, got
@@ -307,7 +307,7 @@ class Air:
             await event.wait()
         finally:
             del self._asked[ticket]
-        at, texts, graphs = wall(), {}, []
+        at, texts, graphs = clock_us(), {}, []
         for text in got[0].running:
             shown = snapshot(text, at=at, source="get", asked_at=asked_at)
             graphs.append(shown)

@@ -21,7 +21,7 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.links.ros2.ros_values import LogLine, OverheardCommand
 from runner.air import HASH, Air
-from runner.world import wall
+from runner.world import clock_us
 
 
 class AirLink:
@@ -92,7 +92,7 @@ class AirLink:
 
     async def get(self) -> Answer:
         """Ask the one server."""
-        before, asked_at = self._air.servers(self._path), wall()
+        before, asked_at = self._air.servers(self._path), clock_us()
         if len(before) != 1:
             raise NoAnswer(self.standing.why)
         got = await self._air.ask(self._path)
@@ -100,7 +100,7 @@ class AirLink:
             raise NoAnswer("while it was asked, another engine came or went")
         return Answer(
             asked_at=asked_at,
-            at=wall(),
+            at=clock_us(),
             incarnation=before[0].gid,
             graphs=got.graphs,
             texts=got.texts,
@@ -117,7 +117,7 @@ class AirLink:
                     self._told = now.state, now.incarnation
                     self._subscribers.tell(
                         EngineChanged(
-                            at=wall(), state=now.state, incarnation=now.incarnation, why=now.why
+                            at=clock_us(), state=now.state, incarnation=now.incarnation, why=now.why
                         )
                     )
                 await anyio.sleep(1)
@@ -129,7 +129,7 @@ class AirLink:
             case OverheardCommand() if self._name in sound.targets:
                 self._subscribers.tell(
                     ForeignCommand(
-                        at=wall(),
+                        at=clock_us(),
                         command=sound.command,
                         graph=sound.graph,
                         umrf=sound.umrf,
@@ -138,7 +138,7 @@ class AirLink:
                     )
                 )
             case LogLine(text=text) if len(self._air.publishers("feedback")) <= 1:
-                self._subscribers.tell(EngineLog(at=wall(), text=text))
+                self._subscribers.tell(EngineLog(at=clock_us(), text=text))
             case _:
                 pass
 

@@ -22,7 +22,7 @@ from action_assistant.runner.links.port import (
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph, Parameter
-from runner.world import Robot, engine, wall
+from runner.world import Robot, clock_us, engine
 
 WORK = codec.write_action(Action(key="work", name="Work"))
 
@@ -65,15 +65,17 @@ class Open(Robot):
 
     def command(self, command: Command, graph: str, umrf: str = "") -> None:
         """Somebody else publishes something."""
-        self.tell(ForeignCommand(at=wall(), command=command, graph=graph, umrf=umrf, sender="them"))
+        self.tell(
+            ForeignCommand(at=clock_us(), command=command, graph=graph, umrf=umrf, sender="them")
+        )
 
     def become(self, state: EngineState, why: str) -> None:
         """Discovery says that the engine is otherwise."""
-        self.tell(EngineChanged(at=wall(), state=state, why=why))
+        self.tell(EngineChanged(at=clock_us(), state=state, why=why))
 
     def log(self, text: str, graph: str | None = None) -> None:
         """The engine logs a line."""
-        self.tell(EngineLog(at=wall(), text=text, graph=graph))
+        self.tell(EngineLog(at=clock_us(), text=text, graph=graph))
 
 
 class Fleet:

@@ -8,7 +8,7 @@ from sqlalchemy import select
 
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import projection
-from action_assistant.runner.clock import wall_clock
+from action_assistant.runner.clock import utc_us
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots.registry import Robots
@@ -25,7 +25,7 @@ async def _all(journal: Journal) -> list[Any]:
 async def test_rebuilt_tables_are_the_same(tmp_path: Path) -> None:
     url = f"sqlite:///{tmp_path / 'runner.db'}"
     journal = await Journal.open(url, branch="runner", fold=projection.fold)
-    async with ExecutionService.opened(journal, Robots(), wall=wall_clock) as control:
+    async with ExecutionService.opened(journal, Robots(), clock_us=utc_us) as control:
         await control.register(Registration(name="David", profile={"commit": "1"}), ANN)
         await control.register(Registration(name="David", domain=4), ANN)
         fast, endless = {"*": [{"after_s": 0.01}]}, {"*": [{"never": True}]}
@@ -43,7 +43,7 @@ async def test_rebuilt_tables_are_the_same(tmp_path: Path) -> None:
 async def test_the_row_of_a_run_that_is_over_tells_what_the_run_tells(tmp_path: Path) -> None:
     url = f"sqlite:///{tmp_path / 'runner.db'}"
     journal = await Journal.open(url, branch="runner", fold=projection.fold)
-    async with ExecutionService.opened(journal, Robots(), wall=wall_clock) as control:
+    async with ExecutionService.opened(journal, Robots(), clock_us=utc_us) as control:
         script = {"*": [{"after_s": 60, "stop_s": 2.5}]}
         started = await control.start(order(sequence(), script=script), ANN)
         await control.stop(started.run.id, BEN)  # takes so long that there is an alarm

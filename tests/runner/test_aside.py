@@ -26,7 +26,7 @@ def test_nothing_that_cannot_travel_is_sent_to_workers() -> None:
         if isinstance(node, ast.Call)
         and isinstance(node.func, ast.Name | ast.Attribute)
         and (node.func.attr if isinstance(node.func, ast.Attribute) else node.func.id).strip("_")
-        == "aside"
+        == "run_in_worker"
         and isinstance(node.args[0], ast.Lambda)
     ]
     assert found == []

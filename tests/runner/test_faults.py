@@ -20,12 +20,12 @@ from runner.world import (
     BEN,
     World,
     at_once,
+    clock_us,
     live_through,
     order,
     sequence,
     until,
     virtual,
-    wall,
 )
 
 
@@ -137,8 +137,8 @@ def test_a_recording_that_cannot_be_looked_at_does_not_end_what_puts_old_ones_aw
             Recordings(tmp_path / "recordings", at_once),
             Keep(folder=tmp_path, raw=1),
             is_open=lambda _: False,
-            wall=wall,
-            aside=at_once,
+            clock_us=clock_us,
+            run_in_worker=at_once,
         )
         retention._left_over = False
         with anyio.move_on_after(3 * 3_600) as waited:
@@ -154,7 +154,7 @@ async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_no
     world = World()
     async with world.runner() as control, anyio.create_task_group() as tasks:
         archive_store = ArchiveStore(world.ledger, Path("nowhere"), at_once)  # type: ignore[arg-type]
-        review_service = ReviewService(control, archive_store, at_once, wall)
+        review_service = ReviewService(control, archive_store, at_once, clock_us)
         keyframes, failed = review_service.keyframe_store.keyframes, []
 
         async def fails_once(run: str) -> Any:

@@ -14,7 +14,7 @@ from websockets.sync.client import ClientConnection
 
 from action_assistant.runner.api.live import Hub, Outbox
 from runner.process import RunnerProcess, over, started
-from runner.world import ANN, World, carousel, order, sequence, virtual, wall
+from runner.world import ANN, World, carousel, clock_us, order, sequence, virtual
 
 ENDLESS = {"*": [{"never": True}]}
 BUSY = {"*": [{"after_s": 0.0}]}
@@ -137,7 +137,7 @@ def test_ten_tabs_and_busy_runs_do_not_delay_a_stop(own_process: RunnerProcess) 
 async def test_a_page_that_does_not_read_is_owed_one_state_of_each_run() -> None:
     world = World()
     async with world.runner() as control:
-        hub = Hub(control, wall)
+        hub = Hub(control, clock_us)
         box = Outbox(hub, lambda: True)
         hub.boxes.add(box)
         run = (await control.start(order(carousel(), script=BUSY), ANN)).run
@@ -159,7 +159,7 @@ async def test_a_page_that_does_not_read_is_owed_one_state_of_each_run() -> None
 async def test_states_of_one_run_come_at_most_twenty_times_a_second() -> None:
     world = World()
     async with world.runner() as control:
-        hub = Hub(control, wall)
+        hub = Hub(control, clock_us)
         box = Outbox(hub, lambda: True)
         hub.boxes.add(box)
         await control.start(order(carousel(), script=BUSY), ANN)
@@ -178,7 +178,7 @@ async def test_states_of_one_run_come_at_most_twenty_times_a_second() -> None:
 async def test_the_answer_to_a_stop_goes_before_everything_that_waits() -> None:
     world = World()
     async with world.runner() as control:
-        hub = Hub(control, wall)
+        hub = Hub(control, clock_us)
         box = Outbox(hub, lambda: True)
         hub.boxes.add(box)
         for i in range(20):
@@ -200,7 +200,7 @@ async def test_the_answer_to_a_stop_goes_before_everything_that_waits() -> None:
 async def test_an_expired_session_is_shown_nothing_more_but_its_stop_is_followed() -> None:
     world = World()
     async with world.runner() as control:
-        hub = Hub(control, wall)
+        hub = Hub(control, clock_us)
         box = Outbox(hub, lambda: False)
         hub.boxes.add(box)
         run = (await control.start(order(sequence(), script=ENDLESS), ANN)).run

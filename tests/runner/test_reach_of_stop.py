@@ -16,7 +16,7 @@ from action_assistant.umrf.files import codec
 from runner.fleet import Fleet, Open
 from runner.scene import PATROL, Scene, asked, shown
 from runner.test_robots import NEVER, fleet, group
-from runner.world import ANN, BEN, World, at_once, order, sequence, until, virtual, wall
+from runner.world import ANN, BEN, World, at_once, clock_us, order, sequence, until, virtual
 
 
 async def _cleaning(robot: Open, run: str) -> None:
@@ -146,7 +146,9 @@ async def test_a_start_that_comes_while_its_robot_is_registered_anew_can_be_stop
     world, david = World(), Open(NEVER)
     robots = Robots(reach=Leases(David=david))
     async with (
-        ExecutionService.opened(world.ledger, robots, wall=wall, aside=at_once) as control,
+        ExecutionService.opened(
+            world.ledger, robots, clock_us=clock_us, run_in_worker=at_once
+        ) as control,
         anyio.create_task_group() as tasks,
     ):
         await control.register(Registration(name="David"), ANN)

@@ -27,7 +27,7 @@ from action_assistant.runner.start.start_checks import GroupRequest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.fleet import Fleet, Open, given
-from runner.world import ANN, BEN, World, at_once, order, sequence, until, virtual, wall
+from runner.world import ANN, BEN, World, at_once, clock_us, order, sequence, until, virtual
 
 NEVER = {"*": [{"never": True}]}
 
@@ -36,7 +36,9 @@ NEVER = {"*": [{"never": True}]}
 async def fleet(world: World, **robots: Open) -> AsyncIterator[ExecutionService]:
     """A runner that knows these robots, after they have answered for the first time."""
     reach = Robots(reach=Fleet(**robots))
-    async with ExecutionService.opened(world.ledger, reach, wall=wall, aside=at_once) as control:
+    async with ExecutionService.opened(
+        world.ledger, reach, clock_us=clock_us, run_in_worker=at_once
+    ) as control:
         for name in robots:
             await control.register(Registration(name=name), ANN)
         await until(lambda: all(control.robots.robot(name).heard_at for name in robots))
@@ -70,7 +72,7 @@ async def test_a_robot_that_answers_says_so_and_what_it_has() -> None:
 @virtual
 async def test_each_beat_tells_when_an_idle_robot_answered_although_nothing_has_changed() -> None:
     async with fleet(World(), David=Open()) as control:
-        hub = Hub(control, wall)
+        hub = Hub(control, clock_us)
         changes: list[None] = []
         control.watch_robots(lambda: changes.append(None))
         first = msgspec.json.decode(hub.beat())["heard"]["David"]
@@ -120,7 +122,7 @@ async def test_an_engine_that_came_back_is_called_restarted() -> None:
 async def test_a_changed_profile_makes_another_link_and_a_removed_robot_is_unknown() -> None:
     reach = Fleet(David=Open())
     async with ExecutionService.opened(
-        World().ledger, Robots(reach=reach), wall=wall, aside=at_once
+        World().ledger, Robots(reach=reach), clock_us=clock_us, run_in_worker=at_once
     ) as control:
         await control.register(Registration(name="David"), ANN)
         await control.register(Registration(name="David", profile={"pauses_safely": True}), ANN)
@@ -167,7 +169,9 @@ async def test_registered_robots_are_known_after_a_restart_and_removed_ones_are_
     async with fleet(world, David=Open(), Eve=Open()) as control:
         await control.remove("Eve", ANN)
     again = Robots(reach=Fleet(David=Open()))
-    async with ExecutionService.opened(world.ledger, again, wall=wall, aside=at_once) as control:
+    async with ExecutionService.opened(
+        world.ledger, again, clock_us=clock_us, run_in_worker=at_once
+    ) as control:
         assert [robot.name for robot in control.robots.all()] == ["simulator", "David"]
 
 
@@ -178,7 +182,7 @@ async def test_candidates_are_those_that_nobody_registered() -> None:
     other = Candidate(domain=3, rmw="x", get_service="/eve/umrf_graph_get", actor="Eve")
     reach.sight = (seen, other)
     async with ExecutionService.opened(
-        World().ledger, Robots(reach=reach), wall=wall, aside=at_once
+        World().ledger, Robots(reach=reach), clock_us=clock_us, run_in_worker=at_once
     ) as control:
         assert await control.robots.candidates() == (seen, other)
         await control.register(Registration(name="David"), ANN)
@@ -360,7 +364,9 @@ async def test_a_change_that_was_read_while_the_run_was_stopped_is_not_sent() ->
         return work(*args)
 
     world = World()
-    async with ExecutionService.opened(world.ledger, Robots(), wall=wall, aside=slowly) as control:
+    async with ExecutionService.opened(
+        world.ledger, Robots(), clock_us=clock_us, run_in_worker=slowly
+    ) as control:
         run = (await control.start(order(sequence(), script=NEVER), ANN)).run
         await anyio.sleep(1)
         async with anyio.create_task_group() as tasks:

@@ -30,13 +30,13 @@ from runner.world import (
     Robot,
     World,
     at_once,
+    clock_us,
     engine,
     order,
     sequence,
     two_ends,
     until,
     virtual,
-    wall,
 )
 
 LOOKED = RestRequest("I stand beside it; nothing moves.")
@@ -500,9 +500,9 @@ async def test_a_run_that_moves_again_while_a_start_is_looked_at_stands_in_its_w
     """The index of the robot is read in a worker meanwhile."""
     real = KnownEngine.index
 
-    async def index(self: KnownEngine, aside: Any) -> Any:
+    async def index(self: KnownEngine, run_in_worker: Any) -> Any:
         await anyio.sleep(0.1)
-        return await real(self, aside)
+        return await real(self, run_in_worker)
 
     monkeypatch.setattr(KnownEngine, "index", index)
     for wait in range(0, 30, 3):
@@ -539,7 +539,9 @@ async def test_a_mark_of_a_run_that_is_not_here_is_asked_for_once() -> None:
         await anyio.sleep(0.5)
         scene.air.carry(Start(graph_name="theirs", targets=("David",), graph_json=text), "other")
         await anyio.sleep(1)
-        async with ExecutionService.opened(ledger, robots, wall=wall, aside=at_once, past=past):
+        async with ExecutionService.opened(
+            ledger, robots, clock_us=clock_us, run_in_worker=at_once, past=past
+        ):
             await anyio.sleep(60)
         wind.cancel_scope.cancel()
     assert asked_for == ["AAAAAAAAAAAA"]

@@ -104,7 +104,7 @@ def virtual(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
     return lived
 
 
-def wall() -> int:
+def clock_us() -> int:
     """Virtual microseconds UTC."""
     return EPOCH + round(asyncio.get_running_loop().time() * 1e6)
 
@@ -146,7 +146,7 @@ class MemoryLedger:
                     len(events) + 1,
                     draft.kind,
                     draft.author,
-                    wall(),
+                    clock_us(),
                     draft.body,
                     self.position,
                 )
@@ -300,7 +300,7 @@ class Robot:
 def engine(script: dict[str, Any] | None = None) -> SimulatorLink:
     """A simulated engine."""
     chosen = script_from({"behaviours": script}) if script else Script()
-    return SimulatorLink(Engine(facts=SIMULATED, script=chosen), wall=wall)
+    return SimulatorLink(Engine(facts=SIMULATED, script=chosen), clock_us=clock_us)
 
 
 class World:
@@ -315,7 +315,7 @@ class World:
     async def runner(self) -> AsyncIterator[ExecutionService]:
         """A runner, up to its end."""
         async with ExecutionService.opened(
-            self.ledger, Robots(self.links), wall=wall, aside=at_once
+            self.ledger, Robots(self.links), clock_us=clock_us, run_in_worker=at_once
         ) as control:
             control.watch(self._saw)
             yield control

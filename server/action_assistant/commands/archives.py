@@ -23,7 +23,7 @@ def add_to(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     archive.add_argument(
         "--check", action="store_true", help="only prove every archive of the folder; no server"
     )
-    archive.set_defaults(deed=_archive)
+    archive.set_defaults(handler=_archive)
 
     restore = runs.add_parser(
         "restore",
@@ -34,7 +34,7 @@ def add_to(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     restore.add_argument(
         "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
     )
-    restore.set_defaults(deed=_restore)
+    restore.set_defaults(handler=_restore)
 
 
 def _days(text: str) -> float:

@@ -49,7 +49,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "--actions", type=Path, metavar="DIR", help="of action packages: their *umrf.json"
     )
     check.add_argument("--graphs", type=Path, metavar="DIR", help="of sub-graphs: *graph.json")
-    check.set_defaults(deed=_check)
+    check.set_defaults(handler=_check)
 
     convert = commands.add_parser(
         "convert",
@@ -67,7 +67,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         action="store_true",
         help="give inputs that lack a value the example that old files have for them",
     )
-    convert.set_defaults(deed=_convert)
+    convert.set_defaults(handler=_convert)
 
     simulate = commands.add_parser(
         "simulate",
@@ -89,15 +89,15 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "--for", type=float, default=_DAY, dest="seconds", metavar="SECONDS", help="default: a day"
     )
     simulate.add_argument("--trace", action="store_true", help="as JSON lines, for programs")
-    simulate.set_defaults(deed=_simulate)
+    simulate.set_defaults(handler=_simulate)
 
 
 def _command(text: str) -> tuple[float, str, str | None]:
     moment, _, rest = text.partition(":")
-    deed, _, graph = rest.partition(":")
-    if deed not in _COMMANDS:
+    handler, _, graph = rest.partition(":")
+    if handler not in _COMMANDS:
         raise ValueError
-    return float(moment), deed, graph or None
+    return float(moment), handler, graph or None
 
 
 def _text(path: Path) -> bytes:

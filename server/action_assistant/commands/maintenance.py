@@ -22,7 +22,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         epilog="example: action-assistant verify --data ./data",
     )
     _where(verify)
-    verify.set_defaults(deed=_verify)
+    verify.set_defaults(handler=_verify)
 
     rebuild = commands.add_parser(
         "rebuild",
@@ -30,7 +30,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         epilog="example: action-assistant rebuild --data ./data",
     )
     _where(rebuild)
-    rebuild.set_defaults(deed=_rebuild)
+    rebuild.set_defaults(handler=_rebuild)
 
 
 def _where(parser: argparse.ArgumentParser) -> None:
@@ -67,7 +67,7 @@ def _rebuild(options: argparse.Namespace) -> int:
 
 
 def _for_each(
-    options: argparse.Namespace, deed: Callable[[Branch, Journal], Awaitable[bool]]
+    options: argparse.Namespace, handler: Callable[[Branch, Journal], Awaitable[bool]]
 ) -> int:
     """Do it to every journal that there is; 1 unless all went well. Raises CannotStart."""
     from action_assistant.editor.log import database_location
@@ -88,7 +88,7 @@ def _for_each(
     async def one(branch: Branch, url: str, fold: Fold) -> bool:
         journal = await Journal.open(url, branch=branch, fold=fold)
         try:
-            return await deed(branch, journal)
+            return await handler(branch, journal)
         except Unavailable as error:
             print(f"{branch}: {error.detail}")
             return False

@@ -22,12 +22,12 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
 
     listed = command(words, "list", "the links, and who came in by them", "", of="people")
     listed.add_argument("--json", action="store_true", help="as JSON, for programs")
-    listed.set_defaults(deed=_list)
+    listed.set_defaults(handler=_list)
 
     invite = command(words, "invite", "make a link", "operator --label 'lab tablet'", of="people")
     invite.add_argument("role", choices=["viewer", "editor", "operator"])
     invite.add_argument("--label", default="", help="whom it is for")
-    invite.set_defaults(deed=_invite)
+    invite.set_defaults(handler=_invite)
 
     revoke = command(
         words,
@@ -37,7 +37,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         of="people",
     )
     revoke.add_argument("id", metavar="ID", help="as `people list` shows it")
-    revoke.set_defaults(deed=_revoke)
+    revoke.set_defaults(handler=_revoke)
 
 
 def _list(options: argparse.Namespace) -> int:

@@ -25,7 +25,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     _database(both, switch=True)
     _sharing(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
-    both.set_defaults(deed=_serve)
+    both.set_defaults(handler=_serve)
 
     editor = commands.add_parser(
         "editor",
@@ -38,7 +38,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     editor.add_argument(
         "--runner-port", type=port_number, metavar="N", help="default: the next port"
     )
-    editor.set_defaults(deed=_editor)
+    editor.set_defaults(handler=_editor)
 
     runner = commands.add_parser(
         "runner",
@@ -50,7 +50,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     runner.add_argument(
         "--page-port", type=port_number, metavar="N", help="default: the port before"
     )
-    runner.set_defaults(deed=_runner)
+    runner.set_defaults(handler=_runner)
 
     migrate = commands.add_parser(
         "migrate",
@@ -59,7 +59,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     migrate.add_argument("--data", type=Path, default=paths.data(), metavar="DIR")
     _database(migrate)
-    migrate.set_defaults(deed=_migrate)
+    migrate.set_defaults(handler=_migrate)
 
 
 def port_number(text: str) -> int:

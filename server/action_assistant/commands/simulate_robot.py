@@ -61,7 +61,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     robot.add_argument("--facts", metavar="COMMIT", help="of the engine that it stands in for")
     robot.add_argument("--wake-words", default="", metavar="A,B", help="others that it answers to")
-    robot.set_defaults(deed=_simulate_robot)
+    robot.set_defaults(handler=_simulate_robot)
 
 
 def _known() -> str:

@@ -26,7 +26,7 @@ from action_assistant.web.auth.session_files import SignedInBrowsers
 from action_assistant.web.auth.sessions import session_routes
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.server.application import Readiness, application
-from action_assistant.web.workers.lanes import here
+from action_assistant.web.workers.lanes import run_here
 
 log: Final = logging.getLogger(__name__)
 
@@ -127,7 +127,9 @@ async def _greet(services: EditorServices, folder: Path) -> None:
     for path in sorted(files, reverse=True):  # the last one made stands first in the list
         try:
             # At once: they are small, ours, and nobody is here whom that could hold up.
-            await services.catalogue.bring(await path.read_bytes(), h.EXAMPLES, aside=here)
+            await services.catalogue.bring(
+                await path.read_bytes(), h.EXAMPLES, run_in_worker=run_here
+            )
         except BadInput as error:
             log.error("the example %s cannot be read: %s", path.name, error.detail)
 

@@ -34,7 +34,7 @@ class EditorServices:
         self.epoch = epoch
         self.people = people
         self.workers = workers
-        self.rooms = Rooms(journal, aside=workers.graphs, tried=workers.edits)
+        self.rooms = Rooms(journal, run_in_worker=workers.graphs, tried=workers.edits)
         self.crowd = Crowd(limits=settings.limits)
         self.budget = Budget(limits=settings.limits)
         self.sights = Sights(journal, self.rooms, workers.graphs)

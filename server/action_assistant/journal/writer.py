@@ -40,12 +40,12 @@ def now() -> int:
 class Job(Generic[T]):
     """Work for the writer's thread, and who waits for its result."""
 
-    def __init__(self, work: Callable[["Pen"], T], future: "asyncio.Future[T]") -> None:
+    def __init__(self, work: Callable[["Transaction"], T], future: "asyncio.Future[T]") -> None:
         self.work = work
         self.future = future
 
 
-class Pen:
+class Transaction:
     """What jobs write with. Events are gathered, and stored together by one statement at the end.
 
     A job that does nothing else costs no round trip of its own. Every other statement of a job is
@@ -194,7 +194,7 @@ class Writer:
         self._fold = fold
         self._tell = tell
         self._clock = clock
-        self._pen: Pen | None = None
+        self._transaction: Transaction | None = None
         self._jobs: queue.SimpleQueue[Sequence[Job[Any]] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, name=f"{database.name} pen", daemon=True)
         self._thread.start()
@@ -233,30 +233,32 @@ class Writer:
 
     def _commit(self, jobs: list[Job[Any]]) -> None:
         done: list[Outcome] = []
-        pen: Pen | None = None
+        transaction: Transaction | None = None
         try:
-            session, pen = self._connected()
-            session.run(lambda: self._together(pen, jobs, done))
+            session, transaction = self._connected()
+            session.run(lambda: self._together(transaction, jobs, done))
         except Exception as error:  # whatever it is, the thread lives on, and all who wait hear it
             # After a failed commit nobody knows what the disk holds: begin again from there.
             ours = not isinstance(error, self._database.faults)
             log.error("%s was not written: %s", self._database.name, cause_of(error), exc_info=ours)
             self._disconnect()
-            done = self._settled(pen, done, len(jobs), error)
+            done = self._settled(transaction, done, len(jobs), error)
         self._tell(list(zip(jobs, done, strict=True)))
 
-    def _together(self, pen: Pen, jobs: list[Job[Any]], done: list[Outcome]) -> None:
-        pen.start()
-        done.extend(pen.attempt(job, self._database) for job in jobs)
-        pen.finish()
+    def _together(
+        self, transaction: Transaction, jobs: list[Job[Any]], done: list[Outcome]
+    ) -> None:
+        transaction.start()
+        done.extend(transaction.attempt(job, self._database) for job in jobs)
+        transaction.finish()
 
     def _settled(
-        self, pen: Pen | None, done: list[Outcome], jobs: int, error: Exception
+        self, transaction: Transaction | None, done: list[Outcome], jobs: int, error: Exception
     ) -> list[Outcome]:
         """What became of jobs whose transaction failed: everything or nothing, or nobody knows."""
         text = f"Nothing can be stored at the moment: {cause_of(error)}."
-        if pen is not None and pen.committing and pen.last is not None:
-            match self._stored(*pen.last):
+        if transaction is not None and transaction.committing and transaction.last is not None:
+            match self._stored(*transaction.last):
                 case True:
                     return done
                 case None:
@@ -279,17 +281,17 @@ class Writer:
                 return None
             time.sleep(_AGAIN)
 
-    def _connected(self) -> tuple[Session, Pen]:
+    def _connected(self) -> tuple[Session, Transaction]:
         session = self._session
         if session is None or not session.alive():
             self._disconnect()
             session = self._session = self._database.connect()
-        if self._pen is None:
-            self._pen = session.run(lambda: Pen(session, self._fold, self._clock))
-        return session, self._pen
+        if self._transaction is None:
+            self._transaction = session.run(lambda: Transaction(session, self._fold, self._clock))
+        return session, self._transaction
 
     def _disconnect(self) -> None:
-        session, self._session, self._pen = self._session, None, None
+        session, self._session, self._transaction = self._session, None, None
         if session is not None:
             session.close()
 

@@ -20,7 +20,7 @@ from action_assistant.runner.api.runs import routes
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
-from action_assistant.runner.clock import wall_clock
+from action_assistant.runner.clock import utc_us
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
@@ -62,34 +62,34 @@ async def open_services(
             ours = WorkerQueries(
                 workers.ours, place, archive_store
             )  # what moves again waits behind nobody
-            services.aside = workers.looks
-            reach = ros2_reach(wall_clock)
+            services.run_in_worker = workers.looks
+            reach = ros2_reach(utc_us)
             robots = Robots(reach=reach, recordings=recordings)
             async with (
                 _kept(reach),
                 ExecutionService.opened(
                     archive_store,
                     robots,
-                    wall=wall_clock,
-                    aside=workers.starts,
+                    clock_us=utc_us,
+                    run_in_worker=workers.starts,
                     simulator=Simulators(),
                     past=lambda run, whole: (ours if whole else services.asked).past(run, whole),
                 ) as control,
             ):
                 services.asked.opened = ours.opened = control.open
-                services.control, services.hub = control, Hub(control, wall_clock)
+                services.control, services.hub = control, Hub(control, utc_us)
                 services.crowd = Crowd(limits=settings.limits, keeps_one=True)
                 services.journal = journal
                 services.review_service = ReviewService(
-                    control, archive_store, on_disk, wall_clock, services.asked
+                    control, archive_store, on_disk, utc_us, services.asked
                 )
                 services.retention = Retention(
                     journal,
                     recordings,
                     keep,
                     is_open=control.open.__contains__,
-                    wall=wall_clock,
-                    aside=on_disk,
+                    clock_us=utc_us,
+                    run_in_worker=on_disk,
                 )
                 async with anyio.create_task_group() as tasks:
                     tasks.start_soon(services.review_service.run)

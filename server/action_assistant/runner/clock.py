@@ -3,9 +3,9 @@
 import time
 from collections.abc import Callable
 
-Clock = Callable[[], int]
+ClockUs = Callable[[], int]
 
 
-def wall_clock() -> int:
+def utc_us() -> int:
     """Microseconds UTC."""
     return time.time_ns() // 1000

@@ -78,8 +78,8 @@ async def add_run(journal: Journal, run: str, number: int, length: int, ended_at
 def retention(journal: Journal, data: Path, **more: Any) -> Retention:
     keep = Keep(folder=data / "archive", runs=30, raw=7)
     recordings = Recordings(data / "recordings", asyncio.to_thread, prunes=False)
-    fields: dict[str, Any] = {"is_open": lambda _: False, "wall": lambda: NOW}
-    return Retention(journal, recordings, keep, aside=asyncio.to_thread, **(fields | more))
+    fields: dict[str, Any] = {"is_open": lambda _: False, "clock_us": lambda: NOW}
+    return Retention(journal, recordings, keep, run_in_worker=asyncio.to_thread, **(fields | more))
 
 
 def archive_store(journal: Journal, data: Path) -> ArchiveStore:

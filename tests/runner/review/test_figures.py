@@ -29,7 +29,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.bounds import Air, Lived, lived
 from runner.test_bounds import AIRS, CALL
-from runner.world import at_once, live_through, wall
+from runner.world import at_once, clock_us, live_through
 
 SCRIPTS = st.dictionaries(
     st.sampled_from(["Work_0", "Work_1", "*"]), st.lists(CALL, min_size=1, max_size=1), max_size=3
@@ -219,7 +219,7 @@ def test_runs_that_an_older_version_has_summed_up_are_summed_up_again(tmp_path: 
         assert [row.took for row in before if row.took] == [[[0, None]]]  # at least: it is no value
         async with told.place.world.runner() as control, anyio.create_task_group() as tasks:
             review_service = ReviewService(
-                control, ArchiveStore(ledger, tmp_path, at_once), at_once, wall
+                control, ArchiveStore(ledger, tmp_path, at_once), at_once, clock_us
             )
             tasks.start_soon(review_service.run)
             await anyio.sleep(5)

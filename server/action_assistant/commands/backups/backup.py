@@ -67,8 +67,8 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         default=settings.database(),
         help="where the graphs shall be, an empty database; default: where those of the folder are",
     )
-    backup.set_defaults(deed=_backup)
-    back.set_defaults(deed=restore.restore)
+    backup.set_defaults(handler=_backup)
+    back.set_defaults(handler=restore.restore)
 
 
 def _backup(options: argparse.Namespace) -> int:

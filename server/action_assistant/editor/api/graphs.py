@@ -216,11 +216,11 @@ def _past(app_state: EditorState) -> list[ControllerRouterHandler]:
         async with services.rooms.enter(h.graph_stream(graph_id)) as room:
             before = room.seq
             seq = await server_edits.restore(
-                room, person.id, then.state, aside=services.workers.graphs
+                room, person.id, then.state, run_in_worker=services.workers.graphs
             )
         if seq > before:
-            deed = h.draft(h.RESTORED, person.id, h.Restored(data.seq, seq))
-            await services.journal.append(h.about_stream(graph_id), [deed])
+            restored = h.draft(h.RESTORED, person.id, h.Restored(data.seq, seq))
+            await services.journal.append(h.about_stream(graph_id), [restored])
         return await services.catalogue.get(graph_id)
 
     return [get_history, get_difference, restore_graph]

@@ -20,7 +20,7 @@ from action_assistant.schema import editor_tables
 from action_assistant.umrf.check import check
 from action_assistant.umrf.model import Graph
 from action_assistant.web.auth.keys import Author
-from action_assistant.web.workers.lanes import Aside, here
+from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 NAME_LIMIT: Final = 200  # characters
 DESCRIPTION_LIMIT: Final = 10_000
@@ -58,9 +58,11 @@ class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Catalogue:
     """All graphs. Raises NotFound for those that are none, or deleted."""
 
-    def __init__(self, journal: Journal, rooms: Rooms, sights: Sights, aside: Aside = here) -> None:
+    def __init__(
+        self, journal: Journal, rooms: Rooms, sights: Sights, run_in_worker: RunInWorker = run_here
+    ) -> None:
         self._journal = journal
-        self._aside = aside
+        self._run_in_worker = run_in_worker
         self._rooms = rooms
         self._sights = sights
 
@@ -97,10 +99,10 @@ class Catalogue:
         return await self._add(changes.first(graph), about, [made], author), None
 
     async def bring(
-        self, body: bytes, author: str, *, aside: Aside | None = None
+        self, body: bytes, author: str, *, run_in_worker: RunInWorker | None = None
     ) -> tuple[GraphView, bytes]:
         """A graph from a UMRF file. The log keeps the file as it came."""
-        found = await (aside or self._aside)(importing.brought, body)
+        found = await (run_in_worker or self._run_in_worker)(importing.brought, body)
         about = found.about
         made = h.draft(
             h.CREATED,
@@ -125,7 +127,7 @@ class Catalogue:
                 author,
                 name=None if name is None else new_name,
                 description=None if description is None else new_description,
-                aside=self._aside,
+                run_in_worker=self._run_in_worker,
             )
             return await self.get(graph)
 

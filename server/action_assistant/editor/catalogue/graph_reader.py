@@ -15,7 +15,7 @@ from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.web.workers.lanes import HOPELESS, Aside, Crashed, here
+from action_assistant.web.workers.lanes import HOPELESS, Crashed, RunInWorker, run_here
 
 log: Final = logging.getLogger(__name__)
 
@@ -42,10 +42,12 @@ class Summary(msgspec.Struct, frozen=True):
 class Sights:
     """Reads graphs. Nothing that it remembers is needed; it only saves reading again."""
 
-    def __init__(self, journal: Journal, rooms: Rooms, aside: Aside = here) -> None:
+    def __init__(
+        self, journal: Journal, rooms: Rooms, run_in_worker: RunInWorker = run_here
+    ) -> None:
         self._journal = journal
         self._rooms = rooms
-        self._aside = aside
+        self._run_in_worker = run_in_worker
         self._sights = _Recent[tuple[str, int], Sight](_REMEMBERED)
         self._problems = _Recent[tuple[str, int], bytes](_REMEMBERED)
         self._summaries = _Recent[str, Summary](_COUNTED)
@@ -93,7 +95,7 @@ class Sights:
     async def _loaded(self, graph: str, seq: int) -> Sight:
         """The graph after its change `seq`, or after the last one before it that can be read."""
         found = await stored(
-            self._journal, graph_stream(graph), seq, learn=False, aside=self._aside
+            self._journal, graph_stream(graph), seq, learn=False, run_in_worker=self._run_in_worker
         )
         sight = Sight(graph, found.seq, Kept.state_of(found.document))
         return self._sights.put((graph, seq), sight)
@@ -104,14 +106,14 @@ class Sights:
 
     async def ask(self, work: Callable[..., T], /, *values: Any) -> T:
         """The outcome of a function of `contents`, of sights and other values."""
-        return await self._aside(work, *values)
+        return await self._run_in_worker(work, *values)
 
     async def problems(self, sight: Sight) -> bytes:
         """What is wrong with a graph at a moment, as JSON."""
         key = sight.graph, sight.seq
         found = self._problems.get(key)
         if found is None:
-            found = self._problems.put(key, await self._aside(contents.problems, sight))
+            found = self._problems.put(key, await self._run_in_worker(contents.problems, sight))
         return found
 
     def made(self, graph: str, state: bytes, about: About) -> None:
@@ -126,7 +128,7 @@ class Sights:
             return known
         try:
             sight = await self.now(graph)
-            about = await self._aside(contents.about, sight)
+            about = await self._run_in_worker(contents.about, sight)
         except HOPELESS as error:  # others are in the list too
             log.error("%s: nothing can be said of change %d: %s", graph, newest, error.detail)
             nothing = Summary(newest)

@@ -77,8 +77,8 @@ class History:
             event.stream == h.about_stream(graph), event.kind == h.RESTORED
         )
         rows = await self._journal.query(chosen)
-        deeds = (msgspec.json.decode(row.body, type=h.Restored) for row in rows)
-        return {deed.seq: deed.restored for deed in deeds}
+        restorings = (msgspec.json.decode(row.body, type=h.Restored) for row in rows)
+        return {restored.seq: restored.restored for restored in restorings}
 
 
 def _entries(

@@ -11,7 +11,7 @@ from action_assistant.editor.crdt.replica import Kept, Replica
 from action_assistant.errors import Unavailable
 from action_assistant.journal.events import Snapshot
 from action_assistant.journal.journal import Journal
-from action_assistant.web.workers.lanes import Aside, here
+from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 log: Final = logging.getLogger(__name__)
 
@@ -45,17 +45,19 @@ async def load(
     upto: int | None = None,
     *,
     learn: bool | None = None,
-    aside: Aside = here,
+    run_in_worker: RunInWorker = run_here,
 ) -> Loaded:
     """The document of a stream, now or after its event `upto`, to go on with.
 
     `learn`: what only editing needs; by default for a document as it is now. Raises Unavailable.
     """
     learn = upto is None if learn is None else learn
-    found = await stored(journal, stream, upto, learn=learn, aside=aside)
+    found = await stored(journal, stream, upto, learn=learn, run_in_worker=run_in_worker)
     replica = Kept.replica(found.document) if found.document else Replica()
     if replica is None:  # a snapshot that cannot be read, and nothing after it
-        found = await _followed(journal, stream, None, upto, learn=learn, aside=aside)
+        found = await _followed(
+            journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker
+        )
         replica = Kept.replica(found.document) if found.document else Replica()
     if replica is None:
         raise Unavailable(f"{stream} reads otherwise each time.")
@@ -63,18 +65,25 @@ async def load(
 
 
 async def stored(
-    journal: Journal, stream: str, upto: int | None = None, *, learn: bool, aside: Aside = here
+    journal: Journal,
+    stream: str,
+    upto: int | None = None,
+    *,
+    learn: bool,
+    run_in_worker: RunInWorker = run_here,
 ) -> Stored:
-    """The document of a stream as bytes. What depends on its size is done by `aside`.
+    """The document of a stream as bytes. What depends on its size is done by `run_in_worker`.
 
     Raises Unavailable.
     """
     snapshot = await _snapshot(journal, stream)
     if snapshot is not None and (upto is None or snapshot.seq <= upto):
-        found = await _followed(journal, stream, snapshot, upto, learn=learn, aside=aside)
+        found = await _followed(
+            journal, stream, snapshot, upto, learn=learn, run_in_worker=run_in_worker
+        )
         if Kept.is_form_of(found.document):
             return found
-    return await _followed(journal, stream, None, upto, learn=learn, aside=aside)
+    return await _followed(journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker)
 
 
 async def _followed(
@@ -84,16 +93,20 @@ async def _followed(
     upto: int | None,
     *,
     learn: bool,
-    aside: Aside,
+    run_in_worker: RunInWorker,
 ) -> Stored:
     """A snapshot, or nothing, and the events after it."""
     start, document = (0, b"") if snapshot is None else (snapshot.seq, snapshot.state)
     tail = Tail(journal, stream, start, upto)
     while events := await tail.next():
         size = len(document) + sum(len(event.body) for event in events)
-        folded = await (here if size <= _SMALL else aside)(fold, document, events, learn)
+        folded = await (run_here if size <= _SMALL else run_in_worker)(
+            fold, document, events, learn
+        )
         if folded is None:  # not a snapshot of ours
-            return await _followed(journal, stream, None, upto, learn=learn, aside=aside)
+            return await _followed(
+                journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker
+            )
         document = folded.document
         if folded.damaged is not None:
             log.error("%s %d cannot be applied: %s", stream, folded.seq + 1, folded.damaged.why)

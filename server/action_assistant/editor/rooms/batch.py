@@ -16,7 +16,7 @@ from action_assistant.editor.crdt.update_scan import Outline
 from action_assistant.editor.rooms.member import Member
 from action_assistant.errors import BadInput, Refused, TooLarge
 from action_assistant.web.auth.access import acting_for
-from action_assistant.web.workers.lanes import Aside, Crashed
+from action_assistant.web.workers.lanes import Crashed, RunInWorker
 
 LARGE: Final = 8 * 1024  # bytes of an update that is tried on a copy first, and by itself
 _BATCH: Final = 200  # items of one commit
@@ -123,7 +123,11 @@ def _answer(error: Objection) -> tuple[int, Refused, str | None]:
 
 
 async def tried_for(
-    person: str, aside: Aside, state: bytes, update: bytes, released: Sequence[bytes] = ()
+    person: str,
+    run_in_worker: RunInWorker,
+    state: bytes,
+    update: bytes,
+    released: Sequence[bytes] = (),
 ) -> Outline:
     """The outline of an update that may be applied to a document of this state, and after it the
     updates that waited for it.
@@ -134,7 +138,7 @@ async def tried_for(
     while True:
         try:
             with acting_for(person):
-                return await aside(tried, state, update, released)
+                return await run_in_worker(tried, state, update, released)
         except Crashed as error:
             died += 1
             if died == _DEATHS:  # one may have been for want of memory

@@ -20,16 +20,16 @@ class Window:
         self._next = 0.0
         self._waiting: list[Callable[[], None]] = []
 
-    def when_open(self, deed: Callable[[], None]) -> None:
-        """Call `deed` soon: in this turn of the loop, or with all others who wait."""
+    def when_open(self, work: Callable[[], None]) -> None:
+        """Call `work` soon: in this turn of the loop, or with all others who wait."""
         now = self._loop.time()
         if not self._waiting and now >= self._next:
             self._next = now + self._length
-            self._loop.call_soon(deed)
+            self._loop.call_soon(work)
             return
         if not self._waiting:
             self._loop.call_at(self._next, self._open)
-        self._waiting.append(deed)
+        self._waiting.append(work)
 
     async def open(self) -> None:
         """Wait until it is."""
@@ -40,5 +40,5 @@ class Window:
     def _open(self) -> None:
         self._next = self._loop.time() + self._length
         deeds, self._waiting = self._waiting, []
-        for deed in deeds:
-            deed()
+        for work in deeds:
+            work()

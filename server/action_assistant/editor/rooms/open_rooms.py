@@ -12,7 +12,7 @@ from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.web.auth.access import done_for_person
-from action_assistant.web.workers.lanes import Aside, here
+from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 LINGER: Final = 5.0  # seconds that a room stays after the last one left
 _TICK: Final = 2.0  # seconds
@@ -21,7 +21,7 @@ _SILENCE: Final = 10.0  # seconds without a word after which a socket hears a be
 
 
 class Rooms:
-    """The rooms of this process, by stream. What depends on the size of a document is done `aside`;
+    """The rooms of this process, by stream. What depends on the size of a document is done `run_in_worker`;
     large updates are `tried` in another process before a room takes them."""
 
     def __init__(
@@ -30,11 +30,11 @@ class Rooms:
         *,
         linger: float = LINGER,
         window: float = LENGTH,
-        aside: Aside = here,
-        tried: Aside = here,
+        run_in_worker: RunInWorker = run_here,
+        tried: RunInWorker = run_here,
     ) -> None:
         self._journal = journal
-        self._aside = aside
+        self._run_in_worker = run_in_worker
         self._tried = tried
         self._window = Window(window)
         self._moments = Window(_MOMENTS * window)
@@ -116,7 +116,7 @@ class Rooms:
     async def _load(self, stream: str) -> Room:
         done_for_person()  # others may wait for it too, when whoever came first has left
         try:
-            loaded = await load(self._journal, stream, aside=self._aside)
+            loaded = await load(self._journal, stream, run_in_worker=self._run_in_worker)
             room = self._rooms[stream] = Room(
                 stream,
                 self._journal,
@@ -124,7 +124,7 @@ class Rooms:
                 self._forget,
                 self._window,
                 self._moments,
-                self._aside,
+                self._run_in_worker,
                 self._tried,
             )
             return room

@@ -49,7 +49,7 @@ from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.web.auth.access import done_for_nobody
-from action_assistant.web.workers.lanes import Aside, here
+from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 log: Final = logging.getLogger(__name__)
 
@@ -71,8 +71,8 @@ class Room:
         gone: Callable[["Room"], None],
         window: Window,
         moments: Window,
-        aside: Aside = here,
-        tried: Aside = here,
+        run_in_worker: RunInWorker = run_here,
+        tried: RunInWorker = run_here,
     ) -> None:
         self.stream: Final = stream
         self.seq = loaded.seq
@@ -85,7 +85,7 @@ class Room:
         self._gone = gone
         self._window = window
         self._moments = moments
-        self._aside = aside
+        self._run_in_worker = run_in_worker
         self._tried = tried
         self._unkept = 0  # bytes of updates since the last snapshot
         self._naming = False
@@ -418,7 +418,7 @@ class Room:
         seq = self.seq
         if self._fingerprint is None or self._fingerprint[0] != seq:
             state = replica.doc.get_update()
-            self._fingerprint = seq, await self._aside(shown, state)
+            self._fingerprint = seq, await self._run_in_worker(shown, state)
         return self._fingerprint
 
     def _say_whether_same(self, compare: Compare, found: Fingerprint) -> None:
@@ -442,7 +442,7 @@ class Room:
 
     async def _reload(self) -> None:
         self._replica.close()
-        loaded = await load(self._journal, self.stream, aside=self._aside)
+        loaded = await load(self._journal, self.stream, run_in_worker=self._run_in_worker)
         self._replica, self.seq, self._kept = loaded.replica, loaded.seq, loaded.kept
 
     async def _keep_snapshot(self) -> None:

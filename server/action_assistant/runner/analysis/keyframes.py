@@ -34,7 +34,7 @@ from action_assistant.runner.runs.fold import begin, follow
 from action_assistant.runner.runs.history import Ledger
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 #: Raise it when `runs.follow` tells something else of the same events: older keyframes are void then.
 FOLD: Final = 3
@@ -101,8 +101,8 @@ class SnapshotJournal(Ledger, Protocol):
 class KeyframeStore:
     """The reels of all runs."""
 
-    def __init__(self, ledger: SnapshotJournal, aside: Aside) -> None:
-        self.aside = aside
+    def __init__(self, ledger: SnapshotJournal, run_in_worker: RunInWorker) -> None:
+        self.run_in_worker = run_in_worker
         self._ledger = ledger
         self._known: OrderedDict[str, RunKeyframes] = OrderedDict()
         self._asking: dict[str, asyncio.Lock] = {}
@@ -123,7 +123,7 @@ class KeyframeStore:
         if key is not None and key.seq == seq:
             return key.run
         events = await self._ledger.read(stream_of(run), after=key.seq if key else 0, upto=seq)
-        return (await self.aside(lambda: _next(key, events))).run
+        return (await self.run_in_worker(lambda: _next(key, events))).run
 
     async def seq_at(self, run: str, at: int) -> int:
         """The first event by which this moment had come. Raises NotFound, Unavailable."""
@@ -136,7 +136,7 @@ class KeyframeStore:
                     return event.seq
             return events[-1].seq if events else key.seq if key else 1
 
-        return await self.aside(found)
+        return await self.run_in_worker(found)
 
     async def page(self, run: str, after: int) -> Sequence[Event]:
         """Events of one page, those with `seq > after`."""
@@ -158,7 +158,7 @@ class KeyframeStore:
             events = await self._ledger.read(stream, after=after, limit=room)
             if not events:
                 break
-            key = await self.aside(lambda last=last, events=events: _next(last, events))
+            key = await self.run_in_worker(lambda last=last, events=events: _next(last, events))
             marks += marks_of(events)
             if last is not None and last.seq % APART:
                 keys.pop()  # an end that has gone on is no keyframe
@@ -176,7 +176,7 @@ class KeyframeStore:
         if kept is None:
             return None
         try:
-            keyframes = await self.aside(
+            keyframes = await self.run_in_worker(
                 lambda: msgspec.msgpack.decode(kept.state, type=RunKeyframes)
             )
         except msgspec.DecodeError:
@@ -184,7 +184,7 @@ class KeyframeStore:
         return keyframes if keyframes.fold == FOLD and keyframes.keys else None
 
     async def _keep(self, stream: str, keyframes: RunKeyframes) -> None:
-        state = await self.aside(lambda: msgspec.msgpack.encode(keyframes))
+        state = await self.run_in_worker(lambda: msgspec.msgpack.encode(keyframes))
         try:
             await self._ledger.keep_snapshot(stream, keyframes.keys[-1].seq, state)
         except Refused:

@@ -20,7 +20,7 @@ from litestar.exceptions import WebSocketDisconnect, WebSocketException
 
 from action_assistant.errors import Refused
 from action_assistant.runner.api.caller import author_of
-from action_assistant.runner.clock import Clock
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.robots.registration import Robot
@@ -103,9 +103,9 @@ class Frame(msgspec.Struct, frozen=True):
 class Hub:
     """Everybody who watches."""
 
-    def __init__(self, control: ExecutionService, wall: Clock) -> None:
+    def __init__(self, control: ExecutionService, clock_us: ClockUs) -> None:
         self.control = control
-        self.wall = wall
+        self.clock_us = clock_us
         self.boxes: set[Outbox] = set()
         self._frames: WeakKeyDictionary[OpenRun, Frame] = WeakKeyDictionary()
         self._memos: WeakKeyDictionary[OpenRun, views.Memo] = WeakKeyDictionary()
@@ -133,7 +133,7 @@ class Hub:
             if opened.watch.seen_at is not None
         }
         heard = {name: views.time(at) for name, at in self.control.robots.heard().items()}
-        return _text(Beat(views.time(self.wall()), seen, heard))
+        return _text(Beat(views.time(self.clock_us()), seen, heard))
 
     def _changed(self, opened: OpenRun) -> None:
         for box in self.boxes:

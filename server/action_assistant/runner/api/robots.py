@@ -29,7 +29,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Signature
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.network.connection_limits import Turns
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 _EVENTS: Final = 200
 _Asking = Request[Any, Any, Any]
@@ -40,7 +40,7 @@ class RobotServices(Protocol):
 
     control: ExecutionService
     turns: Turns
-    aside: Aside
+    run_in_worker: RunInWorker
 
 
 class Reached(msgspec.Struct, frozen=True):
@@ -265,7 +265,7 @@ def _told(seq: int, event: RobotEvent) -> Told:
 
 
 async def _umrf(services: RobotServices, text: str) -> Response[bytes]:
-    return Response(await services.aside(canonical, text), media_type="application/json")
+    return Response(await services.run_in_worker(canonical, text), media_type="application/json")
 
 
 def canonical(text: str) -> bytes:

@@ -12,7 +12,7 @@ from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs import views
 from action_assistant.web.network.connection_limits import Crowd, Turns
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 _BODIES: Final = 4  # large ones of a person at a time
 
@@ -28,7 +28,7 @@ class RunnerServices:
     asked: WorkerQueries
     retention: Retention
     turns: Turns
-    aside: Aside
+    run_in_worker: RunInWorker
     sent: WeakKeyDictionary[OpenRun, views.Sent]
 
     def __init__(self) -> None:

@@ -16,7 +16,7 @@ from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.runs import views
 from action_assistant.schema.runner_tables import run
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 _PREFIX: Final = "run/"
 _KEPT: Final = 64 << 20  # bytes of events from archives in memory
@@ -48,10 +48,10 @@ class ArchiveStore:
     """Reads a run from its archive in `folder` once it stands there. Everything else is the
     journal's."""
 
-    def __init__(self, journal: SnapshotJournal, folder: Path, aside: Aside) -> None:
+    def __init__(self, journal: SnapshotJournal, folder: Path, run_in_worker: RunInWorker) -> None:
         self.folder = folder
         self._journal = journal
-        self._aside = aside
+        self._run_in_worker = run_in_worker
         self._read: OrderedDict[str, tuple[list[Event], int]] = OrderedDict()
 
     async def append(
@@ -102,7 +102,7 @@ class ArchiveStore:
         if stream not in self._read:
             path = self.folder / place.archived_as
             try:
-                events = await self._aside(lambda: list(archive_file.read(path)))
+                events = await self._run_in_worker(lambda: list(archive_file.read(path)))
             except OSError as error:
                 raise Archived(
                     f"Run {place.number} was archived on {views.time(place.archived_at):%Y-%m-%d} "

@@ -23,13 +23,13 @@ from action_assistant.runner.analysis import annotations
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.archives.archive_store import Journaled
 from action_assistant.runner.archives.raw_messages import RawPut, stream_of_raw
-from action_assistant.runner.clock import Clock
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.schema.runner_tables import review, run, runner_event
 from action_assistant.settings import Keep
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
@@ -60,15 +60,15 @@ class Retention:
         keep: Keep,
         *,
         is_open: Callable[[str], bool],
-        wall: Clock,
-        aside: Aside,
+        clock_us: ClockUs,
+        run_in_worker: RunInWorker,
     ) -> None:
         self.keep = keep
         self._journal = journal
         self._recordings = recordings
         self._is_open = is_open
-        self._wall = wall
-        self._aside = aside
+        self._clock_us = clock_us
+        self._run_in_worker = run_in_worker
         self._one = anyio.Lock()
         self._left_over = True  # an earlier process may have ended between two steps
 
@@ -96,7 +96,7 @@ class Retention:
                 found = await self._sweep_raw(raw_days)
             if run_days is None:
                 return found
-            before = self._wall() - round(run_days * _DAY_US)
+            before = self._clock_us() - round(run_days * _DAY_US)
             rows = await self._journal.query(_due(before, _AT_ONCE + 1))
             problems = list(found.problems)
             done = 0
@@ -118,17 +118,19 @@ class Retention:
         end = await self._journal.end(stream)
         place = _place(row)
         path = self.keep.folder / place
-        written = await self._aside(lambda: archive_file.ArchiveFile(path, stream, place, end))
+        written = await self._run_in_worker(
+            lambda: archive_file.ArchiveFile(path, stream, place, end)
+        )
         try:
             after = 0
             while events := await self._journal.read(stream, after=after, limit=_PAGE):
-                await self._aside(partial(written.add, events))
+                await self._run_in_worker(partial(written.add, events))
                 after = events[-1].seq
                 await anyio.sleep(_BREATH_S)
-            digest = await self._aside(written.close)
+            digest = await self._run_in_worker(written.close)
         finally:
             written.abandon()
-        at = self._wall()
+        at = self._clock_us()
         removed = Removed(stream, end.seq, end.chain.hex(), place, digest)
 
         def told(by: int) -> Addition:
@@ -167,7 +169,7 @@ class Retention:
             return Swept()
         problems: list[str] = []
         done = 0
-        for path in await self._aside(lambda: kept.due(days)):
+        for path in await self._run_in_worker(lambda: kept.due(days)):
             try:
                 await self._put_raw_away(path)
                 done += 1
@@ -182,11 +184,11 @@ class Retention:
         file = f"raw/{robot}/{path.name}"
         target = self.keep.folder / file
         size = (await anyio.Path(path).stat()).st_size
-        digest = await self._aside(lambda: archive_file.put(path, target))
-        put = RawPut(self._wall(), robot, path.name, file, size, digest)
+        digest = await self._run_in_worker(lambda: archive_file.put(path, target))
+        put = RawPut(self._clock_us(), robot, path.name, file, size, digest)
         draft = Draft(put.kind, "", msgspec.json.encode(put))
         await self._journal.append(stream_of_raw(robot), [draft])
-        await self._aside(path.unlink)
+        await self._run_in_worker(path.unlink)
 
 
 def _due(before: int, most: int) -> Select[Any]:

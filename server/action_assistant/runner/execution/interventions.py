@@ -19,7 +19,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest, decoded, prepared
 from action_assistant.runner.start.preflight import not_matched_in
 from action_assistant.umrf.facts import SIMULATED
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 _MOVING: Final = frozenset({"running", "paused"})
 
@@ -61,7 +61,12 @@ async def resume(opened: OpenRun, author: Author) -> Run:
 
 
 async def modify(
-    opened: OpenRun, body: bytes, author: Author, *, engine: KnownEngine | None, aside: Aside
+    opened: OpenRun,
+    body: bytes,
+    author: Author,
+    *,
+    engine: KnownEngine | None,
+    run_in_worker: RunInWorker,
 ) -> Run:
     """Give a running graph another structure; `body` is a ModifyRequest, `engine` None that of a
     simulated run. Raises BadInput, Conflict, Unavailable."""
@@ -83,9 +88,9 @@ async def modify(
         override=asked.override,
     )
     facts = SIMULATED if engine is None else engine.facts
-    ready = await aside(prepared, start, facts, run.id)
+    ready = await run_in_worker(prepared, start, facts, run.id)
     if engine is not None:
-        await _require_matched(engine, ready.umrf, aside)
+        await _require_matched(engine, ready.umrf, run_in_worker)
     _require_moving(opened.run)  # somebody may have stopped it meanwhile
     if ready.name != run.graph_name:
         raise Conflict(
@@ -104,11 +109,11 @@ async def modify(
     return opened.run
 
 
-async def _require_matched(engine: KnownEngine, umrf: str, aside: Aside) -> None:
+async def _require_matched(engine: KnownEngine, umrf: str, run_in_worker: RunInWorker) -> None:
     """A change is taken without looking anything up. Raises Conflict."""
     held = {each.graph for each in engine.answer.graphs} if engine.answer is not None else set()
-    index = await engine.index(aside)
-    lost = await aside(not_matched_in, umrf, engine.facts, index, held)
+    index = await engine.index(run_in_worker)
+    lost = await run_in_worker(not_matched_in, umrf, engine.facts, index, held)
     if lost:
         raise Conflict(
             f"{engine.registration.name} does not look up {', '.join(lost[:3])} in a change, and would "

@@ -22,7 +22,7 @@ from action_assistant.runner.runs.fold import is_news
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
 from action_assistant.runner.stop.proof import NEVER_BEGAN, RestProof, hash_of
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
@@ -83,8 +83,8 @@ class Monitor:
         link: Link,
         *,
         exact: bool,
-        wall: Callable[[], int],
-        aside: Aside,
+        clock_us: Callable[[], int],
+        run_in_worker: RunInWorker,
         doubts: DoubtfulErrors,
         rested_at: int | None = None,
     ) -> None:
@@ -93,8 +93,8 @@ class Monitor:
         self.umrf: str | None = None
         self._it = it
         self._link = link
-        self._wall = wall
-        self._aside = aside
+        self._clock_us = clock_us
+        self._run_in_worker = run_in_worker
         self._look = anyio.Event()
         self._order = itertools.count(1)
         self._stop_sent: int | None = None
@@ -156,7 +156,7 @@ class Monitor:
         if self._it.run.graph_state is None:
             self._begun = next(self._order)
         overtaken, self._answered = self._answered, False
-        self.seen_at = self._wall()
+        self.seen_at = self._clock_us()
         if news := fresh(self._it.run, ours) if overtaken else ours:
             asked = self._seen_asked
             self._it.observe(tuple(replace(each, since_asked=asked) for each in news))
@@ -194,7 +194,7 @@ class Monitor:
         silent = anyio.current_time() - self._heard_at
         self.trouble = why or "the engine does not answer"
         if silent >= _SILENT_S and self._it.run.unknown_since is None:
-            at = self._wall()
+            at = self._clock_us()
             self._it.tell(Silent(at, at - round(silent * 1e6), self.trouble))
 
     def _take(self, answer: Answer, order: int, asked: float) -> None:
@@ -237,7 +237,7 @@ class Monitor:
         self._sent = None
 
         async def compare() -> None:
-            if why := await self._aside(differs, sent, text):
+            if why := await self._run_in_worker(differs, sent, text):
                 self._it.alarm(
                     "echo_differs", f"What {self._it.run.engine} shows is not what was sent: {why}"
                 )
@@ -353,12 +353,12 @@ class Monitor:
         return told.rstrip()
 
     async def _find_lacking(self) -> None:
-        self._lacking = await self._aside(stall.lacking_in_words, self.umrf)
+        self._lacking = await self._run_in_worker(stall.lacking_in_words, self.umrf)
 
     async def _tell_stall(self) -> None:
         run = self._it.run
         try:
-            text = await self._aside(stall.told_of, stall.packed(run), self.umrf)
+            text = await self._run_in_worker(stall.told_of, stall.packed(run), self.umrf)
         except Refused:  # nobody can read the graph now; what is known must be said all the same
             text = stall.told(run, None)
         if self._it.run.end is None and self._standstill.lasts:

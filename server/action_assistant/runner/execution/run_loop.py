@@ -12,7 +12,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import Refused
-from action_assistant.runner.clock import Clock
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution.monitor import Monitor
 from action_assistant.runner.links.observations import Hazard, Seen
 from action_assistant.runner.links.port import (
@@ -50,12 +50,12 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.fold import follow, thin
 from action_assistant.runner.runs.history import sent_of
-from action_assistant.runner.runs.recorder import Recorder, Store
+from action_assistant.runner.runs.recorder import RunRecorder, Store
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
 from action_assistant.runner.stop.proof import SET_GOING
 from action_assistant.runner.stop.stop_loop import StopLoop
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
@@ -79,19 +79,19 @@ class OpenRun:
         owns_link: bool,
         store: Store,
         seq: int,
-        wall: Clock,
-        aside: Aside,
+        clock_us: ClockUs,
+        run_in_worker: RunInWorker,
         changed: "Callable[[OpenRun], None]",
     ) -> None:
         self.run = run
         self.revision = 0
         self.published = anyio.Event()
         self._store = store
-        self.recorder = Recorder(store, run.id, seq, self._touch)
+        self.recorder = RunRecorder(store, run.id, seq, self._touch)
         self._link = link
         self._owns_link = owns_link
-        self._wall = wall
-        self._aside = aside
+        self._clock_us = clock_us
+        self._run_in_worker = run_in_worker
         self._doubts = DoubtfulErrors(
             reached=seq > 1 and not owns_link
         )  # what came before is not known
@@ -102,7 +102,7 @@ class OpenRun:
         self._again = anyio.Event()
         self._is_left = False
         self._handing = anyio.CancelScope()  # while the start is handed over
-        self._stopping = StopLoop(self, link, simulated=owns_link, wall=wall)
+        self._stopping = StopLoop(self, link, simulated=owns_link, clock_us=clock_us)
         self._early: list[Report] = []
 
     # --- what people want ---------------------------------------------------------------------
@@ -121,13 +121,13 @@ class OpenRun:
     async def pause(self, author: Author) -> None:
         """Want the run paused. Raises NotSent."""
         self._doubts.reach()
-        self.tell(PauseRequested(self._wall(), author), author.id)
+        self.tell(PauseRequested(self._clock_us(), author), author.id)
         await self._link.pause(self.run.graph_name)
         self.watch.look()
 
     async def resume(self, author: Author) -> None:
         """Want the run to go on. Raises NotSent."""
-        self.tell(ResumeRequested(self._wall(), author), author.id)
+        self.tell(ResumeRequested(self._clock_us(), author), author.id)
         await self._link.resume(self.run.graph_name)
         self.watch.look()
 
@@ -136,7 +136,7 @@ class OpenRun:
     ) -> None:
         """Want the run to go on with another graph. Raises NotSent, EngineRefused."""
         asked = ModifyRequested(
-            at=self._wall(),
+            at=self._clock_us(),
             author=author,
             version=version,
             digest=digest,
@@ -152,7 +152,7 @@ class OpenRun:
         except (NotSent, EngineRefused) as why:
             self.tell(
                 ModifyRefused(
-                    at=self._wall(),
+                    at=self._clock_us(),
                     version=before.version,
                     digest=before.digest,
                     actions={name: action.aid for name, action in before.actions.items()},
@@ -246,8 +246,8 @@ class OpenRun:
             self,
             self._link,
             exact=self._owns_link,
-            wall=self._wall,
-            aside=self._aside,
+            clock_us=self._clock_us,
+            run_in_worker=self._run_in_worker,
             doubts=self._doubts,
             rested_at=rested_at,
         )
@@ -292,7 +292,7 @@ class OpenRun:
 
     async def _publish(self, order: Order, incarnation: str) -> None:
         """Send the one start message. Whatever happens, it is never sent again."""
-        at = self._wall()
+        at = self._clock_us()
         self.watch.starts(order.umrf)
         if self.run.desired == "stopped":
             self.end("stopped", "Stopped before anything was sent.")
@@ -308,7 +308,9 @@ class OpenRun:
         except Exception as error:  # also a deadline: the message may have left
             log.exception("run %s: the start may or may not have left", self.run.id)
             self.tell(self._published(at, incarnation))
-            self.tell(Silent(self._wall(), at, f"Nobody knows whether the start left: {error!r}"))
+            self.tell(
+                Silent(self._clock_us(), at, f"Nobody knows whether the start left: {error!r}")
+            )
         else:
             self.tell(self._published(at, incarnation))
 
@@ -355,7 +357,7 @@ class OpenRun:
 
     def observe(self, seen: tuple[Seen, ...]) -> None:
         """Show and store what was seen."""
-        self.tell(Observed(self._wall(), thin(self.run, seen)))
+        self.tell(Observed(self._clock_us(), thin(self.run, seen)))
         for item in seen:
             if isinstance(item, Hazard) and (item.effect != "goes on" or item.code in _TOLD):
                 place = f" at {item.node}" if item.node else ""
@@ -368,12 +370,12 @@ class OpenRun:
         if self.run.simulated:
             self.end("lost", why)
         elif self.run.lost != why:
-            self.tell(Unconfirmed(self._wall(), why, lost=True))
+            self.tell(Unconfirmed(self._clock_us(), why, lost=True))
             self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why} {_LOOK_AT_IT}")
 
     def doubt(self, why: str) -> None:
         """The code of an action may go on, and the engine will never tell of its end."""
-        self.tell(Unconfirmed(self._wall(), why))
+        self.tell(Unconfirmed(self._clock_us(), why))
         self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {_LOOK_AT_IT}")
 
     def engine_ended(self) -> None:
@@ -385,12 +387,12 @@ class OpenRun:
             else f"The engine's process, {process.pid} on this computer, has ended."
         )
         state: End = "error" if run.unconfirmed else "lost"
-        self._rests(AtRest(None, self._wall(), how), state, run.unconfirmed or run.lost or how)
+        self._rests(AtRest(None, self._clock_us(), how), state, run.unconfirmed or run.lost or how)
 
     def confirm_rest(self, author: Author, how: str) -> None:
         """Somebody has seen that it is at rest, where no answer of the engine can prove it."""
         why = self.run.unconfirmed or self.run.lost or self.watch.trouble
-        self._rests(AtRest(author, self._wall(), how), "error", why, author.id)
+        self._rests(AtRest(author, self._clock_us(), how), "error", why, author.id)
 
     def _rests(self, seen: AtRest, state: End, why: str, author: str = "") -> None:
         self.tell(Ended(seen.at, state, self._result(), why, seen), author)
@@ -401,9 +403,9 @@ class OpenRun:
     def end(self, state: End, detail: str) -> None:
         """The run is over. The first end counts."""
         if self.run.end is None:
-            self.tell(Ended(self._wall(), state, self._result(), detail))
+            self.tell(Ended(self._clock_us(), state, self._result(), detail))
 
     def alarm(self, code: str, text: str) -> None:
         """Tell people something now, once."""
         if all((alarm.code, alarm.text) != (code, text) for alarm in self.run.alarms):
-            self.tell(AlarmRaised(self._wall(), code, text))
+            self.tell(AlarmRaised(self._clock_us(), code, text))

@@ -14,7 +14,7 @@ from anyio.abc import TaskGroup
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
-from action_assistant.runner.clock import Clock
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, Order, Registration
@@ -41,7 +41,7 @@ from action_assistant.runner.start.start_checks import (
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.runner.stop.late_activity import LateActivity
 from action_assistant.web.auth.access import done_for_nobody
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
@@ -59,9 +59,9 @@ class ExecutionService:
         ledger: Ledger,
         robots: Robots,
         *,
-        wall: Clock,
+        clock_us: ClockUs,
         tasks: TaskGroup,
-        aside: Aside,
+        run_in_worker: RunInWorker,
         simulator: Simulator,
         past: Past | None = None,
     ) -> None:
@@ -69,25 +69,25 @@ class ExecutionService:
         self.history = History(ledger, past)
         self.open: dict[str, OpenRun] = {}
         self._ledger = ledger
-        self._wall = wall
+        self._clock_us = clock_us
         self._tasks = tasks
-        self._aside = aside
+        self._run_in_worker = run_in_worker
         self._watchers: list[Callable[[OpenRun], None]] = []
         self._news = anyio.Event()
         self._places: dict[str, anyio.Lock] = {}
-        self._book = IdempotentStarts(ledger, tasks, wall)
+        self._book = IdempotentStarts(ledger, tasks, clock_us)
         self.under_way: Final = self._book.under_way
         self._starting = StartChecks(
             robots,
-            wall=wall,
-            aside=aside,
+            clock_us=clock_us,
+            run_in_worker=run_in_worker,
             taken=self._taken,
             going=self._going,
             settled=self._settled_on,
             simulator=simulator,
         )
         self._late_activity = LateActivity(
-            self.open, self.history, robots, self._tasks, wall=wall, reopen=self._reopen
+            self.open, self.history, robots, self._tasks, clock_us=clock_us, reopen=self._reopen
         )
         self._robot_watchers: list[Callable[[], None]] = []
         self._settled: dict[str, Settled] = {}
@@ -101,8 +101,8 @@ class ExecutionService:
         ledger: Ledger,
         robots: Robots,
         *,
-        wall: Clock,
-        aside: Aside = anyio.to_thread.run_sync,
+        clock_us: ClockUs,
+        run_in_worker: RunInWorker = anyio.to_thread.run_sync,
         simulator: Simulator = in_this_process,
         past: Past | None = None,
     ) -> "AsyncIterator[ExecutionService]":
@@ -112,9 +112,9 @@ class ExecutionService:
             control = cls(
                 ledger,
                 robots,
-                wall=wall,
+                clock_us=clock_us,
                 tasks=tasks,
-                aside=aside,
+                run_in_worker=run_in_worker,
                 simulator=simulator,
                 past=past,
             )
@@ -225,7 +225,7 @@ class ExecutionService:
         stops: int,
         group: str | None = None,
     ) -> Run:
-        number, at = self.next_number(), self._wall()
+        number, at = self.next_number(), self._clock_us()
         requested, order = booked(asked, cleared, author, at=at, number=number, group=group)
         if not cleared.own:  # a run that was over may have moved again since it was looked at
             check_items([of_taken(asked.engine, self._taken(asked.engine))], ())
@@ -253,8 +253,8 @@ class ExecutionService:
             owns_link=own,
             store=self._ledger,
             seq=seq,
-            wall=self._wall,
-            aside=self._aside,
+            clock_us=self._clock_us,
+            run_in_worker=self._run_in_worker,
             changed=self._changed,
         )
         self.open[run.id] = opened
@@ -330,7 +330,9 @@ class ExecutionService:
         Unavailable."""
         opened = await self._movable(run)
         engine = self.robots.link(opened.run.engine)
-        return await interventions.modify(opened, body, author, engine=engine, aside=self._aside)
+        return await interventions.modify(
+            opened, body, author, engine=engine, run_in_worker=self._run_in_worker
+        )
 
     async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:
         """Take somebody's word that a run is at rest, where its engine's is none. Raises NotFound,
@@ -420,8 +422,8 @@ class ExecutionService:
         ground = RegistryContext(
             self._ledger,
             self._tasks,
-            self._wall,
-            self._aside,
+            self._clock_us,
+            self._run_in_worker,
             self._robots_changed,
             self._foreign,
             self._late_activity.shows,
@@ -461,7 +463,7 @@ class ExecutionService:
         )
         opened = self._opened(run, link, own=False, seq=seq)
         if run.simulated:
-            opened.tell(Ended(self._wall(), "lost", None, _LOST))
+            opened.tell(Ended(self._clock_us(), "lost", None, _LOST))
         elif not is_whole:
             log.error("run %s: some of its events cannot be read", run.id)
             opened.lose("Some of what was recorded of this run cannot be read.")

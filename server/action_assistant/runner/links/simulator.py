@@ -54,9 +54,11 @@ _SLICE: Final = 50  # engine steps between two turns of the event loop
 Simulator: TypeAlias = Callable[[EngineFacts, str, Callable[[], int]], Link]
 
 
-def in_this_process(facts: EngineFacts, script: str, wall: Callable[[], int]) -> "SimulatorLink":
+def in_this_process(
+    facts: EngineFacts, script: str, clock_us: Callable[[], int]
+) -> "SimulatorLink":
     """A simulated engine that shares the event loop: where time is virtual."""
-    return SimulatorLink(engine_of(facts, script), wall=wall)
+    return SimulatorLink(engine_of(facts, script), clock_us=clock_us)
 
 
 def engine_of(facts: EngineFacts, script: str) -> semantics.Engine:
@@ -66,15 +68,15 @@ def engine_of(facts: EngineFacts, script: str) -> semantics.Engine:
 
 
 class SimulatorLink:
-    """A simulated engine in this process. `wall` gives microseconds UTC."""
+    """A simulated engine in this process. `clock_us` gives microseconds UTC."""
 
     simulated: Final = True
 
-    def __init__(self, engine: semantics.Engine, *, wall: Callable[[], int]) -> None:
+    def __init__(self, engine: semantics.Engine, *, clock_us: Callable[[], int]) -> None:
         self._engine = engine
-        self._wall = wall
+        self._clock_us = clock_us
         self._origin = anyio.current_time()
-        self._origin_wall = wall()
+        self._origin_wall = clock_us()
         self._incarnation = secrets.token_hex(8)
         self._runs: dict[str, str] = {}  # graph name -> run
         self._subscribers = Listeners[Report]()
@@ -138,7 +140,7 @@ class SimulatorLink:
         """What the engine holds right now."""
         self._alive()
         self._advance()
-        at = self._wall()
+        at = self._clock_us()
         graphs = tuple(
             Snapshot(
                 at=at,

@@ -21,19 +21,19 @@ from action_assistant.runner.analysis.replay import RunReplay, run_replay
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.archive_store import Archived, ArchiveStore
 from action_assistant.runner.archives.raw_messages import RawMessages, RawPut, raw_of, stream_of_raw
-from action_assistant.runner.clock import Clock
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import History
-from action_assistant.runner.runs.recorder import Recorder, stream_of
+from action_assistant.runner.runs.recorder import RunRecorder, stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.workers import Crashed
 from action_assistant.schema.runner_tables import expectation, review, run, run_label
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
@@ -102,7 +102,7 @@ class OngoingRun(Protocol):
     """A run that goes on."""
 
     run: Run
-    recorder: Recorder
+    recorder: RunRecorder
 
 
 class OngoingRuns(Protocol):
@@ -132,16 +132,16 @@ class ReviewService:
         self,
         control: OngoingRuns,
         ledger: ArchiveStore,
-        aside: Aside,
-        wall: Clock,
+        run_in_worker: RunInWorker,
+        clock_us: ClockUs,
         asked: ReviewQueries | None = None,
     ) -> None:
-        self.keyframe_store = KeyframeStore(ledger, aside)
+        self.keyframe_store = KeyframeStore(ledger, run_in_worker)
         self._asked = asked
         self._control = control
         self._ledger = ledger
-        self._aside = aside
-        self._wall = wall
+        self._run_in_worker = run_in_worker
+        self._clock_us = clock_us
         self._ended = anyio.Event()
         self._summed_up: int | None = None  # all runs that had ended by then are summed up
         self._tried: Counter[str] = Counter()  # runs whose sums took a worker's life
@@ -172,7 +172,7 @@ class ReviewService:
 
     async def _sum_up_some(self) -> bool:
         """Sum up the newest runs that are over and are not yet. Whether any was."""
-        before, since = self._wall(), self._summed_up
+        before, since = self._clock_us(), self._summed_up
         figures = func.coalesce(func.json_extract(run.c.summary, "$.figures"), 0)
         done = select(review.c.run).where(
             review.c.run == run.c.id, review.c.summed, figures == annotations.FIGURES
@@ -193,18 +193,18 @@ class ReviewService:
     async def _sum_up(self, run_id: str) -> None:
         try:
             if self._asked is None:
-                summed = await self.summed(run_id, self._wall())
+                summed = await self.summed(run_id, self._clock_us())
             else:
-                summed = await self._asked.value(ReviewService.summed, run_id, self._wall())
+                summed = await self._asked.value(ReviewService.summed, run_id, self._clock_us())
         except Refused as refused:
             self._tried[run_id] += 1
             if self._tried[run_id] < _TRIES or not isinstance(refused, Crashed | TooLarge):
                 raise  # it will be, later
             log.error("run %s is left out of sums: %s", run_id, refused.detail)
-            summed = annotations.SummedUp(self._wall(), {})
+            summed = annotations.SummedUp(self._clock_us(), {})
         except Exception:  # whatever a run of long ago holds, those that go on are not ended by it
             log.exception("run %s cannot be read; it is left out of sums", run_id)
-            summed = annotations.SummedUp(self._wall(), {}, figures=annotations.FIGURES)
+            summed = annotations.SummedUp(self._clock_us(), {}, figures=annotations.FIGURES)
         await self._ledger.append(annotations.stream_about(run_id), [annotations.draft(summed)])
 
     async def summed(self, run_id: str, now: int) -> annotations.SummedUp:
@@ -212,7 +212,7 @@ class ReviewService:
         found = (await self.keyframe_store.keyframes(run_id)).keys[-1].run
         good = found.end == "finished" and found.result == "on_true"
         graph = None if good else await self._graph(run_id)  # only failures have causes
-        return await self._aside(lambda: annotations.sum_of(found, graph, now))
+        return await self._run_in_worker(lambda: annotations.sum_of(found, graph, now))
 
     async def whole(self, run_id: str) -> views.RunWhole:
         """A run that is over, and the graph as it was sent. Raises NotFound."""
@@ -240,7 +240,7 @@ class ReviewService:
     async def causes(self, run_id: str) -> list[CauseShown]:
         """What is proven to be behind the end of a run, the weightiest first. Raises NotFound."""
         found, graph = await self.known(run_id), await self._graph(run_id)
-        named = await self._aside(lambda: causes(found, graph))
+        named = await self._run_in_worker(lambda: causes(found, graph))
         shown: list[CauseShown] = []
         for each in named[:_CAUSES]:
             action = found.actions.get(each.action or "")
@@ -299,7 +299,7 @@ class ReviewService:
     async def mark(self, run_id: str, marks: annotations.Marks, author: Author) -> RunMarks:
         """Pin, note or label a run. Raises NotFound."""
         await self.known(run_id)
-        marked = annotations.Marked(self._wall(), author, marks)
+        marked = annotations.Marked(self._clock_us(), author, marks)
         await self._ledger.append(annotations.stream_about(run_id), [annotations.draft(marked)])
         return await self.marks(run_id)
 
@@ -317,17 +317,17 @@ class ReviewService:
         one, other = await self.known(a), await self.known(b)
         umrf_a = await self._control.history.umrf(a)
         umrf_b = await self._control.history.umrf(b)
-        return await self._aside(lambda: compare(one, other, umrf_a, umrf_b))
+        return await self._run_in_worker(lambda: compare(one, other, umrf_a, umrf_b))
 
     async def export(self, run_id: str, form: Format) -> bytes:
         """The run as a file. Raises NotFound."""
         found = await self.known(run_id)
         if form == "csv":
-            return await self._aside(lambda: exports.intervals(found))
+            return await self._run_in_worker(lambda: exports.intervals(found))
         events = await self._ledger.read(stream_of(run_id))
         if form == "mcap":
-            return await self._aside(lambda: exports.mcap(events))
-        return await self._aside(lambda: b"".join(exports.lines(run_id, events)))
+            return await self._run_in_worker(lambda: exports.mcap(events))
+        return await self._run_in_worker(lambda: b"".join(exports.lines(run_id, events)))
 
     async def lines(self, run_id: str, after: int) -> tuple[int, bytes]:
         """A page of JSON lines, and the seq of its last event; the run may be longer than memory
@@ -349,7 +349,7 @@ class ReviewService:
         if umrf is None:
             return script
         try:
-            reading = await self._aside(lambda: codec.read(umrf))
+            reading = await self._run_in_worker(lambda: codec.read(umrf))
         except codec.Unreadable as wrong:
             raise NotUmrf(wrong.message, where={"path": f"/umrf{wrong.path}"}) from wrong
         return expected_runs.fitted(script, found, reading.graph)
@@ -364,7 +364,7 @@ class ReviewService:
         for i in range(0, len(ids), _ROWS):
             sums += await self._ledger.query(statistics.sums_of(ids[i : i + _ROWS]))
         newest = await self._graph(ids[0]) if ids else None
-        return await self._aside(lambda: statistics.statistics(rows, sums, newest))
+        return await self._run_in_worker(lambda: statistics.statistics(rows, sums, newest))
 
     async def _graph(self, run_id: str) -> Graph | None:
         try:
@@ -381,7 +381,7 @@ class ReviewService:
             stream = stream_of(first.run)
             if not await self._ledger.newest(stream):
                 label = annotations.Marks(labels=(examples.LABEL,))
-                marked = annotations.Marked(self._wall(), author, label)
+                marked = annotations.Marked(self._clock_us(), author, label)
                 await self._ledger.append(
                     annotations.stream_about(first.run), [annotations.draft(marked)]
                 )
@@ -403,10 +403,10 @@ class ReviewService:
         if run_id in self._control.open:
             raise Conflict("The run is not over yet.")
         if self._asked is None:
-            saved = await self.expected(run_id, name, author, self._wall())
+            saved = await self.expected(run_id, name, author, self._clock_us())
         else:
             saved = await self._asked.value(
-                ReviewService.expected, run_id, name, author, self._wall()
+                ReviewService.expected, run_id, name, author, self._clock_us()
             )
         draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
         await self._ledger.append(expected_runs.STREAM, [draft])
@@ -449,7 +449,7 @@ class ReviewService:
         """Expect it no more. Raises NotFound."""
         if not await self._ledger.query(select(expectation).where(expectation.c.name == name)):
             raise NotFound(f"Nothing is expected under the name {name!r}.")
-        retired = expected_runs.Retired(self._wall(), name, author)
+        retired = expected_runs.Retired(self._clock_us(), name, author)
         draft = Draft(retired.kind, author.id, msgspec.json.encode(retired))
         await self._ledger.append(expected_runs.STREAM, [draft])
 

@@ -24,7 +24,7 @@ from action_assistant.runner.review.service import OngoingRun, ReviewService
 from action_assistant.runner.runs.history import History, Ledger
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -47,9 +47,11 @@ class StoragePaths(msgspec.Struct, frozen=True):
 class WorkerQueries:
     """Asks a worker. `opened` are the runs that go on, once that is known."""
 
-    def __init__(self, aside: Aside, place: StoragePaths, ledger: SnapshotJournal) -> None:
+    def __init__(
+        self, run_in_worker: RunInWorker, place: StoragePaths, ledger: SnapshotJournal
+    ) -> None:
         self.opened: Mapping[str, OngoingRun] = {}
-        self._aside = aside
+        self._run_in_worker = run_in_worker
         self._place = place
         self._ledger = ledger
 
@@ -61,7 +63,7 @@ class WorkerQueries:
     ) -> T:
         """What a method of `ReviewService` returns. Raises what that raises, Unavailable, TooMany."""
         await self._settled(args)
-        found, kept = await self._aside(
+        found, kept = await self._run_in_worker(
             answered, self._place, partial(question, **kw) if kw else question, args
         )
         await self._keep(kept)
@@ -76,7 +78,7 @@ class WorkerQueries:
     ) -> bytes:
         """The same as JSON: it need not be taken apart and put together here."""
         await self._settled(args)
-        found, kept = await self._aside(
+        found, kept = await self._run_in_worker(
             encoded, self._place, partial(question, **kw) if kw else question, args
         )
         await self._keep(kept)

@@ -43,7 +43,7 @@ _SHARE: Final = 20  # at most one part in so many of the time goes into asking a
 _FRESH_S: Final = 60.0  # for so long an engine that came back is called restarted
 
 T = TypeVar("T")
-Aside = Callable[..., Awaitable[T]]
+RunInAnyWay = Callable[..., Awaitable[T]]
 
 
 class EngineIndex(msgspec.Struct, frozen=True, kw_only=True):
@@ -69,7 +69,7 @@ class KnownEngine:
         facts: EngineFacts,
         link: Link,
         *,
-        wall: Callable[[], int],
+        clock_us: Callable[[], int],
         changed: Callable[[], None] = lambda: None,
         became: "Callable[[KnownEngine], None]" = lambda _: None,
         foreign: "Callable[[KnownEngine, ForeignCommand], None]" = lambda _, __: None,
@@ -80,12 +80,12 @@ class KnownEngine:
         self.facts = facts
         self.state: EngineState = link.standing.state
         self.why = link.standing.why
-        self.since = wall()
+        self.since = clock_us()
         self.restarted_at: int | None = None
         self.answer: Answer | None = None
         self.took_ms: float | None = None
         self._link = link
-        self._wall = wall
+        self._clock_us = clock_us
         self._changed = changed
         self._became = became
         self._foreign = foreign
@@ -272,21 +272,21 @@ class KnownEngine:
         if (state, why) == (self.state, self.why):
             return
         if state != self.state:
-            self.since = self._wall()
+            self.since = self._clock_us()
         is_other = state != self.state
         self.state, self.why = state, why
         if is_other:
             self._became(self)
         self._changed()
 
-    async def index(self, aside: "Aside[EngineIndex]") -> EngineIndex:
+    async def index(self, run_in_worker: "RunInAnyWay[EngineIndex]") -> EngineIndex:
         """What the engine has indexed, as its last answer says; read when it has changed."""
         answer = self.answer
         if answer is None:
             return EngineIndex()
         texts = answer.known_actions, answer.known_graphs
         if texts != self._index[0]:
-            self._index = texts, await aside(read_index, *texts)
+            self._index = texts, await run_in_worker(read_index, *texts)
         return self._index[1]
 
 

@@ -21,7 +21,7 @@ from action_assistant.errors import NotFound
 from action_assistant.private_files import make_folder, opener
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, Feedback
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
@@ -64,7 +64,7 @@ class Recordings:
     def __init__(
         self,
         folder: Path,
-        aside: Aside,
+        run_in_worker: RunInWorker,
         *,
         kept_days: int = _KEPT_DAYS,
         kept_bytes: int = _KEPT_BYTES,
@@ -72,7 +72,7 @@ class Recordings:
     ) -> None:
         self._folder = folder
         self._prunes = prunes
-        self._aside = aside
+        self._run_in_worker = run_in_worker
         self._kept_days = kept_days
         self._kept_bytes = kept_bytes
         self._waiting: deque[tuple[str, int, bytes]] = deque(maxlen=_WAITING)
@@ -105,7 +105,7 @@ class Recordings:
             if not lines:
                 continue
             try:
-                await self._aside(partial(self._write, lines))
+                await self._run_in_worker(partial(self._write, lines))
                 told = False
             except Exception:
                 if not told:
@@ -156,13 +156,13 @@ class Recordings:
             found = sorted(folder.glob(f"*{_ENDING}"), reverse=True)
             return [Recording(path.name, path.stat().st_size) for path in found]
 
-        return await self._aside(read)
+        return await self._run_in_worker(read)
 
     async def file(self, robot: str, name: str) -> bytes:
         """One of them, compressed. Raises NotFound."""
         if name not in {each.name for each in await self.listed(robot)}:
             raise NotFound("There is no such recording.")
-        return await self._aside((self._folder / robot / name).read_bytes)
+        return await self._run_in_worker((self._folder / robot / name).read_bytes)
 
 
 def hours(since: int, until: int) -> tuple[str, str]:

@@ -10,7 +10,7 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft
-from action_assistant.runner.clock import Clock
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     SIMULATOR,
@@ -40,7 +40,7 @@ from action_assistant.runner.robots.robot_events import (
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import Ledger
 from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
@@ -76,12 +76,12 @@ class RegistryContext(msgspec.Struct, frozen=True):
 
     ledger: Ledger
     tasks: TaskGroup
-    wall: Clock
-    aside: Aside
+    clock_us: ClockUs
+    run_in_worker: RunInWorker
     changed: Callable[[], None]
     foreign: Callable[[KnownEngine, ForeignCommand], Commanded]
     shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None]
-    stops: Callable[[TaskGroup, Clock, Note, Callable[[], None]], ForeignStops]
+    stops: Callable[[TaskGroup, ClockUs, Note, Callable[[], None]], ForeignStops]
 
 
 class Robots:
@@ -109,7 +109,7 @@ class Robots:
         self._ground = ground
         self._robot_log = RobotLog(ground.ledger, ground.tasks)
         self._foreign_stops = ground.stops(
-            ground.tasks, ground.wall, self._robot_log.note, lambda: ground.changed()
+            ground.tasks, ground.clock_us, self._robot_log.note, lambda: ground.changed()
         )
         if self.recordings is not None:
             ground.tasks.start_soon(self.recordings.run)
@@ -122,7 +122,7 @@ class Robots:
         """Take a robot in, or change it. Raises BadInput, Conflict, Unavailable."""
         check_registration(asked)
         ground = self._standing()
-        body = Registered(at=ground.wall(), **msgspec.structs.asdict(asked))
+        body = Registered(at=ground.clock_us(), **msgspec.structs.asdict(asked))
         draft = Draft(body.kind, author.id, msgspec.json.encode(body))
         await ground.ledger.append(STREAM, [draft])
         self.add(asked)
@@ -133,7 +133,7 @@ class Robots:
         """Take a robot out. Raises NotFound, Unavailable."""
         self.registration(name)
         ground = self._standing()
-        body = Removed(at=ground.wall(), name=name)
+        body = Removed(at=ground.clock_us(), name=name)
         draft = Draft(body.kind, author.id, msgspec.json.encode(body))
         await ground.ledger.append(STREAM, [draft])
         self._let_go(name)
@@ -155,7 +155,7 @@ class Robots:
             registration,
             facts,
             link,
-            wall=ground.wall,
+            clock_us=ground.clock_us,
             changed=ground.changed,
             became=self._note_state,
             foreign=self._note_command,
@@ -277,7 +277,9 @@ class Robots:
         """What a robot can do, as far as is known. Raises NotFound."""
         self.registration(name)
         engine = self._engines.get(name)
-        return EngineIndex() if engine is None else await engine.index(self._standing().aside)
+        return (
+            EngineIndex() if engine is None else await engine.index(self._standing().run_in_worker)
+        )
 
     def held(self, name: str, graph: str) -> str:
         """A graph as the engine wrote it in its last answer. Raises NotFound."""
@@ -311,7 +313,7 @@ class Robots:
     def _note_state(self, engine: KnownEngine) -> None:
         name = engine.registration.name
         incarnation = engine.standing.incarnation
-        at = self._standing().wall()
+        at = self._standing().clock_us()
         became = EngineBecame(at=at, state=engine.state, why=engine.why, incarnation=incarnation)
         self.robot_log.note(name, became, name)
 

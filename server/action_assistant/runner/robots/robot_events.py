@@ -15,7 +15,7 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.links.port import Command, EngineState, ForeignCommand
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import Ledger
-from action_assistant.runner.runs.recorder import Pen
+from action_assistant.runner.runs.recorder import StreamAppender
 
 
 def stream_of_robot(name: str) -> str:
@@ -129,19 +129,19 @@ class RobotLog:
     def __init__(self, ledger: Ledger, tasks: TaskGroup) -> None:
         self._ledger = ledger
         self._tasks = tasks
-        self._pens: dict[str, Pen] = {}
+        self._pens: dict[str, StreamAppender] = {}
 
     def note(self, robot: str, event: RobotEvent, author: str) -> None:
         """Record soon. Never waits."""
-        pen = self._pens.get(robot)
-        if pen is None:
-            pen = self._pens[robot] = Pen(self._ledger, stream_of_robot(robot), -1)
-            self._tasks.start_soon(self._write, pen)
-        pen.add(draft_of(event, author))
+        appender = self._pens.get(robot)
+        if appender is None:
+            appender = self._pens[robot] = StreamAppender(self._ledger, stream_of_robot(robot), -1)
+            self._tasks.start_soon(self._write, appender)
+        appender.add(draft_of(event, author))
 
-    async def _write(self, pen: Pen) -> None:
-        await pen.find_end()
-        await pen.run()
+    async def _write(self, appender: StreamAppender) -> None:
+        await appender.find_end()
+        await appender.run()
 
     async def newest(self, robot: str, most: int) -> list[tuple[int, RobotEvent]]:
         """The newest events of a robot, oldest first, with their seqs. Raises Unavailable."""

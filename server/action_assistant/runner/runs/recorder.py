@@ -46,7 +46,7 @@ def stream_of(run: str) -> str:
     return f"run/{run}"
 
 
-class Pen:
+class StreamAppender:
     """The pen of a stream that ends at `seq`. `changed` is called when `seq` or `recorded` have
     changed."""
 
@@ -135,7 +135,7 @@ class Pen:
         self._changed()
 
 
-class Recorder(Pen):
+class RunRecorder(StreamAppender):
     """The pen of one run."""
 
     def __init__(

@@ -9,7 +9,7 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
-from action_assistant.runner.clock import Clock
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.port import GraphOutline, Order
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, Requested, encode
@@ -81,10 +81,10 @@ class StopOrder:
 class IdempotentStarts:
     """Where starts are written down."""
 
-    def __init__(self, ledger: Ledger, tasks: TaskGroup, wall: Clock) -> None:
+    def __init__(self, ledger: Ledger, tasks: TaskGroup, clock_us: ClockUs) -> None:
         self._ledger = ledger
         self._tasks = tasks
-        self._wall = wall
+        self._clock_us = clock_us
         self._asking: WeakValueDictionary[str, anyio.Lock] = WeakValueDictionary()
 
     @asynccontextmanager
@@ -129,7 +129,7 @@ class IdempotentStarts:
     async def _disown(self, run: str) -> None:
         """A commit whose answer got lost may still have happened: then say that nothing was sent."""
         stream = stream_of(run)
-        end = Ended(self._wall(), "refused", None, "It could not be recorded in time.")
+        end = Ended(self._clock_us(), "refused", None, "It could not be recorded in time.")
         while True:
             try:
                 seq = await self._ledger.newest(stream)

@@ -9,7 +9,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
-from action_assistant.runner.clock import Clock
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.port import SIMULATOR, Answer, Link, NoAnswer
 from action_assistant.runner.links.simulator import Simulator
 from action_assistant.runner.robots.engine import KnownEngine
@@ -20,7 +20,7 @@ from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
 from action_assistant.runner.start.preflight import EngineSight, Item, Preflight, Settled
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
-from action_assistant.web.workers.lanes import Aside
+from action_assistant.web.workers.lanes import RunInWorker
 
 #: The simulator as itself: a paused run can be stopped there.
 _ITSELF: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
@@ -102,16 +102,16 @@ class StartChecks:
         self,
         robots: Robots,
         *,
-        wall: Clock,
-        aside: Aside,
+        clock_us: ClockUs,
+        run_in_worker: RunInWorker,
         taken: Callable[[str], Run | None],
         going: Callable[[str], Collection[str]],
         settled: Callable[[str], Sequence[Settled]],
         simulator: Simulator,
     ) -> None:
         self._robots = robots
-        self._wall = wall
-        self._aside = aside
+        self._clock_us = clock_us
+        self._run_in_worker = run_in_worker
         self._taken = taken
         self._going = going
         self._settled = settled
@@ -121,8 +121,8 @@ class StartChecks:
         """Look, and refuse what stands in the way. Raises Refused of many kinds."""
         if asked.engine == SIMULATOR:
             facts = self._simulated(asked)
-            ready = await self._aside(prepared, asked, facts, secrets.token_urlsafe(9))
-            link = self._simulator(facts, ready.script, self._wall)
+            ready = await self._run_in_worker(prepared, asked, facts, secrets.token_urlsafe(9))
+            link = self._simulator(facts, ready.script, self._clock_us)
             return Cleared(
                 ready=ready,
                 link=link,
@@ -133,7 +133,7 @@ class StartChecks:
         robot = self._robots.reachable(asked.engine)
         if asked.like is not None:
             raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
-        ready = await self._aside(prepared, asked, robot.facts, secrets.token_urlsafe(9))
+        ready = await self._run_in_worker(prepared, asked, robot.facts, secrets.token_urlsafe(9))
         free = preflight.of_taken(asked.engine, self._taken(asked.engine))
         preflight.check_items([free], ())
         if self._robots.foreign_stops.going(asked.engine):
@@ -148,7 +148,7 @@ class StartChecks:
             raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
                 nothing
             )
-        items = await self._aside(preflight.of_text, sight, ready.umrf)
+        items = await self._run_in_worker(preflight.of_text, sight, ready.umrf)
         preflight.check_items([preflight.of_taken(asked.engine, self._taken(asked.engine))], ())
         preflight.check_items(items, asked.override.codes if asked.override else ())
         return Cleared(
@@ -206,7 +206,7 @@ class StartChecks:
         except Refused as refused:
             return preflight.summed(asked.engine, [preflight.of_refusal("link", refused)])
         try:
-            ready = await self._aside(partial(prepared, approved=False), asked, facts, "")
+            ready = await self._run_in_worker(partial(prepared, approved=False), asked, facts, "")
             items.append(preflight.of_graph(ready))
         except Refused as refused:
             items.append(preflight.of_refusal("graph", refused))
@@ -223,7 +223,7 @@ class StartChecks:
             return [preflight.of_silence(robot.registration.name, str(nothing))]
         if ready is None:
             return [preflight.of_answer(sight)]
-        return list(await self._aside(preflight.of_text, sight, ready.umrf))
+        return list(await self._run_in_worker(preflight.of_text, sight, ready.umrf))
 
     async def _sight(self, robot: KnownEngine) -> EngineSight:
         """The engine as it answers a get sent now, on the path that would confirm a stop. Raises
@@ -242,7 +242,7 @@ class StartChecks:
             facts=robot.facts,
             standing=robot.standing,
             answer=answer,
-            index=await robot.index(self._aside),
+            index=await robot.index(self._run_in_worker),
             took_ms=took,
             open_runs=going,
             settled=tuple(self._settled(name)),

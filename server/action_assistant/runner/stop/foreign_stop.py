@@ -11,7 +11,7 @@ from typing import Final
 import anyio
 from anyio.abc import TaskGroup
 
-from action_assistant.runner.clock import Clock
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, ForeignCommand, NoAnswer
 from action_assistant.runner.robots.engine import KnownEngine
@@ -38,12 +38,12 @@ class ForeignStopLoop:
     def __init__(
         self,
         tasks: TaskGroup,
-        wall: Clock,
+        clock_us: ClockUs,
         note: Callable[[str, RobotEvent, str], None],
         changed: Callable[[], None],
     ) -> None:
         self._tasks = tasks
-        self._wall = wall
+        self._clock_us = clock_us
         self._note = note
         self._changed = changed
         self._going: dict[tuple[str, str], str] = {}
@@ -67,7 +67,7 @@ class ForeignStopLoop:
             return
         self._patience[robot, graph] = anyio.CancelScope(deadline=until)
         self._going[robot, graph] = ""
-        asked = StopAsked(at=self._wall(), graph=graph, author=author)
+        asked = StopAsked(at=self._clock_us(), graph=graph, author=author)
         self._note(robot, asked, author.id)
         self._tasks.start_soon(self._stop, engine, graph, robot)
         self._changed()
@@ -84,7 +84,7 @@ class ForeignStopLoop:
                 self._note(robot, told, "")
                 return
             why = self._going[robot, graph] or "no proof has come"
-            self._note(robot, StopUnproven(at=self._wall(), graph=graph, why=why), "")
+            self._note(robot, StopUnproven(at=self._clock_us(), graph=graph, why=why), "")
         finally:
             self._going.pop((robot, graph), None)
             self._patience.pop((robot, graph), None)
@@ -107,7 +107,7 @@ class ForeignStopLoop:
                 why = why or engine.why or "the engine does not answer"
             elif len({life, answer.incarnation} - {""}) > 1:
                 why = "the engine was restarted: look at the robot"
-                return StopUnproven(at=self._wall(), graph=graph, why=why)
+                return StopUnproven(at=self._clock_us(), graph=graph, why=why)
             elif engine.standing.servers != 1:
                 why = f"{engine.standing.servers} engines are seen on the path of its answers"
             elif disturbed:

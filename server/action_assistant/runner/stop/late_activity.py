@@ -14,7 +14,7 @@ import msgspec
 from anyio.abc import TaskGroup
 
 from action_assistant.errors import NotFound, Refused
-from action_assistant.runner.clock import Clock
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.engine_text import run_in
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import ForeignCommand, NoAnswer
@@ -66,14 +66,14 @@ class LateActivity:
         robots: RobotRecords,
         tasks: TaskGroup,
         *,
-        wall: Clock,
+        clock_us: ClockUs,
         reopen: Reopen,
     ) -> None:
         self._open = open_
         self._history = history
         self._robots = robots
         self._tasks = tasks
-        self._wall = wall
+        self._clock_us = clock_us
         self._reopen = reopen
         self._looking: set[str] = set()
         self._waiting: deque[tuple[KnownEngine, Snapshot, str]] = deque()
@@ -173,7 +173,7 @@ class LateActivity:
             f"MOVES AGAIN: {run.engine} shows {nodes} moving in {run.graph_name}, after the run "
             f"had been called {run.end}."
         )
-        return MovesAgain(self._wall(), text)
+        return MovesAgain(self._clock_us(), text)
 
 
 async def _asked(engine: KnownEngine, shown: Snapshot, run: str) -> Snapshot | None:

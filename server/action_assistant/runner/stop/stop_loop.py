@@ -63,13 +63,13 @@ class StopLoop:
     """Presses, and the messages that follow. `hung`: why its engine will not answer any more."""
 
     def __init__(
-        self, it: StoppableRun, link: Link, *, simulated: bool, wall: Callable[[], int]
+        self, it: StoppableRun, link: Link, *, simulated: bool, clock_us: Callable[[], int]
     ) -> None:
         self.hung = ""
         self._it = it
         self._link = link
         self._simulated = simulated
-        self._wall = wall
+        self._clock_us = clock_us
         self._wanted = anyio.Event()
         self._pressed = anyio.Event()
         self._news = anyio.Event()
@@ -85,7 +85,7 @@ class StopLoop:
         now, (who, when) = anyio.current_time(), self._asked
         if who != author.id or (stop_id not in self._ids and now - when > _ONE_PRESS_S):
             self._asked = (author.id, now)
-            self._it.tell(StopRequested(self._wall(), author, stop_id), author.id)
+            self._it.tell(StopRequested(self._clock_us(), author, stop_id), author.id)
         self._ids.add(stop_id)
         self._wanted.set()
         self._pressed.set()
@@ -105,7 +105,7 @@ class StopLoop:
             failed = await send_stop(self._link, self._it.run.graph_name)
             if not failed:
                 self._it.watch.stop_left()
-            self._it.tell(StopSent(self._wall(), attempt, failed))
+            self._it.tell(StopSent(self._clock_us(), attempt, failed))
             self._it.watch.look()
             waited = anyio.current_time() - began
             if waited >= _UNCONFIRMED_S:

@@ -22,7 +22,7 @@ from action_assistant.errors import TooLarge, TooMany, Unavailable
 from action_assistant.web.auth.access import Caller, caller
 from action_assistant.web.workers.child_process import LAST, child, serve, wire
 
-__all__ = ["HOPELESS", "Aside", "Crashed", "GaveUp", "Lane", "child", "here", "kept_warm"]
+__all__ = ["HOPELESS", "Crashed", "GaveUp", "Lane", "RunInWorker", "child", "kept_warm", "run_here"]
 
 log: Final = logging.getLogger(__name__)
 
@@ -33,7 +33,7 @@ _ALL_WAITING: Final = 256
 _START_S: Final = 30.0
 
 
-class Aside(Protocol):
+class RunInWorker(Protocol):
     """A way to do work that takes long without holding up a Stop, or other people: in another
     process, so that it is a function of a module, and what it is given and returns are values."""
 
@@ -42,7 +42,7 @@ class Aside(Protocol):
         ...
 
 
-async def here(work: Callable[..., T], /, *args: Any) -> T:
+async def run_here(work: Callable[..., T], /, *args: Any) -> T:
     """No way aside: the work is done at once, in this process."""
     return work(*args)
 
@@ -74,7 +74,7 @@ class Lane:
     def __init__(
         self,
         name: str,
-        hands: int,
+        processes: int,
         patience: float,
         nice: int,
         threads: CapacityLimiter,
@@ -87,7 +87,7 @@ class Lane:
         self._threads = threads
         self._idle: list[_Worker] = []
         self._busy: set[_Worker] = set()
-        self._free = anyio.Semaphore(hands)
+        self._free = anyio.Semaphore(processes)
         self._turns: dict[str, anyio.Lock] = {}
         self._waiting: dict[str, int] = {}
 

@@ -16,10 +16,12 @@ FIELDS: Final = ("umrf_graph_name", "umrf_graph_json", "targets", "name_match_re
 _MAKE: Final = "`make ros` in a checkout, or `source` the ROS 2 workspace before starting"
 
 
-def ros2_reach(wall: Callable[[], int], environ: Mapping[str, str] = os.environ) -> "Reach | str":
+def ros2_reach(
+    clock_us: Callable[[], int], environ: Mapping[str, str] = os.environ
+) -> "Reach | str":
     """What reaches robots over ROS 2 from this process, or why nothing does, in one sentence.
 
-    `wall` gives microseconds UTC. rclpy is imported here and not before: an editor's computer has
+    `clock_us` gives microseconds UTC. rclpy is imported here and not before: an editor's computer has
     none, and its wheels start their interpreter anew.
     """
     missing = why_not(environ)
@@ -30,7 +32,7 @@ def ros2_reach(wall: Callable[[], int], environ: Mapping[str, str] = os.environ)
         return f"ROS_DOMAIN_ID is {home!r}; it must be a number from 0 to 232."
     from action_assistant.runner.links.ros2.reach import Ros2
 
-    return Ros2(wall, int(home))
+    return Ros2(clock_us, int(home))
 
 
 def why_not(environ: Mapping[str, str] = os.environ) -> str:

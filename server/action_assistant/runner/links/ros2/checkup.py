@@ -33,11 +33,13 @@ _SAYS_FASTRTPS: Final = "FASTDDS_BUILTIN_TRANSPORTS"
 
 
 async def look(
-    robots: Sequence[Registration], wall: Callable[[], int], environ: Mapping[str, str] = os.environ
+    robots: Sequence[Registration],
+    clock_us: Callable[[], int],
+    environ: Mapping[str, str] = os.environ,
 ) -> list[Diagnostic]:
     """Everything there is to say, the ground first. Takes some seconds; never raises for trouble."""
     found = environment(environ)
-    reach = ros2_reach(wall, environ)
+    reach = ros2_reach(clock_us, environ)
     if isinstance(reach, str):
         verdict: Verdict = "wrong" if robots else "note"  # a computer without robots needs none
         return [*found, Diagnostic(topic="rclpy", verdict=verdict, what=reach)]

@@ -66,7 +66,7 @@ class Domain:
     """A domain that this process takes part in."""
 
     def __init__(
-        self, number: int, topics: Topics, loop: asyncio.AbstractEventLoop, wall: Clock
+        self, number: int, topics: Topics, loop: asyncio.AbstractEventLoop, clock_us: Clock
     ) -> None:
         """Join. Takes up to some seconds, so it is done in a thread. Raises RuntimeError."""
         self.number = number
@@ -74,7 +74,7 @@ class Domain:
         self.actors: set[str] = set()  # who was heard
         self.settled_at = time.monotonic() + DISCOVERY_S
         self._loop = loop
-        self._wall = wall
+        self._clock_us = clock_us
         self._subscribers = Listeners[RosValue]()
         self._waiting: deque[RosValue] = deque(maxlen=_KEPT)
         self._called = False
@@ -119,7 +119,7 @@ class Domain:
         that was given up goes nowhere. Raises NotAGraph, RuntimeError."""
         loop = asyncio.get_running_loop()
         answered: asyncio.Future[GetResult] = loop.create_future()
-        client, asked_at = self.client(path), self._wall()
+        client, asked_at = self.client(path), self._clock_us()
 
         def hand_over(got: GetResult | Exception) -> None:
             if answered.done():
@@ -134,7 +134,7 @@ class Domain:
             if future.cancelled():
                 return
             try:
-                got: GetResult | Exception = _read(future.result(), asked_at, self._wall())
+                got: GetResult | Exception = _read(future.result(), asked_at, self._clock_us())
             except (NotAGraph, RuntimeError) as error:
                 got = error
             self._to_loop(lambda: hand_over(got))
@@ -229,7 +229,7 @@ class Domain:
         return loggers.pop() if len(loggers) == 1 else ""
 
     def _feedback(self, message: UmrfGraphFeedback) -> None:
-        at, seen = self._wall(), []
+        at, seen = self._clock_us(), []
         for text in reversed(message.history):  # the newest stands first
             try:
                 seen.append(snapshot(text, at=at, source="feedback"))

@@ -67,7 +67,11 @@ class Ros2Link:
     simulated: Final = False
 
     def __init__(
-        self, join: Join, registration: Registration, facts: EngineFacts, wall: Callable[[], int]
+        self,
+        join: Join,
+        registration: Registration,
+        facts: EngineFacts,
+        clock_us: Callable[[], int],
     ) -> None:
         self._join = join
         self._name = registration.name
@@ -75,7 +79,7 @@ class Ros2Link:
         self._path = registration.get_service
         self._facts = facts
         self._topics = topics_of(facts)
-        self._wall = wall
+        self._clock_us = clock_us
         self._subscribers = Listeners[Report]()
         self._domain: Domain | None = None
         self._runs: set[str] = set()
@@ -174,7 +178,7 @@ class Ros2Link:
         if len(servers) != 1 or not domain.settled:
             raise NoAnswer(self._standing.why)
         began = self._asked_at = time.monotonic()
-        asked_at = self._wall()
+        asked_at = self._clock_us()
         if self._unanswered_since is None:
             self._unanswered_since = began
         try:
@@ -189,7 +193,7 @@ class Ros2Link:
         self._look()
         return Answer(
             asked_at=asked_at,
-            at=self._wall(),
+            at=self._clock_us(),
             incarnation=servers[0].gid,
             graphs=got.graphs,
             texts=got.texts,
@@ -314,7 +318,7 @@ class Ros2Link:
         if (before.state, before.incarnation) != (now.state, now.incarnation):
             self._subscribers.tell(
                 EngineChanged(
-                    at=self._wall(), state=now.state, incarnation=now.incarnation, why=now.why
+                    at=self._clock_us(), state=now.state, incarnation=now.incarnation, why=now.why
                 )
             )
 
@@ -339,7 +343,7 @@ class Ros2Link:
                 if self._name in sound.targets:
                     self._subscribers.tell(
                         ForeignCommand(
-                            at=self._wall(),
+                            at=self._clock_us(),
                             command=sound.command,
                             graph=sound.graph,
                             umrf=sound.umrf,
@@ -351,7 +355,7 @@ class Ros2Link:
                 if self._said(sound.logger):
                     text = sound.text.strip()
                     self._subscribers.tell(
-                        EngineLog(at=self._wall(), text=text, graph=_graph_in(text))
+                        EngineLog(at=self._clock_us(), text=text, graph=_graph_in(text))
                     )
             case _:
                 assert_never(sound)

@@ -24,8 +24,8 @@ class Ros2:
     """Makes the links, and holds the domains they share. One per process: a process has one
     middleware, chosen by RMW_IMPLEMENTATION before anything else happens."""
 
-    def __init__(self, wall: Callable[[], int], home: int) -> None:
-        self._wall = wall
+    def __init__(self, clock_us: Callable[[], int], home: int) -> None:
+        self._clock_us = clock_us
         self._home = home
         self._domains: dict[tuple[int, Topics], Domain] = {}
         self._joining = anyio.Lock()
@@ -43,7 +43,7 @@ class Ros2:
                 f"{self.rmw}, and two of them cannot ask each other anything. A process has one: "
                 "start the runner with RMW_IMPLEMENTATION set to the robot's"
             )
-        return Ros2Link(self.domain, registration, facts, self._wall)
+        return Ros2Link(self.domain, registration, facts, self._clock_us)
 
     async def domain(self, number: int, topics: Topics) -> Domain:
         """A domain, joined when it is first asked for. Raises RuntimeError."""
@@ -52,7 +52,7 @@ class Ros2:
             if known is None:
                 loop = asyncio.get_running_loop()
                 known = await anyio.to_thread.run_sync(
-                    lambda: Domain(number, topics, loop, self._wall)
+                    lambda: Domain(number, topics, loop, self._clock_us)
                 )
                 self._domains[number, topics] = known
             return known
