@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.safe_text import PlainLog, one_line, plain
+from action_assistant.safe_text import PrintableLog, one_line, printable
 from action_assistant.web.auth.keys import Keys
 from journal import servers
 from support.product import COMMAND, TOKEN, Product, free_ports
@@ -26,14 +26,14 @@ _CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]"
 
 @given(st.recursive(st.text(), lambda some: st.lists(some) | st.dictionaries(st.text(), some)))
 def test_json_stays_the_same_json_and_steers_nothing(value: object) -> None:
-    shown = plain(json.dumps(value, ensure_ascii=False, indent=1))
+    shown = printable(json.dumps(value, ensure_ascii=False, indent=1))
     assert json.loads(shown) == value
     assert not _CONTROLS.search(shown)
     shown.encode()
 
 
 def test_a_line_of_a_log_cannot_pretend_to_be_two() -> None:
-    formatted = PlainLog()
+    formatted = PrintableLog()
     record = logging.LogRecord("x", logging.INFO, "", 0, "refused %s", (f"/a\n{EVIL}",), None)
     shown = formatted.format(record)
     assert shown.endswith("refused /a\\n" + one_line(EVIL))
@@ -74,14 +74,14 @@ def test_no_log_shows_what_lets_somebody_in(text: str, tmp_path: Path) -> None:
     record = logging.LogRecord(
         "x", logging.INFO, "", 0, "refused %s", (text.format(**secret),), None
     )
-    shown = PlainLog().format(record)
+    shown = PrintableLog().format(record)
     for each in secret.values():
         assert each.rpartition(".")[2] not in shown
 
 
 def test_a_token_that_somebody_chose_is_not_shown_either() -> None:
     record = logging.LogRecord("x", logging.INFO, "", 0, "at %s", (f"/wrong/{TOKEN}/",), None)
-    assert TOKEN not in PlainLog(TOKEN).format(record)
+    assert TOKEN not in PrintableLog(TOKEN).format(record)
 
 
 def test_neither_log_nor_processes_show_secrets_and_nothing_in_them_steers(tmp_path: Path) -> None:

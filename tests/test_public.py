@@ -5,7 +5,7 @@ import ipaddress
 import pytest
 
 from action_assistant.errors import CannotStart
-from action_assistant.public_url import LOOPBACK_PROXIES, Public, proxies, public_url
+from action_assistant.public_url import LOOPBACK_PROXIES, PublicUrl, proxies, public_url
 from action_assistant.settings import EVERYWHERE, check_host, reached
 
 
@@ -75,7 +75,7 @@ def test_behind_a_public_address_the_proxies_of_this_computer_are_believed_unles
         "ACTION_ASSISTANT_TRUSTED_PROXIES": "10.1.2.3, fd00::/8",
     }
     found = reached(None, None, by_environment)
-    assert found.public == Public("https", "robots.example.org", 443, "")
+    assert found.public == PublicUrl("https", "robots.example.org", 443, "")
     assert [str(each) for each in found.proxies] == ["10.1.2.3/32", "fd00::/8"]
     assert reached("https://other.example/", None, by_environment).public != found.public
     with pytest.raises(CannotStart, match=r"10\.0\.0\.1/8"):

@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 import pytest
 
-from action_assistant.supervisor import Enough
+from action_assistant.supervisor import EndSignal
 from support.product import Product, running
 
 
@@ -117,7 +117,7 @@ def nobody_listens() -> Iterator[None]:
 @pytest.mark.usefixtures("nobody_listens")
 def test_a_signal_to_end_is_heard_wherever_it_comes() -> None:
     """Before each line that waiting for it runs, also where a library holds a lock."""
-    enough = Enough(signal.SIGUSR1)
+    enough = EndSignal(signal.SIGUSR1)
     came = 0
 
     def everywhere(frame: FrameType, event: str, _: object) -> Any:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from action_assistant.errors import CannotStart
-from action_assistant.safe_text import make_streams_plain
+from action_assistant.safe_text import make_streams_printable
 from action_assistant.settings import check_environment, hide_password
 from action_assistant.version import VERSION
 
@@ -53,7 +53,7 @@ def parser(command: str = "") -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code."""
-    make_streams_plain()
+    make_streams_printable()
     if arguments is None:
         hide_password()
     asked = sys.argv[1:] if arguments is None else arguments

@@ -38,7 +38,7 @@ LOOPBACK_PROXIES: Final[tuple[Network, ...]] = (
 )
 
 
-class Public(msgspec.Struct, frozen=True):
+class PublicUrl(msgspec.Struct, frozen=True):
     """Where the page is for whoever comes through the proxy. `path` is "" or as "/temoto"."""
 
     scheme: str
@@ -77,7 +77,7 @@ class Public(msgspec.Struct, frozen=True):
         return name == self.host and port in {None, self.port}
 
 
-def public_url(text: str) -> Public:
+def public_url(text: str) -> PublicUrl:
     """The address that somebody wrote down. Raises CannotStart."""
     try:
         parts = urlsplit(text.strip())
@@ -109,7 +109,7 @@ def public_url(text: str) -> Public:
             "through the internet as plain text. Use https; plain http is for names and addresses "
             "of your own network."
         )
-    return Public(parts.scheme, host, port or _PORTS[parts.scheme], path)
+    return PublicUrl(parts.scheme, host, port or _PORTS[parts.scheme], path)
 
 
 def proxies(text: str) -> tuple[Network, ...]:

@@ -30,17 +30,17 @@ _Raised: TypeAlias = (
 )
 
 
-def plain(text: str) -> str:
+def printable(text: str) -> str:
     """The text, with lines and tabs as they were."""
     return _STEERING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def one_line(text: str) -> str:
     """The text, which cannot pretend to be another line."""
-    return plain(text).replace("\n", "\\n")
+    return printable(text).replace("\n", "\\n")
 
 
-def hushed(text: str, secrets: tuple[str, ...] = ()) -> str:
+def redacted(text: str, secrets: tuple[str, ...] = ()) -> str:
     """The text without what would let its readers in."""
     for secret in secrets:
         text = text.replace(secret, "…")
@@ -49,7 +49,7 @@ def hushed(text: str, secrets: tuple[str, ...] = ()) -> str:
     return text
 
 
-class PlainStream:
+class PrintableStream:
     """A standard stream, through which nothing steers a terminal."""
 
     def __init__(self, stream: TextIO) -> None:
@@ -57,22 +57,22 @@ class PlainStream:
 
     def write(self, text: str) -> int:
         """Returns how many characters were taken."""
-        self._stream.write(plain(text))
+        self._stream.write(printable(text))
         return len(text)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
 
 
-def make_streams_plain() -> None:
+def make_streams_printable() -> None:
     """From here on, for `print` and everything else."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is not None and not isinstance(stream, PlainStream):
-            setattr(sys, name, PlainStream(stream))
+        if stream is not None and not isinstance(stream, PrintableStream):
+            setattr(sys, name, PrintableStream(stream))
 
 
-class PlainLog(logging.Formatter):
+class PrintableLog(logging.Formatter):
     """One line for each record; what belongs to it is indented. `secrets` are never shown."""
 
     def __init__(self, *secrets: str) -> None:
@@ -81,7 +81,7 @@ class PlainLog(logging.Formatter):
 
     def format(self, record: logging.LogRecord) -> str:
         """As `logging` asks."""
-        return hushed(super().format(record), self._secrets)
+        return redacted(super().format(record), self._secrets)
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - as `logging` asks
         record.message = one_line(record.message)
@@ -95,4 +95,4 @@ class PlainLog(logging.Formatter):
 
 
 def _indented(text: str) -> str:
-    return "\n".join(f"    {line}" for line in plain(text).split("\n"))
+    return "\n".join(f"    {line}" for line in printable(text).split("\n"))

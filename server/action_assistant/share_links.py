@@ -12,7 +12,7 @@ from typing import Any, Final
 import msgspec
 import segno
 
-from action_assistant.web.auth.keys import Keys, Proof
+from action_assistant.web.auth.keys import Keys, ServerProof
 from action_assistant.web.auth.roles import may
 
 _ROLES: Final = ("viewer", "editor", "operator")
@@ -20,7 +20,7 @@ _PATIENCE_S: Final = 10.0
 _PROOF: Final = 10_000  # bytes
 
 
-class Link(msgspec.Struct, frozen=True):
+class ShareLink(msgspec.Struct, frozen=True):
     """An invitation, as far as it is printed."""
 
     role: str
@@ -32,7 +32,7 @@ class Links(msgspec.Struct, frozen=True):
     """What the editor knows about sharing."""
 
     origins: list[str]
-    invitations: list[Link]
+    invitations: list[ShareLink]
 
 
 def invitations_as_text(
@@ -52,7 +52,7 @@ def invitations_as_text(
         for role in _ROLES:
             if role not in found:
                 made = _ask(base, keys, trust, "POST", {"role": role})
-                found[role] = msgspec.json.decode(made, type=Link)
+                found[role] = msgspec.json.decode(made, type=ShareLink)
     except (OSError, urllib.error.URLError, msgspec.DecodeError) as error:
         return f"the links for others could not be made: {error}"
     if secret:
@@ -75,7 +75,7 @@ def is_ours(base: str, keys: Keys, trust: ssl.SSLContext | None = None) -> bool:
     url = f"{base}/api/server?challenge={challenge}"
     try:
         with _opener(trust).open(url, timeout=1) as answer:
-            proof = msgspec.json.decode(answer.read(_PROOF), type=Proof)
+            proof = msgspec.json.decode(answer.read(_PROOF), type=ServerProof)
     except (OSError, urllib.error.URLError, msgspec.DecodeError, HTTPException):
         return False
     host, _, port = base.partition("://")[2].rpartition(":")
@@ -97,7 +97,7 @@ def _warning(origin: str) -> list[str]:
     return ["What is sent is not encrypted: on a network with strangers, use --tls.", ""]
 
 
-def _text(origins: list[str], link: Link) -> str:
+def _text(origins: list[str], link: ShareLink) -> str:
     first, *others = (f"{origin}{link.path}" for origin in origins)
     lines = [f"\n  {link.role}: may {may_of(link.role)}", f"\n    {first}\n", _drawn(first)]
     if others:

@@ -16,7 +16,7 @@ import msgspec
 
 from action_assistant.interpreter import Interpreter, for_runner
 from action_assistant.private_files import opener
-from action_assistant.settings import EVERYWHERE, Reached, more_hosts
+from action_assistant.settings import EVERYWHERE, Reachability, more_hosts
 from action_assistant.share_links import invitations_as_text, is_ours
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
@@ -30,7 +30,7 @@ _TICK: Final = 0.1
 _ENDING: Final = 8.0  # seconds that a process gets to end by itself
 
 
-class Plan(msgspec.Struct, frozen=True, kw_only=True):
+class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
     """What to serve, and where. The runner listens on the port after the editor's."""
 
     data: Path
@@ -41,10 +41,10 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     share: bool
     tls: bool
     opens: bool
-    reached: Reached = Reached()
+    reached: Reachability = Reachability()
 
 
-class Enough:
+class EndSignal:
     """Whether one of these signals has come.
 
     A handler runs in the main thread wherever that is just then, also while it holds a lock, as it
@@ -137,14 +137,14 @@ class Child:
         self._process = None
 
 
-def serve(plan: Plan) -> int:
+def serve(plan: ServePlan) -> int:
     """Run until told to end; the exit code. Raises CannotStart when a port is taken."""
     for port in (plan.port, plan.port + 1):
         for probe in bound(plan.host, port):
             probe.close()
     keys = Keys.of(plan.data)
     trust = _certified(plan)
-    enough = Enough(signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    enough = EndSignal(signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     # The writing end is never written to: it closes when this process dies, however it dies.
     reading, _writing = os.pipe()
     children = _children(plan)
@@ -167,7 +167,7 @@ def serve(plan: Plan) -> int:
             child.end()
 
 
-def _children(plan: Plan) -> list[Child]:
+def _children(plan: ServePlan) -> list[Child]:
     """The runner last: it is the last to end."""
     address = ["--data", str(plan.data), "--host", plan.host]
     address += [flag for flag, on in (("--share", plan.share), ("--tls", plan.tls)) if on]
@@ -197,7 +197,7 @@ def _children(plan: Plan) -> list[Child]:
     ]
 
 
-def _as_settings(reached: Reached) -> dict[str, str]:
+def _as_settings(reached: Reachability) -> dict[str, str]:
     """For the environment of both: an argument might contain a word by which people find processes."""
     return {
         "ACTION_ASSISTANT_PUBLIC_URL": f"{reached.public.page}/" if reached.public else "",
@@ -205,7 +205,7 @@ def _as_settings(reached: Reached) -> dict[str, str]:
     }
 
 
-def _certified(plan: Plan) -> ssl.SSLContext | None:
+def _certified(plan: ServePlan) -> ssl.SSLContext | None:
     """With --tls, how to trust ourselves; the certificate is there before the processes are."""
     if not plan.tls:
         return None
@@ -222,11 +222,11 @@ def _certified(plan: Plan) -> ssl.SSLContext | None:
 
 
 def _greet(
-    plan: Plan,
+    plan: ServePlan,
     keys: Keys,
     trust: ssl.SSLContext | None,
     children: list[Child],
-    enough: Enough,
+    enough: EndSignal,
 ) -> None:
     """Say where the page is once both processes answer, and open it."""
     here = plan.host if plan.host not in {"0.0.0.0", "::", "localhost", EVERYWHERE} else "127.0.0.1"

@@ -21,7 +21,7 @@ from action_assistant.web.network.connection_limits import (
     OF_A_PERSON,
     OF_AN_ADDRESS,
     PER_MINUTE,
-    Crowd,
+    ConnectionLimits,
 )
 from editor import forge
 from editor.client import Client, settle
@@ -257,65 +257,67 @@ def test_numbers_that_a_page_cannot_read_are_refused(update: bytes) -> None:
 
 def test_sockets_are_counted_per_person_and_address() -> None:
     now = 0.0
-    crowd = Crowd(limits=True, clock=lambda: now)
+    connection_limits = ConnectionLimits(limits=True, clock=lambda: now)
     held = []
     for n in range(OF_A_PERSON):
-        held.append(crowd.admitted("ada", "a"))
+        held.append(connection_limits.admitted("ada", "a"))
         held[n].__enter__()
-    with pytest.raises(TooMany, match="open already"), crowd.admitted("ada", "a"):
+    with pytest.raises(TooMany, match="open already"), connection_limits.admitted("ada", "a"):
         pass
-    with crowd.admitted("bob", "a"):
+    with connection_limits.admitted("bob", "a"):
         pass
     for n in range(OF_AN_ADDRESS - OF_A_PERSON):
-        held.append(crowd.admitted(f"p{n}", "a"))
+        held.append(connection_limits.admitted(f"p{n}", "a"))
         held[-1].__enter__()
         now += 60 / PER_MINUTE
-    with pytest.raises(TooMany, match="address"), crowd.admitted("cy", "a"):
+    with pytest.raises(TooMany, match="address"), connection_limits.admitted("cy", "a"):
         pass
-    with crowd.admitted("cy", "b"):
+    with connection_limits.admitted("cy", "b"):
         pass
     held.pop().__exit__(None, None, None)
-    with crowd.admitted("cy", "a"):
+    with connection_limits.admitted("cy", "a"):
         pass
 
 
 def test_upgrades_come_in_bursts_and_then_at_a_rate() -> None:
     now = 0.0
-    crowd = Crowd(limits=True, clock=lambda: now)
+    connection_limits = ConnectionLimits(limits=True, clock=lambda: now)
     for _ in range(AT_ONCE):
-        with crowd.admitted("ada", "a"):
+        with connection_limits.admitted("ada", "a"):
             pass
-    with pytest.raises(TooMany, match="short time"), crowd.admitted("ada", "a"):
+    with pytest.raises(TooMany, match="short time"), connection_limits.admitted("ada", "a"):
         pass
     now += 60
     for _ in range(PER_MINUTE):
-        with crowd.admitted("ada", "a"):
+        with connection_limits.admitted("ada", "a"):
             pass
-    with pytest.raises(TooMany), crowd.admitted("ada", "a"):
+    with pytest.raises(TooMany), connection_limits.admitted("ada", "a"):
         pass
-    free = Crowd(limits=False, clock=lambda: now)
+    free = ConnectionLimits(limits=False, clock=lambda: now)
     for _ in range(AT_ONCE * 3):
         with free.admitted("ada", "a"):
             pass
 
 
 def test_where_stop_is_sent_the_first_socket_of_a_person_is_always_admitted() -> None:
-    crowd = Crowd(limits=True, keeps_one=True, clock=lambda: 0.0)
-    held = [crowd.admitted("eve", "a") for _ in range(OF_A_PERSON)]
+    connection_limits = ConnectionLimits(limits=True, keeps_one=True, clock=lambda: 0.0)
+    held = [connection_limits.admitted("eve", "a") for _ in range(OF_A_PERSON)]
     for each in held:
         each.__enter__()
-    with pytest.raises(TooMany, match="open already"), crowd.admitted("eve", "a"):
+    with pytest.raises(TooMany, match="open already"), connection_limits.admitted("eve", "a"):
         pass
     for _ in range(AT_ONCE):  # whoever sits at the same address comes too fast, and is too many
-        with contextlib.suppress(TooMany), crowd.admitted("eve", "a"):
+        with contextlib.suppress(TooMany), connection_limits.admitted("eve", "a"):
             pass
     with (
-        crowd.admitted("ada", "a"),
+        connection_limits.admitted("ada", "a"),
         pytest.raises(TooMany, match="short time"),
-        crowd.admitted("ada", "a"),
+        connection_limits.admitted("ada", "a"),
     ):
         pass
-    with crowd.admitted("ada", "a"):  # once it is closed, the next one is the first again
+    with connection_limits.admitted(
+        "ada", "a"
+    ):  # once it is closed, the next one is the first again
         pass
     for each in held:
         each.__exit__(None, None, None)

@@ -9,7 +9,7 @@ from pycrdt import Doc, Map
 
 from action_assistant.editor.crdt import document_quota, messages
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.rate_limits import AT_ONCE, PER_MINUTE, Budget
+from action_assistant.editor.rooms.rate_limits import AT_ONCE, PER_MINUTE, ByteRateLimits
 from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import TooLarge
 from action_assistant.journal.journal import Journal
@@ -182,32 +182,32 @@ async def test_the_limit_is_5000_actions_on_every_way_in(
 
 def test_a_person_brings_so_many_bytes_a_minute_and_nobody_else_waits_for_that() -> None:
     now = 0.0
-    budget = Budget(limits=True, clock=lambda: now)
-    assert budget.spend("ada", AT_ONCE) == 0
-    assert budget.spend("ada", PER_MINUTE) == 60
-    assert budget.spend("mari", 1000) == 0
+    rate_limits = ByteRateLimits(limits=True, clock=lambda: now)
+    assert rate_limits.spend("ada", AT_ONCE) == 0
+    assert rate_limits.spend("ada", PER_MINUTE) == 60
+    assert rate_limits.spend("mari", 1000) == 0
     now = 60.0
-    assert budget.spend("ada", PER_MINUTE // 60) == pytest.approx(1)
+    assert rate_limits.spend("ada", PER_MINUTE // 60) == pytest.approx(1)
     now = 600.0
-    assert budget.spend("ada", AT_ONCE) == 0
-    assert Budget(limits=False).spend("ada", 10 * AT_ONCE) == 0
+    assert rate_limits.spend("ada", AT_ONCE) == 0
+    assert ByteRateLimits(limits=False).spend("ada", 10 * AT_ONCE) == 0
 
 
 def test_a_cursor_may_move_two_hundred_times_a_second_for_ever_and_not_faster() -> None:
     now = 0.0
-    budget = Budget(limits=True, clock=lambda: now)
+    rate_limits = ByteRateLimits(limits=True, clock=lambda: now)
     for n in range(200 * 60 * 10):
         now = n / 200
-        assert budget.speak("ada", 100) == 0
-    waits = [budget.speak("eve", 100) for _ in range(60_000)]
+        assert rate_limits.speak("ada", 100) == 0
+    waits = [rate_limits.speak("eve", 100) for _ in range(60_000)]
     assert waits[0] == 0
     assert waits[-1] > 100
 
 
 def test_a_crowd_of_people_is_not_remembered_for_ever() -> None:
     now = 0.0
-    budget = Budget(limits=True, clock=lambda: now)
+    rate_limits = ByteRateLimits(limits=True, clock=lambda: now)
     for n in range(5_000):
         now += 1.0
-        budget.spend(f"person {n}", 1)
-    assert len(budget._left) <= 1_001
+        rate_limits.spend(f"person {n}", 1)
+    assert len(rate_limits._left) <= 1_001

@@ -18,7 +18,7 @@ from sqlalchemy import Row, Select, StaticPool, create_engine
 
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.events import Draft, Event
-from action_assistant.journal.events import Snapshot as Kept
+from action_assistant.journal.events import StreamSnapshot as Kept
 from action_assistant.runner import projection
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService

@@ -19,10 +19,10 @@ from websockets.sync.client import connect
 
 from action_assistant.errors import Unauthenticated
 from action_assistant.web.auth.access import Needs, person_of
-from action_assistant.web.auth.keys import Author, Keys, Person, Session
-from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.keys import Keys, Person, PersonRef, Session
+from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Role
-from action_assistant.web.auth.session_files import SignedInBrowsers
+from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.sessions import Invited, session_routes
 from action_assistant.web.network.addresses import Addresses
 from action_assistant.web.server.application import application
@@ -76,7 +76,7 @@ class Nobody:
     def look(self, proof: str) -> Invited:
         raise Unauthenticated(f"{proof} is not known.")
 
-    async def welcome(self, invitation: str, person: Author) -> None:
+    async def welcome(self, invitation: str, person: PersonRef) -> None:
         raise AssertionError(f"{person} came by {invitation}")
 
 
@@ -87,8 +87,8 @@ def served(folder: Path) -> Iterator[int]:
     for other in others:  # on another free port of the other family
         other.close()
     port: int = listener.getsockname()[1]
-    revoked = Revoked(folder)
-    browsers = SignedInBrowsers(folder, revoked)
+    revoked = Revocations(folder)
+    browsers = SessionFiles(folder, revoked)
     sessions = session_routes(KEYS, port, reception=Nobody, revoked=revoked, browsers=browsers)
     app = application(
         [me, stop, start, novelty, broken, live, *sessions],

@@ -25,7 +25,7 @@ _EVENTS: Final = 100_000
 _COMMANDS: Final = frozenset({"stop", "pause", "resume"})
 
 
-class Verdict(msgspec.Struct, frozen=True):
+class CheckVerdict(msgspec.Struct, frozen=True):
     """What `check` found in one file, with places there. `notes`: what reading it translated or left
     out."""
 
@@ -140,23 +140,23 @@ def _verdict(
     actions: Mapping[str, Signature] | None,
     graphs: Mapping[str, Graph] | None,
     used: Collection[str],
-) -> Verdict:
+) -> CheckVerdict:
     text = _text(path)
     try:
         reading = codec.read(text)
         if reading.dialect in ACTION_DIALECTS:
             action = codec.read_action(text)
             found = checks.check_action(action)
-            return Verdict(str(path), action.dialect, tuple(found), action.remarks)
+            return CheckVerdict(str(path), action.dialect, tuple(found), action.remarks)
     except codec.Unreadable as error:
         where = Where(path=error.path, line=error.line, column=error.column)
         problem = Problem(code=error.code, severity="error", where=where, message=error.message)
-        return Verdict(str(path), None, (problem,))
+        return CheckVerdict(str(path), None, (problem,))
     inside = reading.graph.name in used
     found = checks.check_reading(reading, actions, facts, graphs)
     found = [_as_sub_graph(problem) for problem in found if not (inside and problem.code == "H7")]
     found.sort(key=rank)
-    return Verdict(str(path), reading.dialect, tuple(dict.fromkeys(found)), reading.remarks)
+    return CheckVerdict(str(path), reading.dialect, tuple(dict.fromkeys(found)), reading.remarks)
 
 
 def _as_sub_graph(problem: Problem) -> Problem:
@@ -182,7 +182,7 @@ def _given(paths: Sequence[Path]) -> dict[str, Graph]:
     return found
 
 
-def _print(verdict: Verdict) -> None:
+def _print(verdict: CheckVerdict) -> None:
     errors = sum(problem.severity == "error" for problem in verdict.problems)
     warnings = len(verdict.problems) - errors
     print(

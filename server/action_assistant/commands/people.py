@@ -7,7 +7,7 @@ from action_assistant.commands.client import No, Server, command, print_json, re
 from action_assistant.errors import CannotStart, Refused
 from action_assistant.private_files import own_folder
 from action_assistant.safe_text import one_line
-from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.revocations import Revocations
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -87,7 +87,7 @@ def _revoke(options: argparse.Namespace) -> int:
         if options.url or not data.is_dir():
             raise
         try:
-            Revoked(own_folder(data)).add(options.id)
+            Revocations(own_folder(data)).add(options.id)
         except (ValueError, Refused) as error:
             raise CannotStart(f"{silent} {error}") from error
         print("No server answers; the link is marked as revoked in the data folder.")

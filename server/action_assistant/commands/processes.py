@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from action_assistant import paths, settings
 from action_assistant.errors import CannotStart
-from action_assistant.safe_text import PlainLog
+from action_assistant.safe_text import PrintableLog
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
-    from action_assistant.web.server.listen import Identity
+    from action_assistant.web.server.listen import TlsIdentity
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -119,7 +119,7 @@ def _sharing(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _reached(options: argparse.Namespace) -> settings.Reached:
+def _reached(options: argparse.Namespace) -> settings.Reachability:
     return settings.reached(options.public_url, options.trusted_proxies)
 
 
@@ -135,25 +135,25 @@ def _host(options: argparse.Namespace) -> str:
 
 def _identity(
     chosen: settings.EditorSettings | settings.RunnerSettings, page_port: int
-) -> "Identity | None":
+) -> "TlsIdentity | None":
     """The certificate of a process, with --tls."""
     from action_assistant.web.network.addresses import addresses_of
     from action_assistant.web.network.certificate import Certificate
-    from action_assistant.web.server.listen import Identity
+    from action_assistant.web.server.listen import TlsIdentity
 
     if not chosen.tls:
         return None
     addresses = addresses_of(
         host=chosen.host, page_port=page_port, hosts=chosen.hosts, share=chosen.share, secure=True
     )
-    return Identity(Certificate(chosen.data), addresses.certified)
+    return TlsIdentity(Certificate(chosen.data), addresses.certified)
 
 
 def _log(data: Path) -> None:
     from action_assistant.web.auth.keys import Keys
 
     handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(PlainLog(Keys.of(data).token))
+    handler.setFormatter(PrintableLog(Keys.of(data).token))
     logging.basicConfig(level=logging.INFO, handlers=[handler])
     logging.getLogger("uvicorn.error").setLevel(logging.WARNING)
     logging.getLogger("httpx").setLevel(logging.WARNING)
@@ -176,14 +176,14 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
 
 
 def _serve(options: argparse.Namespace) -> int:
-    from action_assistant.supervisor import Plan, serve
+    from action_assistant.supervisor import ServePlan, serve
 
     if options.port == 65535:
         raise CannotStart("The runner needs the port after --port; 65535 has none.")
     host = _host(options)
     data = settings.data_folder(options.data.resolve())
     return serve(
-        Plan(
+        ServePlan(
             data=data,
             database=options.database,
             switch_database=options.switch_database,

@@ -8,7 +8,7 @@ import httpx
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.web.auth.keys import Keys, Proof
+from action_assistant.web.auth.keys import Keys, ServerProof
 
 _API: Final = "/api/"
 
@@ -42,7 +42,7 @@ class AfterProof(httpx.Auth):
 
     def _holds(self, challenge: str, answer: httpx.Response) -> bool:
         try:
-            proof = msgspec.json.decode(answer.content, type=Proof)
+            proof = msgspec.json.decode(answer.content, type=ServerProof)
         except msgspec.DecodeError:
             return False
         at = _peer(answer) if self._supposed else None

@@ -20,7 +20,7 @@ from action_assistant.umrf.semantics import script_from
 _WORDS: Final = {"result": "ends", "runs": "is told to", "state": "is", "hazard": "does"}
 
 
-class Verdict(msgspec.Struct, frozen=True, kw_only=True):
+class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
     """What became of one expectation. `against`: the graph as it was sent then, or as it is now."""
 
     name: str
@@ -49,7 +49,7 @@ def verify(options: argparse.Namespace) -> int:
     return 0 if all(each.same for each in verdicts) else 1
 
 
-def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[Verdict]:
+def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[VerifyVerdict]:
     wanted = server.graph_id(options.graph) if options.graph else None
     answer = server.runner("GET", "/api/expectations").content
     for each in msgspec.json.decode(answer, type=list[Expectation]):
@@ -60,24 +60,28 @@ def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[Verdict]:
             yield _now(server, each, each.graph)
 
 
-def _now(server: Server, each: Expectation, graph: str) -> Verdict:
+def _now(server: Server, each: Expectation, graph: str) -> VerifyVerdict:
     """Against the graph as it is now. One that is gone cannot be asked any more."""
     try:
         umrf = server.editor("GET", f"/api/graphs/{graph}/umrf").content
     except No as error:
-        return Verdict(name=each.name, run=each.run, against="now", same=False, why=str(error))
+        return VerifyVerdict(
+            name=each.name, run=each.run, against="now", same=False, why=str(error)
+        )
     return _verdict(each, umrf, "now")
 
 
-def _verdict(each: Expectation, umrf: bytes, against: Literal["then", "now"]) -> Verdict:
+def _verdict(each: Expectation, umrf: bytes, against: Literal["then", "now"]) -> VerifyVerdict:
     script = script_from(msgspec.json.decode(each.script))
     try:
         found = course(codec.read(umrf).graph, script)
     except codec.Unreadable as wrong:
-        return Verdict(name=each.name, run=each.run, against=against, same=False, why=wrong.message)
+        return VerifyVerdict(
+            name=each.name, run=each.run, against=against, same=False, why=wrong.message
+        )
     apart = departure(_unnamed(each.course), _unnamed(found))
     why = _sentence(apart) if apart is not None else ""
-    return Verdict(name=each.name, run=each.run, against=against, same=apart is None, why=why)
+    return VerifyVerdict(name=each.name, run=each.run, against=against, same=apart is None, why=why)
 
 
 def _unnamed(steps: "list[ExpectedStep] | tuple[ExpectedStep, ...]") -> list[ExpectedStep]:

@@ -21,8 +21,8 @@ from action_assistant.errors import BadInput
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
 from action_assistant.web.auth.keys import Keys
-from action_assistant.web.auth.revocations import Revoked
-from action_assistant.web.auth.session_files import SignedInBrowsers
+from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.sessions import session_routes
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.server.application import Readiness, application
@@ -36,10 +36,10 @@ SMALL: Final = 100_000
 
 @asynccontextmanager
 async def open_services(
-    settings: EditorSettings, revoked: Revoked | None = None
+    settings: EditorSettings, revoked: Revocations | None = None
 ) -> AsyncIterator[EditorServices]:
     """The editor without its HTTP side. Raises CannotStart."""
-    revoked = revoked or Revoked(settings.data)
+    revoked = revoked or Revocations(settings.data)
     journal = await Journal.open(settings.database, branch="editor", fold=h.fold)
     try:
         new = await journal.position() == 0
@@ -67,8 +67,8 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     database_location.remember(settings.data, settings.database)
     keys = Keys.of(settings.data)
     app_state = EditorState()
-    revoked = Revoked(settings.data)
-    browsers = SignedInBrowsers(settings.data, revoked)
+    revoked = Revocations(settings.data)
+    browsers = SessionFiles(settings.data, revoked)
     browsers.every()  # forgets those that are over
     addresses = addresses_of(
         host=settings.host,

@@ -8,13 +8,13 @@ from action_assistant.editor.catalogue.library import Library
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.catalogue.versions import Versions
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.rate_limits import Budget
+from action_assistant.editor.rooms.rate_limits import ByteRateLimits
 from action_assistant.editor.workers import EditorWorkers
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
 from action_assistant.web.auth.keys import Keys
-from action_assistant.web.auth.revocations import Revoked
-from action_assistant.web.network.connection_limits import Crowd
+from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.network.connection_limits import ConnectionLimits
 
 
 class EditorServices:
@@ -26,7 +26,7 @@ class EditorServices:
         journal: Journal,
         people: People,
         epoch: str,
-        revoked: Revoked,
+        revoked: Revocations,
         workers: EditorWorkers,
     ) -> None:
         self.settings = settings
@@ -35,8 +35,8 @@ class EditorServices:
         self.people = people
         self.workers = workers
         self.rooms = Rooms(journal, run_in_worker=workers.graphs, tried=workers.edits)
-        self.crowd = Crowd(limits=settings.limits)
-        self.budget = Budget(limits=settings.limits)
+        self.connection_limits = ConnectionLimits(limits=settings.limits)
+        self.rate_limits = ByteRateLimits(limits=settings.limits)
         self.sights = Sights(journal, self.rooms, workers.graphs)
         self.catalogue = Catalogue(journal, self.rooms, self.sights, workers.files)
         self.versions = Versions(journal, self.sights)

@@ -15,7 +15,7 @@ T = TypeVar("T")
 Branch: TypeAlias = Literal["editor", "runner"]
 
 
-class Session(Protocol):
+class WriterSession(Protocol):
     """The connection that writes. Used by one thread at a time; everything only inside `run`."""
 
     connection: Connection
@@ -54,7 +54,7 @@ class Database(Protocol):
     def faults(self) -> tuple[type[Exception], ...]:
         """Everything that its driver raises."""
 
-    def open(self, branch: Branch) -> Session:
+    def open(self, branch: Branch) -> WriterSession:
         """Become the only writer, migrate, connect. Raises CannotStart."""
 
     def look(self, question: Callable[[Connection], object]) -> None:
@@ -63,7 +63,7 @@ class Database(Protocol):
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
         """Run a change of the schema in one transaction. Raises CannotStart."""
 
-    def connect(self) -> Session:
+    def connect(self) -> WriterSession:
         """Connect again after a failure; whatever the last session left unfinished is over then."""
 
     def lost(self, error: Exception) -> bool:

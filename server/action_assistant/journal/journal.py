@@ -12,13 +12,13 @@ from sqlalchemy import Connection, delete, insert, select
 
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.chain import Damage, Head, Inspector
-from action_assistant.journal.database import Branch, Database, Session, cause_of
+from action_assistant.journal.database import Branch, Database, WriterSession, cause_of
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.follower import Follower
 from action_assistant.journal.migrate import BRANCHES
-from action_assistant.journal.reader import Reader, body_of, following, seal_of
-from action_assistant.journal.removal import STREAM, Removed, delete_some, taken_out
+from action_assistant.journal.reader import JournalReader, body_of, following, seal_of
+from action_assistant.journal.removal import STREAM, StreamRemoved, delete_some, taken_out
 from action_assistant.journal.writer import Job, Outcome, Transaction, Writer
 from action_assistant.schema.editor_tables import editor_head, editor_snapshot
 from action_assistant.schema.log_tables import LOG
@@ -31,10 +31,12 @@ _PAGE: Final = 500  # events that a follower reads at once
 _head, _snapshot = editor_head.c, editor_snapshot.c
 
 
-class Journal(Reader):
+class Journal(JournalReader):
     """The log of one process. The only writer of its database; readers never wait for it."""
 
-    def __init__(self, database: Database, session: Session, branch: Branch, fold: Fold) -> None:
+    def __init__(
+        self, database: Database, session: WriterSession, branch: Branch, fold: Fold
+    ) -> None:
         self._branch: Final = branch
         self._loop = asyncio.get_running_loop()
         self._database = database
@@ -102,7 +104,7 @@ class Journal(Reader):
 
         await self._write(keep)
 
-    async def take_out(self, removed: Removed, also: Callable[[int], Addition]) -> int:
+    async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
         """Say in the log that a stream is kept elsewhere from now on; the number of that, by which
         its events may be deleted. `also` tells more of it, in the same transaction. Raises Conflict
         when the stream does not end there, Unavailable."""

@@ -14,7 +14,7 @@ from sqlalchemy.exc import DBAPIError, IntegrityError
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
 from action_assistant.journal.chain import NOTHING, Head, link
-from action_assistant.journal.database import Database, Session, cause_of
+from action_assistant.journal.database import Database, WriterSession, cause_of
 from action_assistant.journal.events import Addition, Event, Fold
 from action_assistant.schema import editor_tables
 
@@ -52,7 +52,7 @@ class Transaction:
     inside a savepoint, so that what a job did wrong touches nobody else's work.
     """
 
-    def __init__(self, session: Session, fold: Fold, clock: Clock) -> None:
+    def __init__(self, session: WriterSession, fold: Fold, clock: Clock) -> None:
         self.fold: Final = fold
         self._session = session
         self._clock = clock
@@ -184,7 +184,7 @@ class Writer:
     def __init__(
         self,
         database: Database,
-        session: Session | None,
+        session: WriterSession | None,
         fold: Fold,
         tell: Callable[[Sequence[tuple[Job[Any], Outcome]]], None],
         clock: Clock = now,
@@ -281,7 +281,7 @@ class Writer:
                 return None
             time.sleep(_AGAIN)
 
-    def _connected(self) -> tuple[Session, Transaction]:
+    def _connected(self) -> tuple[WriterSession, Transaction]:
         session = self._session
         if session is None or not session.alive():
             self._disconnect()
@@ -296,7 +296,7 @@ class Writer:
             session.close()
 
 
-def _scalar(session: Session, chosen: Select[Any]) -> object:
+def _scalar(session: WriterSession, chosen: Select[Any]) -> object:
     return session.connection.execute(chosen).scalar()
 
 

@@ -32,10 +32,10 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.auth.keys import Keys
-from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.sessions import revocation
 from action_assistant.web.network.addresses import addresses_of
-from action_assistant.web.network.connection_limits import Crowd
+from action_assistant.web.network.connection_limits import ConnectionLimits
 from action_assistant.web.server.application import Readiness, application
 
 #: For so long (seconds) a thread may keep the interpreter to itself while the loop waits for it.
@@ -78,7 +78,9 @@ async def open_services(
             ):
                 services.asked.opened = ours.opened = control.open
                 services.control, services.hub = control, Hub(control, utc_us)
-                services.crowd = Crowd(limits=settings.limits, keeps_one=True)
+                services.connection_limits = ConnectionLimits(
+                    limits=settings.limits, keeps_one=True
+                )
                 services.journal = journal
                 services.review_service = ReviewService(
                     control, archive_store, on_disk, utc_us, services.asked
@@ -121,7 +123,7 @@ def _database(settings: RunnerSettings) -> str:
 def create_app(settings: RunnerSettings) -> ASGIApp:
     """The runner as an ASGI application. Raises CannotStart."""
     Journal.prepare(_database(settings), "runner")
-    revoked = Revoked(settings.data)
+    revoked = Revocations(settings.data)
     services = RunnerServices()
     public = settings.reached.public
 

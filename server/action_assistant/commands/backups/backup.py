@@ -12,7 +12,13 @@ from sqlalchemy import make_url, select
 
 from action_assistant import paths, settings
 from action_assistant.commands.backups import restore
-from action_assistant.commands.backups.backup_file import ARCHIVE, FILES, Copied, Packer, about_now
+from action_assistant.commands.backups.backup_file import (
+    ARCHIVE,
+    FILES,
+    JournalCopy,
+    Packer,
+    about_now,
+)
 from action_assistant.commands.backups.data_folder import (
     archived,
     belongings,
@@ -192,7 +198,7 @@ def _settings() -> dict[str, str]:
     }
 
 
-def _tell(journals: Mapping[Branch, Copied], packer: Packer, target: Path, data: Path) -> None:
+def _tell(journals: Mapping[Branch, JournalCopy], packer: Packer, target: Path, data: Path) -> None:
     for branch, copied in journals.items():
         print(f"{branch}: {copied.events} events, all of them sound")
     if "editor" not in journals:

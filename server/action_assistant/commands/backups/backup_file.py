@@ -34,7 +34,7 @@ _ROOM: Final = 64 << 20  # bytes that have to be left on the disk
 _MODE: Final = 0o600
 
 
-class Copied(msgspec.Struct, frozen=True):
+class JournalCopy(msgspec.Struct, frozen=True):
     """One journal in a backup: its last position, SHA-256 of the file, and its size."""
 
     events: int
@@ -42,22 +42,22 @@ class Copied(msgspec.Struct, frozen=True):
     bytes: int | None = None
 
 
-class Held(msgspec.Struct, frozen=True):
+class BackupPart(msgspec.Struct, frozen=True):
     """A file in a backup."""
 
     bytes: int
     sha256: str
 
 
-class About(msgspec.Struct, frozen=True, kw_only=True):
+class BackupManifest(msgspec.Struct, frozen=True, kw_only=True):
     """What a backup says of itself. `database`: where the graphs were, without a password; None in
     the data folder. `settings`: of the environment, without the token. `missing`: sentences."""
 
     format: int
     version: str
     made_at: float
-    journals: dict[Branch, Copied]
-    files: dict[str, Held] = {}
+    journals: dict[Branch, JournalCopy]
+    files: dict[str, BackupPart] = {}
     database: str | None = None
     settings: dict[str, str] = {}
     missing: tuple[str, ...] = ()
@@ -67,19 +67,19 @@ class Packer:
     """Writes a backup, which is there under its name once `close` returns, or not at all."""
 
     def __init__(self, folder: Path, progress: Progress) -> None:
-        self.files: dict[str, Held] = {}
+        self.files: dict[str, BackupPart] = {}
         self._part = folder / "backup.zip"
         descriptor = os.open(self._part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _MODE)
         self._raw = os.fdopen(descriptor, "wb")
         self._zip = zipfile.ZipFile(self._raw, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL)
         self._progress = progress
 
-    def journal(self, branch: Branch, path: Path, events: int) -> Copied:
+    def journal(self, branch: Branch, path: Path, events: int) -> JournalCopy:
         """Take in the copy of a journal."""
         held = self._take(f"{branch}.db", path)
-        return Copied(events, held.sha256, held.bytes)
+        return JournalCopy(events, held.sha256, held.bytes)
 
-    def file(self, name: str, path: Path) -> Held:
+    def file(self, name: str, path: Path) -> BackupPart:
         """Take in a file. Raises OSError."""
         self.files[name] = self._take(name, path)
         return self.files[name]
@@ -87,9 +87,9 @@ class Packer:
     def text(self, name: str, content: bytes) -> None:
         """Take in a file that is nowhere."""
         self._zip.writestr(name, content)
-        self.files[name] = Held(len(content), hashlib.sha256(content).hexdigest())
+        self.files[name] = BackupPart(len(content), hashlib.sha256(content).hexdigest())
 
-    def close(self, about: About, target: Path) -> None:
+    def close(self, about: BackupManifest, target: Path) -> None:
         """Say what it is, and put it into its place."""
         self._zip.writestr(_ABOUT, msgspec.json.format(msgspec.json.encode(about)))
         self._zip.close()
@@ -103,11 +103,11 @@ class Packer:
         """Let go of the file."""
         self._raw.close()
 
-    def _take(self, name: str, path: Path) -> Held:
+    def _take(self, name: str, path: Path) -> BackupPart:
         entry = zipfile.ZipInfo(name) if path.suffix == ".gz" else name  # the former: as it is
         with path.open("rb") as there, self._zip.open(entry, "w", force_zip64=True) as here:
             size, digest = _poured(there, here, f"packing {name}", self._progress)
-        return Held(size, digest)
+        return BackupPart(size, digest)
 
 
 class Package:
@@ -154,12 +154,12 @@ class Package:
         """Let go of the file."""
         self._zip.close()
 
-    def _read_about(self) -> About:
+    def _read_about(self) -> BackupManifest:
         try:
             entry = self._entry(_ABOUT)
             if entry.file_size > _LONGEST:
                 raise self._damaged(f"{_ABOUT} is too long")
-            about = msgspec.json.decode(self._zip.read(entry), type=About)
+            about = msgspec.json.decode(self._zip.read(entry), type=BackupManifest)
         except (zipfile.BadZipFile, msgspec.DecodeError, zlib.error, EOFError) as error:
             raise self._no_backup(error) from error
         if about.format > FORMAT:
@@ -205,9 +205,9 @@ class Package:
         return CannotStart(f"{self._source} is no backup of ours, or is damaged: {why}.")
 
 
-def about_now(**fields: object) -> About:
+def about_now(**fields: object) -> BackupManifest:
     """What this version says."""
-    return msgspec.convert({"format": FORMAT, "version": VERSION, **fields}, type=About)
+    return msgspec.convert({"format": FORMAT, "version": VERSION, **fields}, type=BackupManifest)
 
 
 def sync(path: Path) -> None:

@@ -18,7 +18,7 @@ from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Fold
 from action_assistant.journal.journal import Journal
-from action_assistant.journal.removal import Removed
+from action_assistant.journal.removal import StreamRemoved
 from action_assistant.runner.archives.raw_messages import RawPut
 from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
@@ -141,13 +141,13 @@ def archived(runner: Path) -> dict[str, str]:
     if not runner.exists():
         return {}
     event = runner_event.c
-    kinds = event.kind.in_([Removed.kind, RawPut.kind])
+    kinds = event.kind.in_([StreamRemoved.kind, RawPut.kind])
     places = {}
     for row in rows_of(
         runner, select(event.kind, event.body).where(kinds).order_by(event.position)
     ):
-        if row.kind == Removed.kind:
-            removed = msgspec.json.decode(row.body, type=Removed)
+        if row.kind == StreamRemoved.kind:
+            removed = msgspec.json.decode(row.body, type=StreamRemoved)
             places[removed.kept] = removed.sha256
         else:
             put = msgspec.json.decode(row.body, type=RawPut)

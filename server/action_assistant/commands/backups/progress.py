@@ -4,7 +4,7 @@ import sys
 import time
 from typing import Final
 
-from action_assistant.safe_text import plain
+from action_assistant.safe_text import printable
 
 _EVERY: Final = 1.0  # seconds
 
@@ -24,7 +24,7 @@ class Progress:
         self._next = time.monotonic() + _EVERY
         self._shown = sys.stderr.isatty()
         if self._shown:
-            _steer(f"\r\x1b[K{plain(text)} …")
+            _steer(f"\r\x1b[K{printable(text)} …")
         else:
             sys.stderr.write(f"{text} …\n")
             sys.stderr.flush()

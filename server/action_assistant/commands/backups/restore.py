@@ -19,7 +19,13 @@ import msgspec
 from sqlalchemy import Connection, inspect, select
 
 from action_assistant import settings
-from action_assistant.commands.backups.backup_file import FILES, About, Package, sha256_of, sync
+from action_assistant.commands.backups.backup_file import (
+    FILES,
+    BackupManifest,
+    Package,
+    sha256_of,
+    sync,
+)
 from action_assistant.commands.backups.data_folder import (
     ASIDE,
     BRANCHES,
@@ -93,7 +99,7 @@ def _make(data: Path) -> None:
         raise CannotStart(f"Cannot make {data}: {error.strerror}.") from error
 
 
-def _check_names(about: About, source: Path) -> None:
+def _check_names(about: BackupManifest, source: Path) -> None:
     """A backup may write what belongs to a data folder, and nothing else there."""
     for name in about.files:
         top, inner = name.split("/")[:2]
@@ -119,7 +125,7 @@ def _sweep(data: Path, folder: Path) -> None:
 
 
 def _put(
-    folder: Path, data: Path, url: str, about: About, progress: Progress
+    folder: Path, data: Path, url: str, about: BackupManifest, progress: Progress
 ) -> tuple[Path | None, list[str]]:
     """Everything into its place; where what was there has gone, and what stayed as it was."""
     from action_assistant.editor.log import database_location, epochs
@@ -143,7 +149,13 @@ def _put(
 
 
 def _begin(
-    mark: Path, folder: Path, url: str, about: About, progress: Progress, *, elsewhere: bool
+    mark: Path,
+    folder: Path,
+    url: str,
+    about: BackupManifest,
+    progress: Progress,
+    *,
+    elsewhere: bool,
 ) -> None:
     """Mark the folder; and bring the graphs into a database `elsewhere`, where one transaction does
     it. Raises CannotStart, and then the folder is as before."""
@@ -189,14 +201,14 @@ def _under(mark: Path) -> Under | None:
         return Under("", 0, "")  # cut short by what interrupted it
 
 
-def _end_of(folder: Path, about: About) -> Under:
+def _end_of(folder: Path, about: BackupManifest) -> Under:
     if "editor" not in about.journals:
         return Under("", 0, "")
     row = rows_of(folder / "editor.db", _LAST)[0]
     return Under(about.journals["editor"].sha256, row.position, bytes(row.chain).hex())
 
 
-def _is_there(url: str, under: Under, about: About) -> bool:
+def _is_there(url: str, under: Under, about: BackupManifest) -> bool:
     """Whether a database holds the same backup already. Raises CannotStart."""
     if "editor" not in about.journals or under.sha256 != about.journals["editor"].sha256:
         return False
@@ -287,7 +299,7 @@ def _write(path: Path, content: msgspec.Struct) -> None:
     sync(path.parent)
 
 
-def _tell(about: About, url: str, data: Path, aside: Path | None, kept: list[str]) -> None:
+def _tell(about: BackupManifest, url: str, data: Path, aside: Path | None, kept: list[str]) -> None:
     from action_assistant.editor.log import database_location
 
     for branch, copied in about.journals.items():

@@ -20,7 +20,7 @@ from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.version import VERSION
-from action_assistant.web.auth.keys import Author
+from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.network.addresses import Addresses
 
 _SILENCE: Final = 10.0  # seconds after which a listener is told that we are still here
@@ -41,7 +41,7 @@ class Happened(msgspec.Struct, frozen=True, omit_defaults=True):
     stream: str
     seq: int
     kind: str
-    author: Author
+    author: PersonRef
     at: datetime
     graph: str | None = None
 

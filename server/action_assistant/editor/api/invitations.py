@@ -13,8 +13,8 @@ from action_assistant.editor.catalogue.invitations import Invitation
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.web.auth.access import Needs, person_of
-from action_assistant.web.auth.keys import Author
-from action_assistant.web.auth.session_files import OpenSession, SignedInBrowsers
+from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.auth.session_files import OpenSession, SessionFiles
 from action_assistant.web.network.addresses import Addresses
 
 
@@ -40,13 +40,13 @@ class Inviting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(
-    app_state: EditorState, addresses: Addresses, browsers: SignedInBrowsers
+    app_state: EditorState, addresses: Addresses, browsers: SessionFiles
 ) -> list[ControllerRouterHandler]:
     """Everything under `/api/invitations` and `/api/sessions`."""
     return [*_links(app_state, addresses), *_one(app_state, addresses), *_sessions(browsers)]
 
 
-def _sessions(browsers: SignedInBrowsers) -> list[ControllerRouterHandler]:
+def _sessions(browsers: SessionFiles) -> list[ControllerRouterHandler]:
     @get(
         "/api/sessions",
         summary="Browsers that are signed in, the newest first",
@@ -109,7 +109,7 @@ def _one(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterH
     async def revoke(invitation: str, request: Request[Any, Any, Any]) -> Invitation:
         person = person_of(request)
         return await app_state.services.invitations.revoke(
-            invitation, Author(person.id, person.name)
+            invitation, PersonRef(person.id, person.name)
         )
 
     @get(

@@ -11,7 +11,7 @@ from litestar.types import ControllerRouterHandler, Receive, Send
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.member import Member
-from action_assistant.editor.rooms.rate_limits import Budget
+from action_assistant.editor.rooms.rate_limits import ByteRateLimits
 from action_assistant.editor.rooms.room import Room
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused
@@ -34,7 +34,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         services, person = app_state.services, person_of(socket)
         address = socket.client.host if socket.client is not None else ""
         try:
-            with services.crowd.admitted(person.id, address):
+            with services.connection_limits.admitted(person.id, address):
                 await services.catalogue.require(graph_id)
                 await services.people.seen(person)
                 async with services.rooms.enter(h.graph_stream(graph_id)) as found:
@@ -45,7 +45,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
                     edits = allowed(person.role, "edit")
                     member = Member(person, edits=edits, acks=_wants_acks(socket))
                     member.post_epoch(services.epoch)
-                    await _converse(socket, found, member, services.budget)
+                    await _converse(socket, found, member, services.rate_limits)
         except Refused as refused:
             await _refuse(socket, refused)
 
@@ -74,13 +74,15 @@ async def _part(socket: Socket, epoch: str) -> None:
         await socket.close(messages.OTHER_EPOCH, messages.REASONS[messages.OTHER_EPOCH])
 
 
-async def _converse(socket: Socket, room: Room, member: Member, budget: Budget) -> None:
+async def _converse(
+    socket: Socket, room: Room, member: Member, rate_limits: ByteRateLimits
+) -> None:
     """Until one side ends it."""
     receive, send = plain(socket)
     room.join(member)
     # Two plain tasks: a thousand idle sockets are a thousand times what stands around each.
     tasks = [
-        asyncio.create_task(_listen(receive, room, member, budget)),
+        asyncio.create_task(_listen(receive, room, member, rate_limits)),
         asyncio.create_task(_speak(send, member)),
     ]
     for task in tasks:
@@ -100,7 +102,9 @@ async def _converse(socket: Socket, room: Room, member: Member, budget: Budget) 
             await socket.close(code, member.said or messages.REASONS.get(code))
 
 
-async def _listen(receive: Receive, room: Room, member: Member, budget: Budget) -> None:
+async def _listen(
+    receive: Receive, room: Room, member: Member, rate_limits: ByteRateLimits
+) -> None:
     """What the client says. Ends the member when the client goes, or says what cannot be read."""
     while True:
         event: Any = await receive()
@@ -121,7 +125,7 @@ async def _listen(receive: Receive, room: Room, member: Member, budget: Budget) 
             room.hear(member, message)
             if member.far_ahead:
                 await member.until_heard()
-            spend = budget.spend if isinstance(message, messages.Edit) else budget.speak
+            spend = rate_limits.spend if isinstance(message, messages.Edit) else rate_limits.speak
             wait = spend(member.person.id, len(data)) + member.toll()
             if wait > 0:
                 await anyio.sleep(wait)

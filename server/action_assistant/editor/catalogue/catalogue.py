@@ -19,7 +19,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.check import check
 from action_assistant.umrf.model import Graph
-from action_assistant.web.auth.keys import Author
+from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 NAME_LIMIT: Final = 200  # characters
@@ -43,7 +43,7 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     problems: Counts | None = None
     robots: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
-    people: tuple[Author, ...] = ()
+    people: tuple[PersonRef, ...] = ()
     deleted_at: datetime | None = None
     damaged: int | None = None
 

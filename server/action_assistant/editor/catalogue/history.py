@@ -13,7 +13,7 @@ from action_assistant.editor.catalogue.versions import Versions, VersionView
 from action_assistant.editor.log import graph_events as h
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
-from action_assistant.web.auth.keys import Author
+from action_assistant.web.auth.keys import PersonRef
 
 _ONE_GO: Final = 5 * 60  # seconds between two edits of one entry
 _CHANGES: Final = 10_000  # changes of the document that one answer looks at
@@ -31,7 +31,7 @@ class Entry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """
 
     kind: Kind
-    author: Author
+    author: PersonRef
     at: datetime
     until: datetime
     seq: int

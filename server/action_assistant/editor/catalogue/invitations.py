@@ -30,8 +30,8 @@ from action_assistant.errors import (
 )
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
-from action_assistant.web.auth.keys import Author, Keys
-from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.keys import Keys, PersonRef
+from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import OWNER, Role
 from action_assistant.web.auth.sessions import Invited
 
@@ -46,7 +46,7 @@ _AGAIN_S: Final = 5.0
 class Guest(msgspec.Struct, frozen=True):
     """Somebody who came in by an invitation, and when that was first."""
 
-    person: Author
+    person: PersonRef
     at: datetime
 
 
@@ -58,11 +58,11 @@ class Invitation(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     role: Role
     label: str
     made_at: datetime
-    made_by: Author
+    made_by: PersonRef
     guests: list[Guest]
     path: str | None = None
     revoked_at: datetime | None = None
-    revoked_by: Author | None = None
+    revoked_by: PersonRef | None = None
     unrecorded: bool = False
 
 
@@ -70,13 +70,13 @@ class Invitations:
     """All that were ever made. Kept in mind, so that what opens and ends them needs no database; this
     process is the only one that adds to them."""
 
-    def __init__(self, journal: Journal, people: People, keys: Keys, revoked: Revoked) -> None:
+    def __init__(self, journal: Journal, people: People, keys: Keys, revoked: Revocations) -> None:
         self._journal = journal
         self._people = people
         self._keys = keys
         self._revoked = revoked
         self._made: dict[str, Invitation] = {}
-        self._unrecorded: list[tuple[str, Author]] = []  # what was revoked, and by whom
+        self._unrecorded: list[tuple[str, PersonRef]] = []  # what was revoked, and by whom
         self._recording: asyncio.Task[None] | None = None
 
     @asynccontextmanager
@@ -88,7 +88,7 @@ class Invitations:
         marked = self._revoked.every()
         for each in tuple(self._made.values()):
             if each.revoked_at is None and each.id in marked:
-                self._end(each, Author(h.SERVER, ""))
+                self._end(each, PersonRef(h.SERVER, ""))
             elif each.revoked_at is not None and each.id not in marked:
                 try:
                     self._revoked.add(each.id)
@@ -125,7 +125,7 @@ class Invitations:
         """One of them. Raises NotFound."""
         return self._view(self._one(invitation))
 
-    async def revoke(self, invitation: str, by: Author) -> Invitation:
+    async def revoke(self, invitation: str, by: PersonRef) -> Invitation:
         """End a link and every session that came in by it, at once and for good, whatever becomes of
         the log. Raises NotFound; Unavailable when neither log nor folder could take it up: then it
         holds here until this process ends."""
@@ -148,7 +148,7 @@ class Invitations:
             raise NotFound(f"There is no invitation {invitation!r}.")
         return self._made[invitation]
 
-    def _end(self, link: Invitation, by: Author) -> None:
+    def _end(self, link: Invitation, by: PersonRef) -> None:
         """From now on it opens nothing, whatever the log says yet."""
         self._made[link.id] = replace(
             link, revoked_at=datetime.now(UTC), revoked_by=by, unrecorded=True
@@ -206,7 +206,7 @@ class Invitations:
             raise Withdrawn("This link was revoked. Ask for another one.")
         return Invited(invitation, link.role, self._people.person(link.made_by.id).name)
 
-    async def welcome(self, invitation: str, person: Author) -> None:
+    async def welcome(self, invitation: str, person: PersonRef) -> None:
         """Somebody comes in: remember who, and by which link. Raises Unavailable."""
         guests = self._one(invitation).guests
         if any(each.person.id == person.id for each in guests):
@@ -216,7 +216,7 @@ class Invitations:
         mine = select(guest.at).where(guest.invitation == invitation, guest.person == person.id)
         (row,) = await self._journal.query(mine)
         if not any(each.person.id == person.id for each in guests):
-            guests.append(Guest(Author(person.id, person.name), h.when(row.at)))
+            guests.append(Guest(PersonRef(person.id, person.name), h.when(row.at)))
 
     async def _append(self, kind: str, author: str, body: msgspec.Struct) -> None:
         await self._journal.append(h.INVITATIONS, [h.draft(kind, author, body)])
@@ -233,10 +233,10 @@ class Invitations:
                 role=row.role,
                 label=row.label,
                 made_at=h.when(row.made_at),
-                made_by=Author(row.made_by, ""),
+                made_by=PersonRef(row.made_by, ""),
                 guests=[],
                 revoked_at=h.when(row.revoked_at) if over else None,
-                revoked_by=Author(row.revoked_by, "") if over else None,
+                revoked_by=PersonRef(row.revoked_by, "") if over else None,
             )
         if new is not None:
             return
@@ -244,7 +244,7 @@ class Invitations:
             select(editor_tables.guest).order_by(editor_tables.guest.c.at)
         ):
             if each.invitation in self._made:
-                guest = Guest(Author(each.person, each.name), h.when(each.at))
+                guest = Guest(PersonRef(each.person, each.name), h.when(each.at))
                 self._made[each.invitation].guests.append(guest)
 
     def _view(self, link: Invitation) -> Invitation:
@@ -258,6 +258,6 @@ class Invitations:
             revoked_by=self._named(link.revoked_by) if link.revoked_by is not None else None,
         )
 
-    def _named(self, person: Author) -> Author:
+    def _named(self, person: PersonRef) -> PersonRef:
         now = self._people.person(person.id)
         return now if now.name else person

@@ -6,7 +6,7 @@ from action_assistant.editor.log.graph_events import EXAMPLES, NAMED, PEOPLE, SE
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
-from action_assistant.web.auth.keys import Author
+from action_assistant.web.auth.keys import PersonRef
 
 _OURS = {SERVER: "Action Assistant", EXAMPLES: "Examples"}
 
@@ -24,7 +24,7 @@ class People:
         rows = await journal.query(select(editor_tables.person.c.id, editor_tables.person.c.name))
         return cls(journal, {row.id: row.name for row in rows})
 
-    async def seen(self, person: Author) -> None:
+    async def seen(self, person: PersonRef) -> None:
         """Somebody acts: remember the name, if it is new."""
         if self._names.get(person.id) == person.name:
             return
@@ -38,10 +38,10 @@ class People:
                 self._names[person.id] = before
             raise
 
-    def person(self, author: str) -> Author:
+    def person(self, author: str) -> PersonRef:
         """Who the author of an event is."""
-        return Author(author, self._names.get(author) or _OURS.get(author, ""))
+        return PersonRef(author, self._names.get(author) or _OURS.get(author, ""))
 
-    def everyone(self) -> list[Author]:
+    def everyone(self) -> list[PersonRef]:
         """All of them, by name."""
-        return sorted((Author(*item) for item in self._names.items()), key=lambda p: p.name)
+        return sorted((PersonRef(*item) for item in self._names.items()), key=lambda p: p.name)

@@ -14,7 +14,7 @@ from action_assistant.errors import BadInput, NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.files import codec
-from action_assistant.web.auth.keys import Author
+from action_assistant.web.auth.keys import PersonRef
 
 LABEL_LIMIT: Final = 200  # characters
 
@@ -27,7 +27,7 @@ class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
     label: str
     digest: str
     seq: int
-    author: Author
+    author: PersonRef
     at: datetime
     umrf: Any = None
 
@@ -40,7 +40,7 @@ class Versions:
         self._sights = sights
 
     async def publish(
-        self, graph: str, author: Author, *, label: str = "", seq: int | None = None
+        self, graph: str, author: PersonRef, *, label: str = "", seq: int | None = None
     ) -> tuple[VersionView, bool]:
         """The version of a graph at `seq`, or as it is, and whether it is new.
 
@@ -104,6 +104,6 @@ def _view(row: Row[Any]) -> VersionView:
         label=row.label,
         digest=row.digest,
         seq=row.seq,
-        author=Author(row.author_id, row.author_name),
+        author=PersonRef(row.author_id, row.author_name),
         at=h.when(row.at),
     )

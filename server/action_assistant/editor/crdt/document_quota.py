@@ -76,11 +76,11 @@ def refuse_too_long(update: bytes) -> None:
         raise TooLarge(f"A graph may have {MOST_BYTES >> 20} MiB.", where={"path": ""})
 
 
-class Full(Exception):
+class QuotaExceeded(Exception):
     """The document would hold more than one may; the message says of what."""
 
 
-class Fullness:
+class DocumentQuota:
     """The bounds of one document: never below what it holds."""
 
     def __init__(self, doc: "Doc[Any]") -> None:
@@ -98,17 +98,17 @@ class Fullness:
             self._changed = False
             self._spare = MOST_ACTIONS - actions_in(self._doc)
         if read.actions > max(self._spare, 0):
-            raise Full(f"a graph may have {MOST_ACTIONS:,} actions")
+            raise QuotaExceeded(f"a graph may have {MOST_ACTIONS:,} actions")
         if read.fields > self._spare_fields and self._fields_changed:
             self._fields_changed = False
             self._spare_fields = MOST_FIELDS - fields_in(self._doc)
         if read.fields > max(self._spare_fields, 0):
-            raise Full(f"a graph may have {MOST_FIELDS:,} fields")
+            raise QuotaExceeded(f"a graph may have {MOST_FIELDS:,} fields")
         if read.brings and self._bytes + len(update) > MOST_BYTES:
             if self._bytes - self._measured >= _WORTH:
                 self._bytes = self._measured = len(self._doc.get_update())
             if self._bytes + len(update) > MOST_BYTES:
-                raise Full(f"a graph may have {MOST_BYTES >> 20} MiB")
+                raise QuotaExceeded(f"a graph may have {MOST_BYTES >> 20} MiB")
 
     def took(self, size: int, actions: int = 0, fields: int = 0) -> None:
         """So many bytes were applied, with so many new actions and fields in them."""

@@ -9,7 +9,7 @@ from action_assistant.editor.crdt.folding import Damaged, fold
 from action_assistant.editor.crdt.log_tail import Tail
 from action_assistant.editor.crdt.replica import Kept, Replica
 from action_assistant.errors import Unavailable
-from action_assistant.journal.events import Snapshot
+from action_assistant.journal.events import StreamSnapshot
 from action_assistant.journal.journal import Journal
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
@@ -89,7 +89,7 @@ async def stored(
 async def _followed(
     journal: Journal,
     stream: str,
-    snapshot: Snapshot | None,
+    snapshot: StreamSnapshot | None,
     upto: int | None,
     *,
     learn: bool,
@@ -114,7 +114,7 @@ async def _followed(
     return Stored(document, tail.seq, start, tail.damaged)
 
 
-async def _snapshot(journal: Journal, stream: str) -> Snapshot | None:
+async def _snapshot(journal: Journal, stream: str) -> StreamSnapshot | None:
     """The snapshot; none where it cannot even be read, since the log says all that it could."""
     try:
         return await journal.snapshot(stream)

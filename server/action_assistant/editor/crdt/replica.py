@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 import msgspec
 from pycrdt import Doc, get_update
 
-from action_assistant.editor.crdt.document_quota import Fullness
+from action_assistant.editor.crdt.document_quota import DocumentQuota
 from action_assistant.editor.crdt.messages import NOTHING_NEW, Malformed, Reader
 from action_assistant.editor.crdt.nesting import Nesting
 from action_assistant.editor.crdt.update_scan import Outline, outline
@@ -55,7 +55,7 @@ class Replica:
         self.doc: Final[Doc[Any]] = Doc()
         self.owners: dict[int, str] = {}
         self.nesting = Nesting()
-        self._fullness = Fullness(self.doc)
+        self._quota = DocumentQuota(self.doc)
         self._known: dict[int, int] = {}
         self._fired = False
         self._waiting: dict[bytes, tuple[Outline, str]] = {}
@@ -82,7 +82,7 @@ class Replica:
             if (self.owners.get(client) or holder(client) or author) != author:
                 raise Foreign(f"client {client} is not {author}'s")
         if new:  # what is known is echoed by stock clients, and adds nothing
-            self._fullness.check(update, read)
+            self._quota.check(update, read)
         if not read.ready(self._known):
             self._check_patience(update, author)
         brought = self._took(update, read, author)
@@ -106,7 +106,7 @@ class Replica:
     def begin(self, kept: "Kept") -> None:
         """Take up where a snapshot was made. Raises Malformed, Panicked."""
         self._apply(kept.state)
-        self._fullness.took(len(kept.state))
+        self._quota.took(len(kept.state))
         self.owners, self.nesting = kept.owners, Nesting(kept.spans)
         self._known = clocks(self.doc.get_state())
         self._waiting = {update: (outline(update), author) for update, author in kept.waiting}
@@ -192,7 +192,7 @@ class Replica:
         return self._fired
 
     def _count(self, read: Outline, size: int) -> None:
-        self._fullness.took(size, read.actions, read.fields)
+        self._quota.took(size, read.actions, read.fields)
         for client, _, end in read.brings:
             self._known[client] = max(end, self._known.get(client, 0))
 

@@ -8,7 +8,7 @@ import msgspec
 from pycrdt import merge_updates
 
 from action_assistant.editor.crdt import messages
-from action_assistant.editor.crdt.document_quota import Full
+from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import Foreign, Panicked, Replica, TooMuchWaits
 from action_assistant.editor.crdt.trial import TooSlow, tried
@@ -87,7 +87,7 @@ class NotNow(Exception):
 
 #: Why an edit was not taken.
 Objection: TypeAlias = (
-    Malformed | Foreign | Full | TooMuchWaits | Panicked | NotAllowed | TooSlow | NotNow
+    Malformed | Foreign | QuotaExceeded | TooMuchWaits | Panicked | NotAllowed | TooSlow | NotNow
 )
 
 
@@ -110,7 +110,7 @@ def _answer(error: Objection) -> tuple[int, Refused, str | None]:
         case Foreign():
             reason = BadInput("The update speaks for somebody else.")
             return messages.FORBIDDEN, reason, messages.OTHER_CLIENT
-        case Full():
+        case QuotaExceeded():
             return messages.FULL, TooLarge(f"The graph is full: {error}."), str(error)
         case TooMuchWaits():
             return messages.TOO_BIG, TooLarge("Too much waits for what never came."), None

@@ -6,7 +6,7 @@ from typing import Final
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.presence import News, Seat
-from action_assistant.web.auth.keys import Author
+from action_assistant.web.auth.keys import PersonRef
 
 WAITING_FRAMES: Final = 256
 WAITING_BYTES: Final = 1 << 20
@@ -27,7 +27,7 @@ class _Answer(Enum):
 class Member:
     """Someone's socket. The room posts; whoever owns the socket takes and sends."""
 
-    def __init__(self, person: Author, *, edits: bool = True, acks: bool = False) -> None:
+    def __init__(self, person: PersonRef, *, edits: bool = True, acks: bool = False) -> None:
         self.person: Final = person
         self.seat: Final = Seat(person)
         self.edits = edits

@@ -9,7 +9,7 @@ import msgspec
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.messages import Entry
-from action_assistant.web.auth.keys import Author
+from action_assistant.web.auth.keys import PersonRef
 
 STATE_LIMIT: Final = 32_768  # bytes of one client's entry
 _GONE: Final = b"null"
@@ -34,7 +34,7 @@ def colour_of(person_id: str) -> str:
     return _COLOURS[hashlib.sha256(person_id.encode()).digest()[0] % len(_COLOURS)]
 
 
-def stamp_of(person: Author) -> bytes:
+def stamp_of(person: PersonRef) -> bytes:
     """The stamp as JSON."""
     return msgspec.json.encode(Stamp(person.id, person.name, colour_of(person.id)))
 
@@ -42,7 +42,7 @@ def stamp_of(person: Author) -> bytes:
 class Seat:
     """The one client id that a socket speaks for."""
 
-    def __init__(self, person: Author) -> None:
+    def __init__(self, person: PersonRef) -> None:
         self.person: Final = person
         self.client: int | None = None
         self._stamp: Final = msgspec.Raw(stamp_of(person))
@@ -117,11 +117,11 @@ class Attendance:
         seat = self._seats.get(client)
         return None if seat is None else seat.person.id
 
-    def people(self) -> tuple[Author, ...]:
+    def people(self) -> tuple[PersonRef, ...]:
         """Who is there now, each once, by name."""
         there = {seat.person.id: seat.person for seat in self._seats.values()}
         return tuple(
-            Author(person.id, person.name)
+            PersonRef(person.id, person.name)
             for person in sorted(there.values(), key=lambda person: (person.name, person.id))
         )
 

@@ -11,7 +11,7 @@ _REMEMBERED: Final = 1000  # people
 _WORD: Final = PER_MINUTE // (60 * 200)
 
 
-class Budget:
+class ByteRateLimits:
     """What each person may still bring. Nothing is refused: the socket is read later."""
 
     def __init__(self, *, limits: bool, clock: Callable[[], float] = time.monotonic) -> None:

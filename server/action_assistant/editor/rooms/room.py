@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, TypeVar
 
 from action_assistant.editor.crdt import messages
-from action_assistant.editor.crdt.document_quota import Full
+from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.loading import Loaded, load
 from action_assistant.editor.crdt.messages import Entry, Malformed
 from action_assistant.editor.crdt.replica import (
@@ -318,7 +318,7 @@ class Room:
         begun = time.perf_counter()
         try:
             brought = self._brought(offer, read)
-        except (Malformed, Foreign, Full, TooMuchWaits, Panicked, NotAllowed) as error:
+        except (Malformed, Foreign, QuotaExceeded, TooMuchWaits, Panicked, NotAllowed) as error:
             log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
             taken.panicked = isinstance(error, Panicked)
             refuse(offer, error)

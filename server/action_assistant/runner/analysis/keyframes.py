@@ -13,7 +13,7 @@ from typing import Final, Protocol
 import msgspec
 
 from action_assistant.errors import BadInput, NotFound, Refused
-from action_assistant.journal.events import Event, Snapshot
+from action_assistant.journal.events import Event, StreamSnapshot
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     Ended,
@@ -89,7 +89,7 @@ class RunKeyframes(msgspec.Struct, frozen=True):
 class SnapshotJournal(Ledger, Protocol):
     """A ledger that also keeps what a stream adds up to."""
 
-    async def snapshot(self, stream: str) -> Snapshot | None:
+    async def snapshot(self, stream: str) -> StreamSnapshot | None:
         """What was kept, if it still fits the stream."""
         ...
 

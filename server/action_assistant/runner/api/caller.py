@@ -12,7 +12,7 @@ from litestar.connection import ASGIConnection
 from action_assistant.errors import Unavailable
 from action_assistant.runner.runs.events import Author
 from action_assistant.web.auth.access import person_of, session_of
-from action_assistant.web.network.connection_limits import Turns
+from action_assistant.web.network.connection_limits import ConcurrencyLimit
 
 #: Bytes of a body that carries a graph: 5,000 actions, the most that the editor takes, are 1.2 MB.
 LARGE: Final = 2_000_000
@@ -33,10 +33,12 @@ def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
 
 
 @asynccontextmanager
-async def body_of(request: Request[Any, Any, Any], turns: Turns) -> AsyncIterator[bytes]:
+async def body_of(
+    request: Request[Any, Any, Any], body_limit: ConcurrencyLimit
+) -> AsyncIterator[bytes]:
     """A body that may be large: of one person few are in memory at a time, and it has to come in
     time. Raises TooLarge, Unavailable."""
-    async with turns.turn(person_of(request).id):
+    async with body_limit.turn(person_of(request).id):
         try:
             with anyio.fail_after(_BODY_S):
                 body = await request.body()

@@ -33,7 +33,7 @@ from action_assistant.runner.review.service import (
 from action_assistant.runner.review.worker_queries import WorkerQueries, json_of
 from action_assistant.runner.start.admission import decoded
 from action_assistant.web.auth.access import Needs
-from action_assistant.web.network.connection_limits import Turns
+from action_assistant.web.network.connection_limits import ConcurrencyLimit
 
 _Asking = Request[Any, Any, Any]
 _TYPES: Final[dict[str, str]] = {
@@ -73,7 +73,7 @@ class ReviewServices(Protocol):
     review_service: ReviewService
     asked: WorkerQueries
     retention: Retention
-    turns: Turns
+    body_limit: ConcurrencyLimit
 
 
 def routes(services: ReviewServices) -> list[ControllerRouterHandler]:
@@ -131,7 +131,7 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
         request_max_body_size=LARGE,
     )
     async def fit(run: str, request: _Asking) -> Response[expected_runs.Recorded]:
-        async with body_of(request, services.turns) as body:
+        async with body_of(request, services.body_limit) as body:
             asked = decoded(body, Fit)
             fault = _fault(asked.action, asked.fault)
             text = await services.asked.text(ReviewService.script, run, fault, bytes(asked.umrf))

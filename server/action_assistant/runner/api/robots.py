@@ -28,7 +28,7 @@ from action_assistant.runner.start.start_checks import read_group
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Signature
 from action_assistant.web.auth.access import Needs
-from action_assistant.web.network.connection_limits import Turns
+from action_assistant.web.network.connection_limits import ConcurrencyLimit
 from action_assistant.web.workers.lanes import RunInWorker
 
 _EVENTS: Final = 200
@@ -39,7 +39,7 @@ class RobotServices(Protocol):
     """What these routes work on."""
 
     control: ExecutionService
-    turns: Turns
+    body_limit: ConcurrencyLimit
     run_in_worker: RunInWorker
 
 
@@ -212,7 +212,7 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
         request_max_body_size=LARGE,
     )
     async def look(request: _Asking) -> list[Preflight]:
-        async with body_of(request, services.turns) as body:
+        async with body_of(request, services.body_limit) as body:
             return await services.control.look(read_group(body))
 
     @post(
@@ -223,7 +223,7 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
         request_max_body_size=LARGE,
     )
     async def start(request: _Asking) -> Response[GroupShown]:
-        async with body_of(request, services.turns) as body:
+        async with body_of(request, services.body_limit) as body:
             grouped = await services.control.start_group(read_group(body), author_of(request))
         runs = [views.shown(run) for run in grouped.runs]
         shown = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)

@@ -68,7 +68,7 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         request_max_body_size=LARGE,
     )
     async def start(request: _Asking) -> Response[views.RunShown]:
-        async with body_of(request, services.turns) as body:
+        async with body_of(request, services.body_limit) as body:
             asked = read_request(body)
             if asked.engine != SIMULATOR:
                 require(request, "operate")
@@ -145,7 +145,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def modify(run: str, request: _Asking) -> views.RunShown:
         await _require_hand_on(services, run, request)
-        async with body_of(request, services.turns) as body:
+        async with body_of(request, services.body_limit) as body:
             return views.shown(await services.control.modify(run, body, author_of(request)))
 
     @post(
@@ -246,7 +246,7 @@ def _live(services: RunnerServices) -> ControllerRouterHandler:
     async def live(socket: WebSocket[Any, Any, Any]) -> None:
         address = socket.client.host if socket.client is not None else ""
         try:
-            with services.crowd.admitted(person_of(socket).id, address):
+            with services.connection_limits.admitted(person_of(socket).id, address):
                 await attend(socket, services.hub)
         except TooMany as refused:
             await refuse(socket.scope, socket.receive, socket.send, refused)

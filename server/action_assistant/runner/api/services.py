@@ -11,7 +11,7 @@ from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs import views
-from action_assistant.web.network.connection_limits import Crowd, Turns
+from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
 from action_assistant.web.workers.lanes import RunInWorker
 
 _BODIES: Final = 4  # large ones of a person at a time
@@ -22,15 +22,15 @@ class RunnerServices:
 
     control: ExecutionService
     hub: Hub
-    crowd: Crowd
+    connection_limits: ConnectionLimits
     journal: Journal
     review_service: ReviewService
     asked: WorkerQueries
     retention: Retention
-    turns: Turns
+    body_limit: ConcurrencyLimit
     run_in_worker: RunInWorker
     sent: WeakKeyDictionary[OpenRun, views.Sent]
 
     def __init__(self) -> None:
         self.sent = WeakKeyDictionary()
-        self.turns = Turns(_BODIES)
+        self.body_limit = ConcurrencyLimit(_BODIES)

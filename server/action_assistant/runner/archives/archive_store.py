@@ -10,8 +10,8 @@ from sqlalchemy import Row, Select, select
 
 from action_assistant.errors import Refused
 from action_assistant.journal.chain import Head
-from action_assistant.journal.events import Addition, Draft, Event, Snapshot
-from action_assistant.journal.removal import Removed
+from action_assistant.journal.events import Addition, Draft, Event, StreamSnapshot
+from action_assistant.journal.removal import StreamRemoved
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.runs import views
@@ -35,7 +35,7 @@ class Journaled(SnapshotJournal, Protocol):
         """The last event of a stream, and the chain up to it."""
         ...
 
-    async def take_out(self, removed: Removed, also: Callable[[int], Addition]) -> int:
+    async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
         """Say that a stream is kept elsewhere from now on. Raises Conflict, Unavailable."""
         ...
 
@@ -68,7 +68,7 @@ class ArchiveStore:
         """As the journal's."""
         return await self._journal.query(statement)
 
-    async def snapshot(self, stream: str) -> Snapshot | None:
+    async def snapshot(self, stream: str) -> StreamSnapshot | None:
         """None for a run in an archive: its keyframes went with it."""
         return None if await self.place(stream) else await self._journal.snapshot(stream)
 

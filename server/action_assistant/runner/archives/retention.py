@@ -18,7 +18,7 @@ from sqlalchemy import Row, Select, exists, literal, or_, select
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.journal.events import Addition, Draft
-from action_assistant.journal.removal import Removed
+from action_assistant.journal.removal import StreamRemoved
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.archives.archive_store import Journaled
@@ -131,7 +131,7 @@ class Retention:
         finally:
             written.abandon()
         at = self._clock_us()
-        removed = Removed(stream, end.seq, end.chain.hex(), place, digest)
+        removed = StreamRemoved(stream, end.seq, end.chain.hex(), place, digest)
 
         def told(by: int) -> Addition:
             put = annotations.Put(at, place, digest, by, _fields(row))

@@ -60,13 +60,15 @@ class PublishedGraphs:
         """What happened in the engine; the graphs that have ended by it, but no sub-graphs."""
         ended: list[str] = []
         seen = _as_threads_do(traces)
-        crowd = sum(isinstance(each, NodeState) and each.state in _SHOWN for each in seen)
+        connection_limits = sum(
+            isinstance(each, NodeState) and each.state in _SHOWN for each in seen
+        )
         for trace in seen:
             if isinstance(trace, NodeResult):
                 self._remember(trace.graph, trace.node, round(self._epoch_ms + now_ms))
         for trace in seen:
             if isinstance(trace, NodeState):
-                self._node(trace, crowd)
+                self._node(trace, connection_limits)
             elif isinstance(trace, GraphState) and (held := self._of(trace.graph)):
                 held.state = trace.state
                 if trace.state in ENDED and held.running.home is None:
@@ -79,12 +81,12 @@ class PublishedGraphs:
         shown = [held for _, held in sorted(self._held.items())]
         return tuple(each.text() for each in shown if keeps or each.state not in ENDED)
 
-    def snapshot(self, name: str, crowd: int = 1) -> None:
+    def snapshot(self, name: str, connection_limits: int = 1) -> None:
         """One more snapshot in the ring, unless somebody else looks at the graphs just now."""
         held = self._held.get(name)
         if held is None or self.taken or self._engine.locked:
             return
-        kept = (1 - self._quirks.loss) / max(1, crowd - 1)
+        kept = (1 - self._quirks.loss) / max(1, connection_limits - 1)
         if not self._quirks.loss or self._chance.random() < kept:
             self._ring.appendleft(held.text())
 
@@ -107,7 +109,7 @@ class PublishedGraphs:
             self.plans[name] = GraphPlan(plan.graph, before | plan.attributes)
             held.sheet = self._sheet(held.running)
 
-    def _node(self, trace: NodeState, crowd: int) -> None:
+    def _node(self, trace: NodeState, connection_limits: int) -> None:
         held = self._of(trace.graph)
         if held is None or trace.state == "INITIALIZED":
             return
@@ -115,7 +117,7 @@ class PublishedGraphs:
         held.states[trace.node] = trace.state
         resumed = before in {"PAUSED", "PAUSE_REQUESTED"} and trace.state == "RUNNING"
         if trace.state in _SHOWN and not resumed:
-            self.snapshot(trace.graph, crowd)
+            self.snapshot(trace.graph, connection_limits)
 
     def _of(self, name: str) -> _Held | None:
         running = self._engine.graphs.get(name)

@@ -16,8 +16,8 @@ import msgspec
 from litestar import MediaType, Response
 
 from action_assistant.errors import Refused, Unavailable
-from action_assistant.journal.events import Draft, Snapshot
-from action_assistant.journal.reader import FileReader
+from action_assistant.journal.events import Draft, StreamSnapshot
+from action_assistant.journal.reader import FileJournalReader
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.review.service import OngoingRun, ReviewService
@@ -101,7 +101,7 @@ class WorkerQueries:
                 with anyio.move_on_after(_SETTLED_S):
                     await opened.recorder.flushed()
 
-    async def _keep(self, kept: Sequence[Snapshot]) -> None:
+    async def _keep(self, kept: Sequence[StreamSnapshot]) -> None:
         for each in kept:
             with suppress(Refused):  # a cache: it is made again when the journal can be written
                 await self._ledger.keep_snapshot(each.stream, each.seq, each.state)
@@ -109,7 +109,7 @@ class WorkerQueries:
 
 def answered(
     place: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
-) -> tuple[Any, list[Snapshot]]:
+) -> tuple[Any, list[StreamSnapshot]]:
     """In the worker: the answer, and what of it is worth keeping."""
     review_service, file = _reading(place)
     found = asyncio.run(_asked(question, review_service, args))
@@ -118,7 +118,7 @@ def answered(
 
 def encoded(
     place: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
-) -> tuple[bytes, list[Snapshot]]:
+) -> tuple[bytes, list[StreamSnapshot]]:
     """The same as JSON."""
     found, kept = answered(place, question, args)
     return msgspec.json.encode(found), kept
@@ -145,12 +145,12 @@ def _no_clock() -> NoReturn:
     raise AssertionError("what is stored needs no clock to be read")
 
 
-class _ReadOnlyJournal(FileReader):
+class _ReadOnlyJournal(FileJournalReader):
     """The journal as a worker has it: what is to be kept is given to the runner."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._kept: list[Snapshot] = []
+        self._kept: list[StreamSnapshot] = []
 
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
@@ -160,9 +160,9 @@ class _ReadOnlyJournal(FileReader):
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
         """By the runner."""
-        self._kept.append(Snapshot(stream, seq, state))
+        self._kept.append(StreamSnapshot(stream, seq, state))
 
-    def given(self) -> list[Snapshot]:
+    def given(self) -> list[StreamSnapshot]:
         """What is to be kept, once."""
         given, self._kept = self._kept, []
         return given

@@ -24,7 +24,7 @@ from action_assistant.errors import (
     WrongOrigin,
 )
 from action_assistant.web.auth.keys import Keys, Person, Session
-from action_assistant.web.auth.revocations import SESSION_ENDED, Leashes, Revoked
+from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards
 from action_assistant.web.auth.roles import OWNER, Deed, allowed, may
 from action_assistant.web.http import cookies
 from action_assistant.web.http.problems import problem_of
@@ -176,7 +176,7 @@ class Access:
         page_port: int,
         is_open: Callable[[str, bool], bool],
         policy: Callable[[str], str],
-        revoked: Revoked,
+        revoked: Revocations,
     ) -> None:
         self._app = app
         self._keys = keys
@@ -185,7 +185,7 @@ class Access:
         self._is_open = is_open
         self._policy = policy
         self._revoked = revoked
-        self._leashes = Leashes(revoked)
+        self._leashes = SessionGuards(revoked)
         self._local = Person("local", _user_name(), OWNER)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

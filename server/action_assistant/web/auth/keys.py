@@ -26,14 +26,14 @@ SESSION_SECONDS: Final = 30 * 24 * 3600
 _MIN_TOKEN: Final = 32  # characters; the tokens made here have 43 (256 bit)
 
 
-class Author(msgspec.Struct, frozen=True):
+class PersonRef(msgspec.Struct, frozen=True):
     """Somebody who acted. `id` is opaque and stable for a browser; `name` is theirs to choose."""
 
     id: str
     name: str
 
 
-class Person(Author, frozen=True):
+class Person(PersonRef, frozen=True):
     """Somebody who acts now, and may do what the role allows."""
 
     role: Role = "viewer"
@@ -67,7 +67,7 @@ class Sealed(msgspec.Struct, frozen=True, array_like=True):
     invitation: str | None = None
 
 
-class Proof(msgspec.Struct, frozen=True):
+class ServerProof(msgspec.Struct, frozen=True):
     """That a server knows the token: an HMAC over a challenge and the address, `HOST:PORT`, at which
     the connection was taken."""
 
@@ -136,11 +136,11 @@ class Keys:
         """The secret of a link (256 bit): only who knows the token can tell it from the id."""
         return _text(hmac.digest(self._seal, b"invitation\0" + invitation.encode(), "sha256"))
 
-    def prove(self, challenge: str, address: str) -> Proof:
+    def prove(self, challenge: str, address: str) -> ServerProof:
         """For a client that is to show us the token."""
-        return Proof(address, self._proof(challenge, address))
+        return ServerProof(address, self._proof(challenge, address))
 
-    def proven(self, challenge: str, proof: Proof, *, at: str | None = None) -> bool:
+    def proven(self, challenge: str, proof: ServerProof, *, at: str | None = None) -> bool:
         """Whether somebody else knows the token; `at` which address, if it has to be that one."""
         if at is not None and proof.address != at:
             return False

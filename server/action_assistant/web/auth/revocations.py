@@ -29,7 +29,7 @@ _SESSION: Final = "session-"
 _SESSION_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 
-class Revoked:
+class Revocations:
     """The invitations that open nothing any more, and the sessions that have ended."""
 
     def __init__(self, data: Path) -> None:
@@ -116,7 +116,7 @@ class Revoked:
         return self._marks
 
 
-class Leash:
+class SessionGuard:
     """Holds one open socket or stream of a session; is cut when the session ends."""
 
     def __init__(self, session: Session, task: "asyncio.Task[object]", *, outlives: bool) -> None:
@@ -125,7 +125,7 @@ class Leash:
         self._task = task
         self._outlives = outlives
 
-    def look(self, revoked: Revoked) -> None:
+    def look(self, revoked: Revocations) -> None:
         """Cut it if the session has ended."""
         over = revoked.ends(self._session)
         over = over or (self._session.expired and not self._outlives)
@@ -138,21 +138,21 @@ class Leash:
         self._task.uncancel()
 
 
-class Leashes:
+class SessionGuards:
     """Everything that is open in somebody's name. Looks while there is something to look after."""
 
-    def __init__(self, revoked: Revoked) -> None:
+    def __init__(self, revoked: Revocations) -> None:
         self._revoked = revoked
-        self._held: set[Leash] = set()
+        self._held: set[SessionGuard] = set()
         self._watch: asyncio.Task[None] | None = None
 
     @contextmanager
-    def hold(self, session: Session, *, outlives: bool = False) -> Iterator[Leash]:
+    def hold(self, session: Session, *, outlives: bool = False) -> Iterator[SessionGuard]:
         """Cancel the current task when the session ends. `outlives`: not when it merely expires."""
         task = asyncio.current_task()
         if task is None:
             raise RuntimeError("only a task can be cancelled")
-        leash = Leash(session, task, outlives=outlives)
+        leash = SessionGuard(session, task, outlives=outlives)
         self._held.add(leash)
         if self._watch is None or self._watch.done():
             self._watch = asyncio.create_task(self._looking(), name="leashes")

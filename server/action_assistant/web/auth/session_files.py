@@ -17,7 +17,7 @@ import msgspec
 from action_assistant.errors import NotFound
 from action_assistant.private_files import opener
 from action_assistant.web.auth.keys import SESSION_SECONDS, Person, Session
-from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.revocations import Revocations
 
 log: Final = logging.getLogger(__name__)
 
@@ -36,10 +36,10 @@ class OpenSession(msgspec.Struct, frozen=True, omit_defaults=True):
     invitation: str | None = None
 
 
-class SignedInBrowsers:
+class SessionFiles:
     """All of them, as far as the disk had room to note them."""
 
-    def __init__(self, data: Path, revoked: Revoked) -> None:
+    def __init__(self, data: Path, revoked: Revocations) -> None:
         self._folder = data / FOLDER
         self._revoked = revoked
         self._noted: dict[str, Session] = {}
@@ -73,7 +73,7 @@ class SignedInBrowsers:
         return sorted(found, key=lambda each: each.expires, reverse=True)
 
     def end(self, session: str) -> None:
-        """End one, in both processes. Raises NotFound; Unavailable, as `Revoked.end`."""
+        """End one, in both processes. Raises NotFound; Unavailable, as `Revocations.end`."""
         if session not in {each.id for each in self.every()}:
             raise NotFound(f"There is no open session {session!r}.")
         self._revoked.end(session)

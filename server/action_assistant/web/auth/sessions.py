@@ -18,13 +18,13 @@ from action_assistant.web.auth.access import (
     live_session,
     session_of,
 )
-from action_assistant.web.auth.keys import SESSION_SECONDS, Author, Keys, Person, Session
-from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.keys import SESSION_SECONDS, Keys, Person, PersonRef, Session
+from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Role, rank
-from action_assistant.web.auth.session_files import SignedInBrowsers
+from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.http.problems import PROBLEM_JSON, problem_of
 from action_assistant.web.network.addresses import Addresses
-from action_assistant.web.network.connection_limits import Pace
+from action_assistant.web.network.connection_limits import RateLimit
 
 _BODY: Final = 10_000  # bytes; strangers send it
 _NAME: Final = 60  # characters
@@ -76,7 +76,7 @@ class InvitationRegistry(Protocol):
     def look(self, proof: str) -> Invited:
         """What a link invites to. Raises Unauthenticated."""
 
-    async def welcome(self, invitation: str, person: Author) -> None:
+    async def welcome(self, invitation: str, person: PersonRef) -> None:
         """Remember who came in by it."""
 
 
@@ -96,7 +96,7 @@ class Sessions:
         self._cookie = cookie_name(page_port)
         self._reception = reception
         self._addresses = addresses
-        self._pace = Pace(_TRIES_AT_ONCE, _TRIES_PER_MINUTE) if limits else None
+        self._pace = RateLimit(_TRIES_AT_ONCE, _TRIES_PER_MINUTE) if limits else None
 
     def look(self, invitation: str, request: _Asking) -> Invited:
         """What a link leads to. Raises Unauthenticated, TooMany."""
@@ -169,8 +169,8 @@ def session_routes(
     page_port: int,
     *,
     reception: Callable[[], InvitationRegistry],
-    revoked: Revoked,
-    browsers: SignedInBrowsers,
+    revoked: Revocations,
+    browsers: SessionFiles,
     addresses: Addresses | None = None,
     limits: bool = True,
 ) -> list[ControllerRouterHandler]:
@@ -214,7 +214,7 @@ def session_routes(
     return [who, sign_in, look, sign_out]
 
 
-def revocation(revoked: Revoked) -> list[ControllerRouterHandler]:
+def revocation(revoked: Revocations) -> list[ControllerRouterHandler]:
     """For a process that knows no invitations: the runner, which may be on another computer."""
 
     @post(
@@ -242,7 +242,7 @@ def revocation(revoked: Revoked) -> list[ControllerRouterHandler]:
     return [revoke, sign_out]
 
 
-async def _end(revoked: Revoked, request: _Asking) -> None:
+async def _end(revoked: Revocations, request: _Asking) -> None:
     """The session of whoever asks, also one that has expired. Raises Unavailable."""
     state = request.scope["state"]
     session: Session | None = state.get("session") or state.get("expired")

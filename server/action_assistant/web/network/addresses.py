@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 import ifaddr
 
-from action_assistant.public_url import Public
+from action_assistant.public_url import PublicUrl
 from action_assistant.settings import EVERYWHERE, LOOPBACK
 
 _ANYWHERE: Final = frozenset({"0.0.0.0", "::", EVERYWHERE})
@@ -73,7 +73,7 @@ class Addresses:
         hosts: Iterable[str] = (),
         secure: bool = False,
         lan: Callable[[], tuple[str, ...]] | None = None,
-        public: Public | None = None,
+        public: PublicUrl | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._public = public
@@ -122,7 +122,7 @@ class Addresses:
             return False
         return (port or (443 if parts.scheme == "https" else 80)) == self._page_port
 
-    def public_at(self, header: str) -> Public | None:
+    def public_at(self, header: str) -> PublicUrl | None:
         """The public address, if this is what a Host header names; None for everything else."""
         public = self._public
         return public if public is not None and public.is_named(*_host_and_port(header)) else None
@@ -195,7 +195,7 @@ def addresses_of(
     hosts: tuple[str, ...],
     share: bool,
     secure: bool,
-    public: Public | None = None,
+    public: PublicUrl | None = None,
 ) -> Addresses:
     """What the settings of a process come to."""
     listens_everywhere = share and host in _ANYWHERE

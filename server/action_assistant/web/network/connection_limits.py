@@ -19,7 +19,7 @@ _REMEMBERED: Final = 1000  # addresses
 Clock = Callable[[], float]
 
 
-class Pace:
+class RateLimit:
     """So many at once for each address, and so many a minute after that."""
 
     def __init__(self, at_once: int, per_minute: int, clock: Clock = time.monotonic) -> None:
@@ -40,7 +40,7 @@ class Pace:
         return left >= 1
 
 
-class Turns:
+class ConcurrencyLimit:
     """So many requests with large bodies of each person at a time; the others wait unread."""
 
     def __init__(self, most: int) -> None:
@@ -61,7 +61,7 @@ class Turns:
                 self._turns[person] = turn, waiting - 1
 
 
-class Crowd:
+class ConnectionLimits:
     """The sockets of this process. Without `limits` it only counts.
 
     Where the way for Stop leads over a socket, `keeps_one` keeps one for everybody: the first of a
@@ -79,7 +79,7 @@ class Crowd:
         self._keeps_one = keeps_one
         self._people: Counter[str] = Counter()
         self._addresses: Counter[str] = Counter()
-        self._upgrades = Pace(AT_ONCE, PER_MINUTE, clock)
+        self._upgrades = RateLimit(AT_ONCE, PER_MINUTE, clock)
 
     @contextmanager
     def admitted(self, person: str, address: str) -> Iterator[None]:

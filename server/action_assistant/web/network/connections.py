@@ -71,7 +71,7 @@ class Connection:
                 self._wire.shutdown(socket.SHUT_RDWR)
 
 
-class Held:
+class ConnectionsByHolder:
     """Connections by who holds them, and the oldest first."""
 
     def __init__(self) -> None:
@@ -117,8 +117,8 @@ class Connections:
     def __init__(self, limit: int) -> None:
         self._most = max(32, min(_MOST, limit - _in_use() - _KEPT))
         self._most_strangers = max(16, min(_MOST_STRANGERS, self._most * 2 // 3))
-        self._all = Held()
-        self._strangers = Held()
+        self._all = ConnectionsByHolder()
+        self._strangers = ConnectionsByHolder()
         self._tasks: set[asyncio.Task[None]] = set()
         self._listeners: list[socket.socket] = []
 
@@ -214,7 +214,7 @@ class Connections:
 
     # --- going --------------------------------------------------------------------------------
 
-    def _make_room(self, among: Held, most: int) -> None:
+    def _make_room(self, among: ConnectionsByHolder, most: int) -> None:
         """The oldest of whoever holds most goes, those first that nothing is being done for."""
         while len(among) > most:
             of_them = among.most()

@@ -19,8 +19,8 @@ from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive,
 
 from action_assistant.version import VERSION
 from action_assistant.web.auth.access import Access, Needs, require
-from action_assistant.web.auth.keys import Keys, Proof
-from action_assistant.web.auth.revocations import Revoked
+from action_assistant.web.auth.keys import Keys, ServerProof
+from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Deed
 from action_assistant.web.http.page import Page
 from action_assistant.web.http.problems import problem_handlers
@@ -53,7 +53,7 @@ def application(
     *,
     title: str,
     keys: Keys,
-    revoked: Revoked,
+    revoked: Revocations,
     addresses: Addresses,
     page_port: int,
     lifespan: Sequence[Lifespan] = (),
@@ -103,7 +103,7 @@ def application(
         policy=lambda host: _policy(addresses, host, page_port, runner_port),
         revoked=revoked,
     )
-    return _Named(Mounted(outer, mount), inner)
+    return _NamedRoute(Mounted(outer, mount), inner)
 
 
 def _host(scope: HTTPScope) -> str:
@@ -151,7 +151,7 @@ async def _undecided(
         require(connection, "restore")
 
 
-class _Named:
+class _NamedRoute:
     """The application, with Litestar's own one in reach for those who make its OpenAPI text."""
 
     def __init__(self, outer: ASGIApp, inner: Litestar) -> None:
@@ -228,7 +228,7 @@ def _proving(keys: Keys) -> ControllerRouterHandler:
     async def prove(
         request: Request[Any, Any, Any],
         challenge: Annotated[str, Parameter(min_length=20, max_length=100)],
-    ) -> Response[Proof]:
+    ) -> Response[ServerProof]:
         host, port = request.scope.get("server") or ("", 0)
         # Of whoever comes through a proxy the address proves nothing: anybody could pass it on.
         passed_on = any(name in request.headers for name in _PASSED_ON)

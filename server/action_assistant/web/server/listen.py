@@ -52,7 +52,7 @@ def serve(
     *,
     host: str,
     port: int,
-    identity: "Identity | None" = None,
+    identity: "TlsIdentity | None" = None,
     proxies: tuple[Network, ...] = (),
 ) -> None:
     """Serve what `make` makes until told to end; nothing is touched before the address is ours.
@@ -64,14 +64,14 @@ def serve(
     try:
         if identity is not None:
             identity.certificate.renew(identity.names())
-        endings = Endings(make())
+        endings = StreamEndings(make())
     except BaseException:
         for listener in sockets:
             listener.close()
         raise
     connections = Connections(raise_limit())
     config = uvicorn.Config(
-        Watched(Forwarded(endings, proxies), connections),
+        ActivityTracker(Forwarded(endings, proxies), connections),
         http=_Http,
         h11_max_incomplete_event_size=HEAD_LIMIT,
         lifespan="on",
@@ -98,7 +98,7 @@ def serve(
         raise CannotStart("The process could not be set up; the log above says why.")
 
 
-class Identity:
+class TlsIdentity:
     """Who we are under TLS: a certificate, renewed in time and when our names have changed."""
 
     def __init__(self, certificate: Certificate, names: Callable[[], Sequence[str]]) -> None:
@@ -127,7 +127,7 @@ class Identity:
         threading.Thread(target=look, name="certificate", daemon=True).start()
 
 
-class Endings:
+class StreamEndings:
     """Around an application: when the process is told to end, streams without an end get one.
 
     A listener to server-sent events is told that its peer has gone, which is how it would end
@@ -178,7 +178,7 @@ class Endings:
             told.cancel()
 
 
-class Watched:
+class ActivityTracker:
     """Around everything: says for which connection something is being done, and for whom. A request
     whose body does not come is not waited for."""
 
@@ -272,7 +272,9 @@ class _Strict(h11.Connection):
 class _Server(uvicorn.Server):
     """Ends streams before it waits for them."""
 
-    def __init__(self, config: uvicorn.Config, endings: Endings, connections: Connections) -> None:
+    def __init__(
+        self, config: uvicorn.Config, endings: StreamEndings, connections: Connections
+    ) -> None:
         super().__init__(config)
         self._endings = endings
         self._connections = connections

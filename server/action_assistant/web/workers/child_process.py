@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from action_assistant.errors import TooLarge
-from action_assistant.safe_text import make_streams_plain
+from action_assistant.safe_text import make_streams_printable
 
 _MEMORY: Final = 768 << 20  # bytes that a worker may take beyond what it begins with
 _TIRED: Final = 256 << 20  # bytes in use after which a worker makes room for a fresh one
@@ -47,7 +47,7 @@ def child(
 
 def _humbly(work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
     """In the process: others first, when time or memory runs short."""
-    make_streams_plain()
+    make_streams_printable()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for our parent, which ends us
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(OSError):
