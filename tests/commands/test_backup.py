@@ -94,7 +94,7 @@ def data(tmp_path: Path) -> Path:
         url = f"sqlite:///{tmp_path / 'editor.db'}"
         journal = await Journal.open(url, branch="editor", fold=h.fold)
         for name in ("Ada", "Ada L.", "Ada Lovelace"):
-            await journal.append(h.PEOPLE, [h.draft(h.NAMED, "ada", h.Named(name))])
+            await journal.append(h.PEOPLE, [h.draft(h.NAMED, "ada", h.PersonNamed(name))])
         await journal.close()
 
     asyncio.run(fill())

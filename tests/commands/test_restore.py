@@ -49,7 +49,7 @@ def filled(data: Path, name: str, body: bytes = b"") -> None:
         for branch, fold in folds.items():
             url = f"sqlite:///{data / f'{branch}.db'}"
             journal = await Journal.open(url, branch=branch, fold=fold)
-            draft = h.draft(h.NAMED, "ada", h.Named(name)) if branch == "editor" else None
+            draft = h.draft(h.NAMED, "ada", h.PersonNamed(name)) if branch == "editor" else None
             await journal.append("people", [draft or Draft("x.y.v1", "ada", name.encode())])
             await journal.append("graph/g", [Draft("x.y.v1", "ada", body)])
             await journal.close()

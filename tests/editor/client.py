@@ -79,12 +79,12 @@ class Client:
     def take(self, frame: bytes) -> None:
         """One message of the room's."""
         if frame[0] == messages.ACKS:
-            reader = messages.Reader(frame[1:])
+            reader = messages.ByteReader(frame[1:])
             self.durable, self.seq = reader.number(), reader.number()
             assert self.durable <= self.sent
             return
         if frame[0] == messages.READ_ONLY:
-            self.read_only = messages.Reader(frame[1:]).text().decode()
+            self.read_only = messages.ByteReader(frame[1:]).text().decode()
             return
         match messages.parse(frame):
             case messages.Question(state):
@@ -93,7 +93,7 @@ class Client:
                 self._remote = True
                 self.doc.apply_update(update)
                 self._remote = False
-            case messages.Comparison(_, entries, total):
+            case messages.CompareMessage(_, entries, total):
                 self.told = Fingerprint(entries, total)
             case messages.Presence(entries):
                 for entry in entries:

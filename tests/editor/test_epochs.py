@@ -14,7 +14,7 @@ async def told(session: httpx_ws.AsyncWebSocketSession) -> str:
     """The name of the history, the first thing that a socket hears."""
     frame = await session.receive_bytes(timeout=5)
     assert frame[0] == messages.EPOCH
-    return messages.Reader(frame[1:]).text().decode()
+    return messages.ByteReader(frame[1:]).text().decode()
 
 
 async def entered(editor: Editor, graph: str, query: str) -> tuple[str, int | None]:

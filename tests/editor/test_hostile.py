@@ -11,7 +11,7 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.nesting import DEEPEST_TYPES
-from action_assistant.editor.crdt.replica import WAITING_UPDATES, Foreign, Replica
+from action_assistant.editor.crdt.replica import WAITING_UPDATES, ForeignClient, Replica
 from action_assistant.editor.crdt.update_scan import outline
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import TooMany
@@ -106,7 +106,7 @@ async def test_an_id_that_somebody_shows_is_theirs_before_they_write(rooms: Room
     async with rooms.enter(STREAM) as room:
         for client in (ada, eve):
             client.join(room)
-        ada.deliver(messages.presence([messages.Entry(1, 1, b"{}")]))
+        ada.deliver(messages.presence([messages.PresenceEntry(1, 1, b"{}")]))
         eve.deliver(messages.change(forge.entry(1, 0, "stolen", "x")))
         await room.quiet()
         assert await ended(eve) == messages.FORBIDDEN
@@ -124,7 +124,7 @@ def test_no_forged_header_is_taken() -> None:
     before = replica.doc.get_update()
     for _ in range(10_000):
         client, clock = chance.randint(1, 39), chance.choice([1, 1, 2, 50, 2**31 - 2])
-        with pytest.raises(Foreign):
+        with pytest.raises(ForeignClient):
             replica.take(forge.entry(client, clock, "forged", "x"), "eve")
     assert replica.doc.get_update() == before
     assert replica.waiting == ()

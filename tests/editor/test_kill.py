@@ -66,7 +66,7 @@ class Writer:
         while True:
             frame = await session.receive_bytes()
             if frame[0] == messages.ACKS:
-                durable = messages.Reader(frame[1:]).number()
+                durable = messages.ByteReader(frame[1:]).number()
                 self.acknowledged = max([self.acknowledged, *sent[:durable]])
                 for _ in range(random.randint(1, 4)):
                     sent.append(await self._next(session))

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from action_assistant.editor.app import open_services
-from action_assistant.editor.interchange.action_uses import Known
+from action_assistant.editor.interchange.action_uses import LibraryAction
 from action_assistant.editor.services import EditorServices
 from action_assistant.settings import EditorSettings
 
@@ -33,11 +33,11 @@ def settings(tmp_path: Path) -> EditorSettings:
     return EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
 
 
-async def known(services: EditorServices) -> list[Known]:
-    return msgspec.json.decode(await services.library.all(), type=list[Known])
+async def known(services: EditorServices) -> list[LibraryAction]:
+    return msgspec.json.decode(await services.library.all(), type=list[LibraryAction])
 
 
-def only(known: list[Known], name: str) -> Known:
+def only(known: list[LibraryAction], name: str) -> LibraryAction:
     (found,) = [each for each in known if each.name == name]
     return found
 

@@ -52,7 +52,7 @@ async def test_the_list_says_who_is_in_a_graph_now(tmp_path: Path) -> None:
             here = [Client("mari"), Client("ada"), Client("ada")]
             for number, client in enumerate(here, start=1):
                 client.join(room)
-                client.deliver(messages.presence([messages.Entry(number, 1, b"{}")]))
+                client.deliver(messages.presence([messages.PresenceEntry(number, 1, b"{}")]))
             await asyncio.sleep(0)
             view = await services.catalogue.get(made.id)
             assert [person.name for person in view.people] == ["Ada", "Mari"]
@@ -72,14 +72,14 @@ async def test_a_graph_of_which_nothing_can_be_found_out_stays_in_the_list_with_
         made, _ = await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
         others = {view.id for view in await services.catalogue.all()} - {made.id}
     async with open_services(settings) as services:
-        asked = services.sights._run_in_worker
+        asked = services.graph_reader._run_in_worker
 
         async def ask(work: Any, *values: Any) -> Any:
             if getattr(values[0], "graph", "") == made.id:
                 raise GaveUp("This took longer than it may.")
             return await asked(work, *values)
 
-        services.sights._run_in_worker = ask
+        services.graph_reader._run_in_worker = ask
         views = {view.id: view for view in await services.catalogue.all()}
         assert views.keys() == others | {made.id}
         assert (views[made.id].name, views[made.id].problems) == (made.name, None)

@@ -115,7 +115,7 @@ def test_a_file_with_too_much_is_refused_with_the_place(
     assert len(http.get("/api/graphs").json()) == before
 
 
-@pytest.mark.parametrize("way", [importing.brought, importing.preview, importing.pieces])
+@pytest.mark.parametrize("way", [importing.imported, importing.preview, importing.pieces])
 def test_a_file_whose_actions_say_too_much_together_is_refused(
     way: Callable[[bytes], object], monkeypatch: pytest.MonkeyPatch
 ) -> None:

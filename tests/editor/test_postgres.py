@@ -58,7 +58,7 @@ class Hand:
         await session.send_bytes(messages.question(self.doc.get_state()))
         while True:
             frame = await session.receive_bytes()
-            if frame[0] == messages.ACKS and messages.Reader(frame[1:]).number() > 0:
+            if frame[0] == messages.ACKS and messages.ByteReader(frame[1:]).number() > 0:
                 return
             match frame[0] == messages.SYNC and messages.parse(frame):
                 case messages.Question(state):

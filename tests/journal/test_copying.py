@@ -38,9 +38,9 @@ async def filled(url: str, events: int = 300) -> None:
     dice = random.Random(7)
     for number in range(events // 3):
         graph, name = f"g{number % 20}", f"Zoë {number} 🤖\x01'\""
-        made = h.draft(h.CREATED, "ann", h.Created(name, "what it does"))
+        made = h.draft(h.CREATED, "ann", h.GraphCreated(name, "what it does"))
         additions = [
-            Addition(h.PEOPLE, (h.draft(h.NAMED, f"p{number % 7}", h.Named(name)),)),
+            Addition(h.PEOPLE, (h.draft(h.NAMED, f"p{number % 7}", h.PersonNamed(name)),)),
             Addition(
                 h.graph_stream(graph), (h.Draft(h.UPDATED, "ben", dice.randbytes(number * 20)),)
             ),
@@ -95,7 +95,7 @@ async def test_what_is_written_meanwhile_is_in_the_copy_wholly_or_not_at_all(
 
     async def write() -> None:
         for number in range(10_000):
-            names = [h.draft(h.NAMED, f"w{number}", h.Named(str(number)))] * 3
+            names = [h.draft(h.NAMED, f"w{number}", h.PersonNamed(str(number)))] * 3
             await journal.append(h.PEOPLE, names)
 
     writing = asyncio.create_task(write())

@@ -10,7 +10,7 @@ from action_assistant.runner.emulator.messages import EngineTraits, index_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, EXIT, Conditions, Graph, Relation
-from action_assistant.umrf.semantics import NodeState, script_from
+from action_assistant.umrf.semantics import NodeStateEvent, script_from
 from runner import world
 from runner.air import now_ms
 from runner.record_streams import Place
@@ -82,11 +82,11 @@ async def _lived(graph: Graph, script: dict[str, Any], air: Air, stop: float | N
         born_ms=now_ms(),
         epoch_ms=world.EPOCH // 1000,
     )
-    traces: list[NodeState] = []
+    traces: list[NodeStateEvent] = []
     take = robot._take
 
     def overheard(told: Any) -> None:
-        traces.extend(each for each in told if isinstance(each, NodeState))
+        traces.extend(each for each in told if isinstance(each, NodeStateEvent))
         take(told)
 
     robot._take = overheard  # type: ignore[method-assign]
@@ -119,7 +119,7 @@ async def _started(place: Place, graph: Graph) -> str:
     raise AssertionError("it could not be started")
 
 
-def _real(name: str, traces: list[NodeState], script: dict[str, Any]) -> list[Real]:
+def _real(name: str, traces: list[NodeStateEvent], script: dict[str, Any]) -> list[Real]:
     """When the code of an action ran. One that ignores stop goes on after the engine has given up."""
     found: list[Real] = []
     state = ""

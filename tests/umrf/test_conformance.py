@@ -19,7 +19,7 @@ from action_assistant.umrf.check import refused_by_parser
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Signature
-from action_assistant.umrf.semantics import Behaviour, Engine, EngineRefused, Script, Trace
+from action_assistant.umrf.semantics import Behaviour, Engine, GraphRefused, Script, Trace
 
 ROOT = Path(__file__).parents[2]
 SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared"))
@@ -194,7 +194,7 @@ def driven(name: str, lines: list[dict[str, Any]], script: Script, until_ms: flo
             continue
         verb, *names = line["op"].split()
         traces += engine.advance(line["t_ms"])
-        with suppress(EngineRefused):
+        with suppress(GraphRefused):
             match verb:
                 case "startGraphA" | "startGraph":
                     reading = reading_of(names[0] if ".json" in names[0] else name)

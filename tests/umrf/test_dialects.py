@@ -177,7 +177,7 @@ def ends(text: str, work_s: float) -> str:
     behaviours = {name: [{"after_s": after}] for name, after in times.items()}
     script = semantics.script_from({"behaviours": behaviours})
     trace = semantics.simulate(graph, script=script, facts=SIMULATED, until_ms=3_600_000)
-    return [event.state for event in trace if isinstance(event, semantics.GraphState)][-1]
+    return [event.state for event in trace if isinstance(event, semantics.GraphStateEvent)][-1]
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from action_assistant.umrf.check import blocking, check, check_reading
 from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import Graph, Signature
-from action_assistant.umrf.semantics import Engine, EngineRefused
+from action_assistant.umrf.semantics import Engine, GraphRefused
 
 ROOT = Path(__file__).parents[2]
 SHARED = Path(os.environ.get("UMRF_SHARED", ROOT.parent / "shared")) / "umrf" / "traces"
@@ -127,7 +127,7 @@ def test_a_sub_graph_is_used_up_for_what_the_engine_resolves_after_it(
         engine.start(outer, 0.0)
         return
     assert problems[0].where.path == f"/actions/{len(names) - 1}/name"
-    with pytest.raises(EngineRefused, match="Could not resolve graph 'outer'"):
+    with pytest.raises(GraphRefused, match="Could not resolve graph 'outer'"):
         engine.start(outer, 0.0)
 
 

@@ -169,7 +169,7 @@ def test_a_viewer_hears_everything_and_changes_nothing(product: Product, graph: 
         assert isinstance(first, messages.Edit)  # its own answer, and no step 1 before it
         viewer.send(messages.answer(messages.NOTHING_NEW))
         viewer.send(
-            messages.presence([messages.Entry(77, 1, b'{"user":{"name":"Somebody else"}}')])
+            messages.presence([messages.PresenceEntry(77, 1, b'{"user":{"name":"Somebody else"}}')])
         )
         said = heard(owner, messages.Presence)
         assert json.loads(said.entries[0].state)["user"]["name"] == "Viewer"

@@ -254,7 +254,7 @@ def _simulate(options: argparse.Namespace) -> int:
         cut_off = None
         for event in trace:
             _report(event, as_json=options.trace)
-            if isinstance(event, semantics.Hazard) and event.code == semantics.CUT_OFF:
+            if isinstance(event, semantics.HazardEvent) and event.code == semantics.CUT_OFF:
                 cut_off = event
     except codec.Unreadable as error:
         print(_refusal(options.file, error), file=sys.stderr)
@@ -308,19 +308,19 @@ def _actions(folder: Path) -> Mapping[str, Signature]:
 
 
 def _report(event: semantics.Trace, *, as_json: bool) -> None:
-    if isinstance(event, semantics.NodeResult):
+    if isinstance(event, semantics.NodeResultEvent):
         return  # what an action answered is ours to know; the engine sends no such thing
     if as_json:
         print(msgspec.json.encode(event).decode())
         return
     match event:
-        case semantics.NodeState(t_ms=at, graph=graph, node=node, state=state):
+        case semantics.NodeStateEvent(t_ms=at, graph=graph, node=node, state=state):
             print(f"{at / 1000:10.3f} s  {graph}  {node}: {state}")
-        case semantics.GraphState(t_ms=at, graph=graph, state=state):
+        case semantics.GraphStateEvent(t_ms=at, graph=graph, state=state):
             print(f"{at / 1000:10.3f} s  {graph}: {state}")
-        case semantics.GraphResult(t_ms=at, graph=graph, value=value):
+        case semantics.GraphResultEvent(t_ms=at, graph=graph, value=value):
             print(f"{at / 1000:10.3f} s  {graph} ends with {value}")
-        case semantics.Hazard(t_ms=at, graph=graph, code=code, node=node, message=message):
+        case semantics.HazardEvent(t_ms=at, graph=graph, code=code, node=node, message=message):
             who = f"  {node}" if node else ""
             print(f"{at / 1000:10.3f} s  {graph}{who}: hazard {code}: {message}")
         case _:

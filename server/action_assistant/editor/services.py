@@ -1,8 +1,8 @@
 """What one editor process is made of."""
 
 from action_assistant.editor.catalogue.catalogue import Catalogue
-from action_assistant.editor.catalogue.graph_reader import Sights
-from action_assistant.editor.catalogue.history import History
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.catalogue.history import GraphHistory
 from action_assistant.editor.catalogue.invitations import Invitations
 from action_assistant.editor.catalogue.library import Library
 from action_assistant.editor.catalogue.people import People
@@ -37,12 +37,12 @@ class EditorServices:
         self.rooms = Rooms(journal, run_in_worker=workers.graphs, tried=workers.edits)
         self.connection_limits = ConnectionLimits(limits=settings.limits)
         self.rate_limits = ByteRateLimits(limits=settings.limits)
-        self.sights = Sights(journal, self.rooms, workers.graphs)
-        self.catalogue = Catalogue(journal, self.rooms, self.sights, workers.files)
-        self.versions = Versions(journal, self.sights)
-        self.library = Library(journal, self.sights)
+        self.graph_reader = GraphReader(journal, self.rooms, workers.graphs)
+        self.catalogue = Catalogue(journal, self.rooms, self.graph_reader, workers.files)
+        self.versions = Versions(journal, self.graph_reader)
+        self.library = Library(journal, self.graph_reader)
         self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)
-        self.history = History(journal, people, self.versions)
+        self.history = GraphHistory(journal, people, self.versions)
 
 
 class EditorState:

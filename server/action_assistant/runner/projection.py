@@ -8,7 +8,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Event
 from action_assistant.runner.analysis import annotations, expected_runs
-from action_assistant.runner.robots.registration import Registered, Removed
+from action_assistant.runner.robots.registration import RobotRegistered, RobotRemoved
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     Answered,
@@ -27,14 +27,14 @@ from action_assistant.schema.runner_tables import review, robot, run
 
 def fold(event: Event) -> Sequence[Executable]:
     """What an event means for the tables."""
-    if event.kind == Registered.kind:
-        return (_robot(msgspec.json.decode(event.body, type=Registered)),)
+    if event.kind == RobotRegistered.kind:
+        return (_robot(msgspec.json.decode(event.body, type=RobotRegistered)),)
     if annotations.is_about(event.stream):
         return annotations.fold(event)
     if event.stream == expected_runs.STREAM:
         return expected_runs.fold(event)
-    if event.kind == Removed.kind:
-        gone = msgspec.json.decode(event.body, type=Removed)
+    if event.kind == RobotRemoved.kind:
+        gone = msgspec.json.decode(event.body, type=RobotRemoved)
         return (update(robot).where(robot.c.name == gone.name).values(retired_at=gone.at),)
     if not event.stream.startswith("run/"):
         return ()
@@ -114,7 +114,7 @@ def _run(asked: Requested) -> Executable:
     )
 
 
-def _robot(robot_: Registered) -> Executable:
+def _robot(robot_: RobotRegistered) -> Executable:
     values = {
         "domain": robot_.domain,
         "rmw": robot_.rmw,

@@ -44,7 +44,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def rehearse(graph_id: str, data: Rehearsing) -> Rehearsal:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        sight = await services.sights.moment(graph_id, data.seq)
+        sight = await services.graph_reader.moment(graph_id, data.seq)
         played: Rehearsal = encoded(await services.workers.files(rehearsed, sight, data))
         return played
 

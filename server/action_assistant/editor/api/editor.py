@@ -12,7 +12,7 @@ from litestar.response import ServerSentEvent, ServerSentEventMessage
 from litestar.types import ControllerRouterHandler
 
 from action_assistant import paths
-from action_assistant.editor.interchange.action_uses import Known
+from action_assistant.editor.interchange.action_uses import LibraryAction
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.presence import colour_of
 from action_assistant.editor.services import EditorState
@@ -34,7 +34,7 @@ class Config(msgspec.Struct, frozen=True):
     runner_url: str
 
 
-class Happened(msgspec.Struct, frozen=True, omit_defaults=True):
+class StoredEvent(msgspec.Struct, frozen=True, omit_defaults=True):
     """Something that was stored. `seq` counts in `stream`."""
 
     position: int
@@ -95,8 +95,8 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         summary="The actions that all graphs together know, by name",
         operation_id="listActions",
     )
-    async def list_actions() -> list[Known]:
-        known: list[Known] = encoded(await app_state.services.library.all())
+    async def list_actions() -> list[LibraryAction]:
+        known: list[LibraryAction] = encoded(await app_state.services.library.all())
         return known
 
     @get(
@@ -145,7 +145,7 @@ async def _told(app_state: EditorState, after: int | None) -> AsyncIterator[Serv
 
 
 def _message(app_state: EditorState, event: Event) -> ServerSentEventMessage:
-    happened = Happened(
+    happened = StoredEvent(
         event.position,
         event.stream,
         event.seq,

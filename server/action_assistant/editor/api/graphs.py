@@ -9,11 +9,11 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.catalogue.catalogue import GraphView
-from action_assistant.editor.catalogue.history import Entry
+from action_assistant.editor.catalogue.history import HistoryEntry
 from action_assistant.editor.documents import contents
 from action_assistant.editor.interchange import importing
-from action_assistant.editor.interchange.edited_text import Rewriting, rewritten
-from action_assistant.editor.interchange.importing import Preview, Reading
+from action_assistant.editor.interchange.edited_text import TextEdit, edited_text
+from action_assistant.editor.interchange.importing import ImportReport, Preview
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
@@ -29,7 +29,7 @@ Seq = Annotated[int, Parameter(ge=1)]
 class MadeGraph(GraphView, frozen=True, omit_defaults=True):
     """A new graph; `reading` is there when it was read from a file."""
 
-    reading: Reading | None = None
+    reading: ImportReport | None = None
 
 
 class Describing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -135,8 +135,8 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def get_umrf(graph_id: str, at: Seq | None = None) -> Response[bytes]:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        sight = await services.sights.moment(graph_id, at)
-        text = await services.sights.ask(contents.umrf, sight)
+        sight = await services.graph_reader.moment(graph_id, at)
+        text = await services.graph_reader.ask(contents.umrf, sight)
         return Response(text, media_type="application/json", headers={"x-seq": str(sight.seq)})
 
     @get(
@@ -147,8 +147,8 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def get_problems(graph_id: str, seq: Seq | None = None) -> Problems:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        sight = await services.sights.moment(graph_id, seq)
-        return Problems(sight.seq, encoded(await services.sights.problems(sight)))
+        sight = await services.graph_reader.moment(graph_id, seq)
+        return Problems(sight.seq, encoded(await services.graph_reader.problems(sight)))
 
     @post(
         "/api/graphs/{graph_id:str}/rewriting",
@@ -158,12 +158,12 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
         request_max_body_size=BODY_LIMIT,
     )
-    async def get_rewriting(graph_id: str, seq: Seq, request: Asking) -> Rewriting:
+    async def get_rewriting(graph_id: str, seq: Seq, request: Asking) -> TextEdit:
         services = app_state.services
         text = await request.body()
         await services.catalogue.require(graph_id)
-        then = await services.sights.at(graph_id, seq)
-        answer: Rewriting = encoded(await services.workers.files(rewritten, then, text))
+        then = await services.graph_reader.at(graph_id, seq)
+        answer: TextEdit = encoded(await services.workers.files(edited_text, then, text))
         return answer
 
     return [get_umrf, get_problems, get_rewriting]
@@ -179,7 +179,7 @@ def _past(app_state: EditorState) -> list[ControllerRouterHandler]:
         graph_id: str,
         limit: Annotated[int, Parameter(ge=1, le=1000)] = 100,
         before: Seq | None = None,
-    ) -> list[Entry]:
+    ) -> list[HistoryEntry]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         return await services.history.of(graph_id, limit=limit, before=before)
@@ -196,9 +196,11 @@ def _past(app_state: EditorState) -> list[ControllerRouterHandler]:
     ) -> Difference:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        then = await services.sights.at(graph_id, before)
-        later = await services.sights.moment(graph_id, after)
-        found: Difference = encoded(await services.sights.ask(contents.differing, then, later))
+        then = await services.graph_reader.at(graph_id, before)
+        later = await services.graph_reader.moment(graph_id, after)
+        found: Difference = encoded(
+            await services.graph_reader.ask(contents.differing, then, later)
+        )
         return found
 
     @post(
@@ -212,14 +214,14 @@ def _past(app_state: EditorState) -> list[ControllerRouterHandler]:
         services, person = app_state.services, person_of(request)
         await services.catalogue.require(graph_id)
         await services.people.seen(person)
-        then = await services.sights.at(graph_id, data.seq)
+        then = await services.graph_reader.at(graph_id, data.seq)
         async with services.rooms.enter(h.graph_stream(graph_id)) as room:
             before = room.seq
             seq = await server_edits.restore(
                 room, person.id, then.state, run_in_worker=services.workers.graphs
             )
         if seq > before:
-            restored = h.draft(h.RESTORED, person.id, h.Restored(data.seq, seq))
+            restored = h.draft(h.RESTORED, person.id, h.GraphRestored(data.seq, seq))
             await services.journal.append(h.about_stream(graph_id), [restored])
         return await services.catalogue.get(graph_id)
 

@@ -7,8 +7,8 @@ import msgspec
 from sqlalchemy import Row, Select, select
 
 from action_assistant.editor.catalogue import server_edits
-from action_assistant.editor.catalogue.graph_reader import Sights
-from action_assistant.editor.documents.contents import About, Counts, about_graph
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.documents.contents import Counts, GraphInfo, info_of
 from action_assistant.editor.documents.document import new_aid
 from action_assistant.editor.interchange import changes, importing
 from action_assistant.editor.log import graph_events as h
@@ -59,12 +59,16 @@ class Catalogue:
     """All graphs. Raises NotFound for those that are none, or deleted."""
 
     def __init__(
-        self, journal: Journal, rooms: Rooms, sights: Sights, run_in_worker: RunInWorker = run_here
+        self,
+        journal: Journal,
+        rooms: Rooms,
+        graph_reader: GraphReader,
+        run_in_worker: RunInWorker = run_here,
     ) -> None:
         self._journal = journal
         self._run_in_worker = run_in_worker
         self._rooms = rooms
-        self._sights = sights
+        self._graph_reader = graph_reader
 
     async def require(self, graph: str) -> None:
         """Be sure that there is such a graph."""
@@ -94,20 +98,20 @@ class Catalogue:
             return await self.bring(body, author)
         name, description = _fit(wanted.name, wanted.description)
         graph = Graph(name=name, description=description)
-        made = h.draft(h.CREATED, author, h.Created(name, description))
-        about = about_graph(graph, check(graph))
+        made = h.draft(h.CREATED, author, h.GraphCreated(name, description))
+        about = info_of(graph, check(graph))
         return await self._add(changes.first(graph), about, [made], author), None
 
     async def bring(
         self, body: bytes, author: str, *, run_in_worker: RunInWorker | None = None
     ) -> tuple[GraphView, bytes]:
         """A graph from a UMRF file. The log keeps the file as it came."""
-        found = await (run_in_worker or self._run_in_worker)(importing.brought, body)
+        found = await (run_in_worker or self._run_in_worker)(importing.imported, body)
         about = found.about
         made = h.draft(
             h.CREATED,
             author,
-            h.Created(about.name, about.description, found.dialect, found.notes),
+            h.GraphCreated(about.name, about.description, found.dialect, found.notes),
         )
         drafts = [made, Draft(h.IMPORTED, author, body)]
         return await self._add(found.update, about, drafts, author), found.reading
@@ -144,7 +148,9 @@ class Catalogue:
             await self._journal.append(h.about_stream(graph), [h.draft(h.RECOVERED, author)])
         return await self.get(graph)
 
-    async def _add(self, update: bytes, of: About, about: list[Draft], author: str) -> GraphView:
+    async def _add(
+        self, update: bytes, of: GraphInfo, about: list[Draft], author: str
+    ) -> GraphView:
         made = new_aid()
         document = Draft(h.UPDATED, author, update)
         await self._journal.append_all(
@@ -153,7 +159,7 @@ class Catalogue:
                 Addition(h.graph_stream(made), (document,)),
             ]
         )
-        self._sights.made(made, update, of)
+        self._graph_reader.made(made, update, of)
         return await self.get(made)
 
     async def _row(self, graph: str, *, deleted: bool = False) -> Row[Any]:
@@ -163,11 +169,11 @@ class Catalogue:
         return rows[0]
 
     async def _view(self, row: Row[Any]) -> GraphView:
-        summary = await self._sights.summary(row.id, row.seq)
+        summary = await self._graph_reader.summary(row.id, row.seq)
         name = row.name if summary.name is None else summary.name
         description = row.description if summary.description is None else summary.description
         if (name, description) != (row.name, row.description):
-            now = h.Described(name, description, summary.seq)
+            now = h.GraphDescribed(name, description, summary.seq)
             await self._journal.append(
                 h.about_stream(row.id), [h.draft(h.DESCRIBED, h.SERVER, now)]
             )

@@ -8,9 +8,9 @@ from typing import Any, Final, Generic, TypeVar
 import msgspec
 
 from action_assistant.editor.crdt.loading import stored
-from action_assistant.editor.crdt.replica import Kept
+from action_assistant.editor.crdt.replica import ReplicaState
 from action_assistant.editor.documents import contents
-from action_assistant.editor.documents.contents import About, Counts, Sight
+from action_assistant.editor.documents.contents import Counts, GraphAtSeq, GraphInfo
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
@@ -25,7 +25,7 @@ _REMEMBERED: Final = 32  # moments of graphs
 _COUNTED: Final = 5000
 
 
-class Summary(msgspec.Struct, frozen=True):
+class GraphSummary(msgspec.Struct, frozen=True):
     """What a list shows of a graph. `damaged`: the first change that cannot be read. What is None is
     not known, since finding it out takes more than it may."""
 
@@ -39,7 +39,7 @@ class Summary(msgspec.Struct, frozen=True):
     damaged: int | None = None
 
 
-class Sights:
+class GraphReader:
     """Reads graphs. Nothing that it remembers is needed; it only saves reading again."""
 
     def __init__(
@@ -48,11 +48,11 @@ class Sights:
         self._journal = journal
         self._rooms = rooms
         self._run_in_worker = run_in_worker
-        self._sights = _Recent[tuple[str, int], Sight](_REMEMBERED)
+        self._graph_reader = _Recent[tuple[str, int], GraphAtSeq](_REMEMBERED)
         self._problems = _Recent[tuple[str, int], bytes](_REMEMBERED)
-        self._summaries = _Recent[str, Summary](_COUNTED)
+        self._summaries = _Recent[str, GraphSummary](_COUNTED)
 
-    async def now(self, graph: str) -> Sight:
+    async def now(self, graph: str) -> GraphAtSeq:
         """The graph as it is; of one whose history is damaged, what can be read of it.
 
         Raises Unavailable, NotFound.
@@ -60,17 +60,18 @@ class Sights:
         room = self._rooms.open_room(graph_stream(graph))
         if room is None:
             newest = await self._newest(graph)
-            return self._sights.get((graph, newest)) or await self._loaded(graph, newest)
+            return self._graph_reader.get((graph, newest)) or await self._loaded(graph, newest)
         found = await room.look(
             lambda replica, seq: (
-                self._sights.get((graph, seq)) or Sight(graph, seq, replica.doc.get_update())
+                self._graph_reader.get((graph, seq))
+                or GraphAtSeq(graph, seq, replica.doc.get_update())
             )
         )
-        return self._sights.put((graph, found.seq), found)
+        return self._graph_reader.put((graph, found.seq), found)
 
-    async def at(self, graph: str, seq: int) -> Sight:
+    async def at(self, graph: str, seq: int) -> GraphAtSeq:
         """The graph after its change `seq`. Raises NotFound, Conflict, Unavailable."""
-        known = self._sights.get((graph, seq))
+        known = self._graph_reader.get((graph, seq))
         if known is not None and known.seq == seq:
             return known
         room = self._rooms.open_room(graph_stream(graph))
@@ -92,15 +93,15 @@ class Sights:
             )
         return found
 
-    async def _loaded(self, graph: str, seq: int) -> Sight:
+    async def _loaded(self, graph: str, seq: int) -> GraphAtSeq:
         """The graph after its change `seq`, or after the last one before it that can be read."""
         found = await stored(
             self._journal, graph_stream(graph), seq, learn=False, run_in_worker=self._run_in_worker
         )
-        sight = Sight(graph, found.seq, Kept.state_of(found.document))
-        return self._sights.put((graph, seq), sight)
+        sight = GraphAtSeq(graph, found.seq, ReplicaState.state_of(found.document))
+        return self._graph_reader.put((graph, seq), sight)
 
-    async def moment(self, graph: str, seq: int | None) -> Sight:
+    async def moment(self, graph: str, seq: int | None) -> GraphAtSeq:
         """The graph at `seq`, or as it is."""
         return await (self.now(graph) if seq is None else self.at(graph, seq))
 
@@ -108,7 +109,7 @@ class Sights:
         """The outcome of a function of `contents`, of sights and other values."""
         return await self._run_in_worker(work, *values)
 
-    async def problems(self, sight: Sight) -> bytes:
+    async def problems(self, sight: GraphAtSeq) -> bytes:
         """What is wrong with a graph at a moment, as JSON."""
         key = sight.graph, sight.seq
         found = self._problems.get(key)
@@ -116,22 +117,22 @@ class Sights:
             found = self._problems.put(key, await self._run_in_worker(contents.problems, sight))
         return found
 
-    def made(self, graph: str, state: bytes, about: About) -> None:
+    def made(self, graph: str, state: bytes, about: GraphInfo) -> None:
         """A graph has been made of this document, and this is to be said of it."""
-        self._sights.put((graph, 1), Sight(graph, 1, state))
+        self._graph_reader.put((graph, 1), GraphAtSeq(graph, 1, state))
         self._summaries.put(graph, _summary(1, about))
 
-    async def summary(self, graph: str, newest: int) -> Summary:
+    async def summary(self, graph: str, newest: int) -> GraphSummary:
         """What a list shows of a graph whose last change is `newest`."""
         known = self._summaries.get(graph)
         if known is not None and known.seq >= newest:
             return known
         try:
             sight = await self.now(graph)
-            about = await self._run_in_worker(contents.about, sight)
+            about = await self._run_in_worker(contents.info, sight)
         except HOPELESS as error:  # others are in the list too
             log.error("%s: nothing can be said of change %d: %s", graph, newest, error.detail)
-            nothing = Summary(newest)
+            nothing = GraphSummary(newest)
             # What has died once may have been in somebody's way: the next list tries it again.
             return nothing if isinstance(error, Crashed) else self._summaries.put(graph, nothing)
         return self._summaries.put(graph, _summary(sight.seq, about, newest))
@@ -143,8 +144,8 @@ class Sights:
         return newest
 
 
-def _summary(seq: int, about: About, newest: int = 0) -> Summary:
-    return Summary(
+def _summary(seq: int, about: GraphInfo, newest: int = 0) -> GraphSummary:
+    return GraphSummary(
         seq,
         about.name,
         about.description,

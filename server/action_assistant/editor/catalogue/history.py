@@ -23,7 +23,7 @@ Kind: TypeAlias = Literal[
 ]
 
 
-class Entry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Something that was done to a graph, between `at` and `until`.
 
     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
@@ -40,7 +40,7 @@ class Entry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     version: VersionView | None = None
 
 
-class History:
+class GraphHistory:
     """Tells the past of graphs."""
 
     def __init__(self, journal: Journal, people: People, versions: Versions) -> None:
@@ -48,7 +48,7 @@ class History:
         self._people = people
         self._versions = versions
 
-    async def of(self, graph: str, *, limit: int, before: int | None) -> list[Entry]:
+    async def of(self, graph: str, *, limit: int, before: int | None) -> list[HistoryEntry]:
         """Up to `limit` entries, newest first; with `before` only what was before that change."""
         rows = await self._rows(graph, before)
         versions = await self._versions.by_event(graph)
@@ -77,7 +77,7 @@ class History:
             event.stream == h.about_stream(graph), event.kind == h.RESTORED
         )
         rows = await self._journal.query(chosen)
-        restorings = (msgspec.json.decode(row.body, type=h.Restored) for row in rows)
+        restorings = (msgspec.json.decode(row.body, type=h.GraphRestored) for row in rows)
         return {restored.seq: restored.restored for restored in restorings}
 
 
@@ -86,13 +86,15 @@ def _entries(
     people: People,
     versions: Mapping[int, VersionView],
     restored: Mapping[int, int],
-) -> Iterator[Entry]:
+) -> Iterator[HistoryEntry]:
     """Entries in order of time from events in order of time."""
     seq = 1
-    last: Entry | None = None
+    last: HistoryEntry | None = None
     for row in rows:
         at = h.when(row.at)
-        entry = Entry(kind="edited", author=people.person(row.author), at=at, until=at, seq=seq)
+        entry = HistoryEntry(
+            kind="edited", author=people.person(row.author), at=at, until=at, seq=seq
+        )
         match row.kind:
             case h.UPDATED | h.DEFERRED if row.seq == 1:
                 continue  # what the graph was created with
@@ -126,7 +128,7 @@ def _entries(
         yield last
 
 
-def _same_go(last: Entry, entry: Entry) -> bool:
+def _same_go(last: HistoryEntry, entry: HistoryEntry) -> bool:
     return (
         last.kind == "edited"
         and last.author == entry.author

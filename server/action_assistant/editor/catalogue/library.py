@@ -2,8 +2,8 @@
 
 from sqlalchemy import select
 
-from action_assistant.editor.catalogue.graph_reader import Sights
-from action_assistant.editor.interchange.action_uses import NOTHING, Use, merged, used
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.interchange.action_uses import NOTHING, GraphUse, merged, used
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.web.workers.lanes import HOPELESS
@@ -12,9 +12,9 @@ from action_assistant.web.workers.lanes import HOPELESS
 class Library:
     """Reads a graph again only when it has changed."""
 
-    def __init__(self, journal: Journal, sights: Sights) -> None:
+    def __init__(self, journal: Journal, graph_reader: GraphReader) -> None:
         self._journal = journal
-        self._sights = sights
+        self._graph_reader = graph_reader
         self._read: dict[str, tuple[int, bytes]] = {}
         self._shown: tuple[dict[str, int], bytes] = {}, b"[]"
 
@@ -44,16 +44,16 @@ class Library:
         if self._shown[0] != seqs:
             self._read = {row.id: self._read[row.id] for row in rows}
             newest_first = sorted(rows, key=lambda row: row.at, reverse=True)
-            uses = [(Use(row.id, row.made_at), self._read[row.id][1]) for row in newest_first]
-            self._shown = seqs, await self._sights.ask(merged, uses)
+            uses = [(GraphUse(row.id, row.made_at), self._read[row.id][1]) for row in newest_first]
+            self._shown = seqs, await self._graph_reader.ask(merged, uses)
         return self._shown[1]
 
     async def _refresh(self, graph: str, seq: int) -> None:
         known = self._read.get(graph)
         if known is None or known[0] < seq:
             try:
-                sight = await self._sights.now(graph)
-                seq, actions = sight.seq, await self._sights.ask(used, sight)
+                sight = await self._graph_reader.now(graph)
+                seq, actions = sight.seq, await self._graph_reader.ask(used, sight)
             except HOPELESS:
                 actions = NOTHING
             self._read[graph] = seq, actions

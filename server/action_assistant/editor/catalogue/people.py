@@ -2,7 +2,14 @@
 
 from sqlalchemy import select
 
-from action_assistant.editor.log.graph_events import EXAMPLES, NAMED, PEOPLE, SERVER, Named, draft
+from action_assistant.editor.log.graph_events import (
+    EXAMPLES,
+    NAMED,
+    PEOPLE,
+    SERVER,
+    PersonNamed,
+    draft,
+)
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
@@ -31,7 +38,7 @@ class People:
         before = self._names.get(person.id)
         self._names[person.id] = person.name
         try:
-            await self._journal.append(PEOPLE, [draft(NAMED, person.id, Named(person.name))])
+            await self._journal.append(PEOPLE, [draft(NAMED, person.id, PersonNamed(person.name))])
         except Unavailable:  # it is told when they act next
             self._names.pop(person.id)
             if before is not None:

@@ -6,7 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row, select
 
-from action_assistant.editor.catalogue.graph_reader import Sights
+from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents import contents
 from action_assistant.editor.documents.document import new_aid
 from action_assistant.editor.log import graph_events as h
@@ -35,9 +35,9 @@ class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
 class Versions:
     """All versions of all graphs."""
 
-    def __init__(self, journal: Journal, sights: Sights) -> None:
+    def __init__(self, journal: Journal, graph_reader: GraphReader) -> None:
         self._journal = journal
-        self._sights = sights
+        self._graph_reader = graph_reader
 
     async def publish(
         self, graph: str, author: PersonRef, *, label: str = "", seq: int | None = None
@@ -50,14 +50,14 @@ class Versions:
         label = " ".join(label.split())
         if len(label) > LABEL_LIMIT:
             raise BadInput(f"A label has up to {LABEL_LIMIT} characters.", where={"path": "/label"})
-        sight = await self._sights.moment(graph, seq)
+        sight = await self._graph_reader.moment(graph, seq)
         if not label:
             for row in await self._rows(graph, sight.seq):
                 return await self.get(row.id), False
         made = new_aid()
         stamp = codec.Stamp(graph=graph, version=made, run=None)
-        digest, text = await self._sights.ask(contents.released, sight, stamp)
-        published = h.Published(
+        digest, text = await self._graph_reader.ask(contents.released, sight, stamp)
+        published = h.VersionPublished(
             id=made,
             label=label,
             digest=digest,
@@ -78,7 +78,7 @@ class Versions:
             raise NotFound(f"There is no version {version!r}.")
         row = rows[0]
         (event,) = await self._journal.read(row.stream, after=row.event_seq - 1, upto=row.event_seq)
-        published = msgspec.json.decode(event.body, type=h.Published)
+        published = msgspec.json.decode(event.body, type=h.VersionPublished)
         return msgspec.structs.replace(_view(row), umrf=published.umrf)
 
     async def of(self, graph: str) -> list[VersionView]:

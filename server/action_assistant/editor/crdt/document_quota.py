@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from pycrdt import Doc, Map
 
-from action_assistant.editor.crdt.update_scan import Outline
+from action_assistant.editor.crdt.update_scan import UpdateOutline
 from action_assistant.editor.documents.values import ROOTS
 from action_assistant.errors import TooLarge
 from action_assistant.umrf.model import ENTRY, EXIT, Graph
@@ -92,7 +92,7 @@ class DocumentQuota:
         self._fields_changed = True
         self._changed = True  # since actions were counted
 
-    def check(self, update: bytes, read: Outline) -> None:
+    def check(self, update: bytes, read: UpdateOutline) -> None:
         """Raises Full for an update that brings too much. Only deletions never do."""
         if read.actions > self._spare and self._changed:
             self._changed = False

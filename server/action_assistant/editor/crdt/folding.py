@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import msgspec
 
 from action_assistant.editor.crdt.messages import Malformed
-from action_assistant.editor.crdt.replica import Kept, Panicked, Replica
+from action_assistant.editor.crdt.replica import Panicked, Replica, ReplicaState
 from action_assistant.errors import Unavailable
 from action_assistant.journal.events import Event
 
 
-class Damaged(msgspec.Struct, frozen=True):
+class StreamDamage(msgspec.Struct, frozen=True):
     """A stream is sound before its event `seq`, and not at it."""
 
     seq: int
@@ -22,18 +22,18 @@ class Folded(msgspec.Struct, frozen=True):
 
     document: bytes
     seq: int
-    damaged: Damaged | None = None
+    damaged: StreamDamage | None = None
 
 
 def fold(document: bytes, events: Sequence[Event], learn: bool) -> Folded | None:
     """A document, as the bytes of a snapshot or nothing, after some events that follow it; None when
     these bytes are no document."""
-    replica = Kept.replica(document) if document else Replica()
+    replica = ReplicaState.replica(document) if document else Replica()
     if replica is None:
         return None
     try:
         replica.replay(events, learn=learn)
-        return Folded(Kept.of(replica), events[-1].seq)
+        return Folded(ReplicaState.of(replica), events[-1].seq)
     except (Malformed, Panicked):
         return _before_the_bad(document, events, learn=learn)
     finally:
@@ -45,21 +45,21 @@ def _before_the_bad(document: bytes, events: Sequence[Event], *, learn: bool) ->
     is not gone on with."""
     bad, why = _first_bad(document, events)
     good = events[:bad]
-    damaged = Damaged(events[bad].seq, why)
+    damaged = StreamDamage(events[bad].seq, why)
     if not good:
         return Folded(document, events[bad].seq - 1, damaged)
-    replica = Kept.replica(document) if document else Replica()
+    replica = ReplicaState.replica(document) if document else Replica()
     assert replica is not None
     try:
         replica.replay(good, learn=learn)
-        return Folded(Kept.of(replica), good[-1].seq, damaged)
+        return Folded(ReplicaState.of(replica), good[-1].seq, damaged)
     finally:
         replica.close()
 
 
 def _first_bad(document: bytes, events: Sequence[Event]) -> tuple[int, str]:
     """Which of these events cannot be applied, and why."""
-    replica = Kept.replica(document) if document else Replica()
+    replica = ReplicaState.replica(document) if document else Replica()
     assert replica is not None
     try:
         for n, event in enumerate(events):

@@ -5,9 +5,9 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.editor.crdt.folding import Damaged, fold
-from action_assistant.editor.crdt.log_tail import Tail
-from action_assistant.editor.crdt.replica import Kept, Replica
+from action_assistant.editor.crdt.folding import StreamDamage, fold
+from action_assistant.editor.crdt.log_tail import LogTail
+from action_assistant.editor.crdt.replica import Replica, ReplicaState
 from action_assistant.errors import Unavailable
 from action_assistant.journal.events import StreamSnapshot
 from action_assistant.journal.journal import Journal
@@ -27,7 +27,7 @@ class Loaded(msgspec.Struct, frozen=True):
     replica: Replica
     seq: int
     kept: int
-    damaged: Damaged | None = None
+    damaged: StreamDamage | None = None
 
 
 class Stored(msgspec.Struct, frozen=True):
@@ -36,7 +36,7 @@ class Stored(msgspec.Struct, frozen=True):
     document: bytes
     seq: int
     kept: int
-    damaged: Damaged | None = None
+    damaged: StreamDamage | None = None
 
 
 async def load(
@@ -53,12 +53,12 @@ async def load(
     """
     learn = upto is None if learn is None else learn
     found = await stored(journal, stream, upto, learn=learn, run_in_worker=run_in_worker)
-    replica = Kept.replica(found.document) if found.document else Replica()
+    replica = ReplicaState.replica(found.document) if found.document else Replica()
     if replica is None:  # a snapshot that cannot be read, and nothing after it
         found = await _followed(
             journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker
         )
-        replica = Kept.replica(found.document) if found.document else Replica()
+        replica = ReplicaState.replica(found.document) if found.document else Replica()
     if replica is None:
         raise Unavailable(f"{stream} reads otherwise each time.")
     return Loaded(replica, found.seq, found.kept, found.damaged)
@@ -81,7 +81,7 @@ async def stored(
         found = await _followed(
             journal, stream, snapshot, upto, learn=learn, run_in_worker=run_in_worker
         )
-        if Kept.is_form_of(found.document):
+        if ReplicaState.is_form_of(found.document):
             return found
     return await _followed(journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker)
 
@@ -97,7 +97,7 @@ async def _followed(
 ) -> Stored:
     """A snapshot, or nothing, and the events after it."""
     start, document = (0, b"") if snapshot is None else (snapshot.seq, snapshot.state)
-    tail = Tail(journal, stream, start, upto)
+    tail = LogTail(journal, stream, start, upto)
     while events := await tail.next():
         size = len(document) + sum(len(event.body) for event in events)
         folded = await (run_here if size <= _SMALL else run_in_worker)(

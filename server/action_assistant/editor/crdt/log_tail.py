@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from sqlalchemy import Select, select
 
-from action_assistant.editor.crdt.folding import Damaged
+from action_assistant.editor.crdt.folding import StreamDamage
 from action_assistant.errors import Unavailable
 from action_assistant.journal.chain import START, link
 from action_assistant.journal.events import Event
@@ -20,12 +20,12 @@ _COLUMNS: Final = (*Event.__struct_fields__, "chain")
 _TYPES: Final = (str, int, str, str, int, bytes, int, bytes)
 
 
-class Tail:
+class LogTail:
     """Reads on from `after`. At the end `damaged` says whether that was the end of the stream."""
 
     def __init__(self, journal: Journal, stream: str, after: int, upto: int | None) -> None:
         self.seq = after
-        self.damaged: Damaged | None = None
+        self.damaged: StreamDamage | None = None
         self._journal = journal
         self._stream = stream
         self._upto = upto
@@ -99,7 +99,7 @@ class Tail:
             self._stop("it is missing")
 
     def _stop(self, why: str) -> None:
-        self.damaged = Damaged(self.seq + 1, why)
+        self.damaged = StreamDamage(self.seq + 1, why)
         log.error("%s %d is damaged: %s", self._stream, self.seq + 1, why)
 
 

@@ -64,7 +64,7 @@ class Edit(msgspec.Struct, frozen=True):
     update: bytes
 
 
-class Entry(msgspec.Struct, frozen=True):
+class PresenceEntry(msgspec.Struct, frozen=True):
     """What one client says about itself. `state` is JSON text; `null` means gone."""
 
     client: int
@@ -75,14 +75,14 @@ class Entry(msgspec.Struct, frozen=True):
 class Presence(msgspec.Struct, frozen=True):
     """Awareness entries."""
 
-    entries: tuple[Entry, ...]
+    entries: tuple[PresenceEntry, ...]
 
 
 class WhoIsThere(msgspec.Struct, frozen=True):
     """Query awareness."""
 
 
-class Comparison(msgspec.Struct, frozen=True):
+class CompareMessage(msgspec.Struct, frozen=True):
     """What the client shows at `seq`, as a fingerprint (`sameness`)."""
 
     seq: int
@@ -90,10 +90,10 @@ class Comparison(msgspec.Struct, frozen=True):
     total: int
 
 
-Message: TypeAlias = Question | Edit | Presence | WhoIsThere | Comparison
+Message: TypeAlias = Question | Edit | Presence | WhoIsThere | CompareMessage
 
 
-class Reader:
+class ByteReader:
     """Reads lib0's variable-length encoding. Raises Malformed past the end."""
 
     def __init__(self, data: bytes) -> None:
@@ -147,7 +147,7 @@ class Reader:
 
 def parse(data: bytes) -> Message | None:
     """A message; None for kinds that we do not know. Raises Malformed."""
-    reader = Reader(data)
+    reader = ByteReader(data)
     kind = reader.number()
     if kind == SYNC:
         return _sync(reader)
@@ -156,11 +156,11 @@ def parse(data: bytes) -> Message | None:
     if kind == QUERY_AWARENESS:
         return WhoIsThere()
     if kind == COMPARE:
-        return Comparison(reader.number(), reader.number(), reader.number())
+        return CompareMessage(reader.number(), reader.number(), reader.number())
     return None
 
 
-def _sync(reader: Reader) -> Message:
+def _sync(reader: ByteReader) -> Message:
     step = reader.number()
     if step == STEP_1:
         return Question(reader.text())
@@ -169,10 +169,10 @@ def _sync(reader: Reader) -> Message:
     raise Malformed(f"there is no sync message {step}")
 
 
-def _entries(data: bytes) -> Iterable[Entry]:
-    reader = Reader(data)
+def _entries(data: bytes) -> Iterable[PresenceEntry]:
+    reader = ByteReader(data)
     for _ in range(reader.number()):
-        yield Entry(reader.number(), reader.number(), reader.text())
+        yield PresenceEntry(reader.number(), reader.number(), reader.text())
 
 
 def number(value: int) -> bytes:
@@ -205,7 +205,7 @@ def change(update: bytes) -> bytes:
     return bytes((SYNC, UPDATE)) + text(update)
 
 
-def presence(entries: Iterable[Entry]) -> bytes:
+def presence(entries: Iterable[PresenceEntry]) -> bytes:
     """Awareness entries."""
     packed = [number(e.client) + number(e.clock) + text(e.state) for e in entries]
     return bytes((AWARENESS,)) + text(number(len(packed)) + b"".join(packed))

@@ -11,9 +11,9 @@ import msgspec
 from pycrdt import Doc, get_update
 
 from action_assistant.editor.crdt.document_quota import DocumentQuota
-from action_assistant.editor.crdt.messages import NOTHING_NEW, Malformed, Reader
+from action_assistant.editor.crdt.messages import NOTHING_NEW, ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Nesting
-from action_assistant.editor.crdt.update_scan import Outline, outline
+from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
 from action_assistant.editor.log.document_events import DEFERRED, UPDATED
 from action_assistant.journal.events import Event
 
@@ -23,7 +23,7 @@ WAITING_BYTES: Final = 4 << 20  # of one author, for something that may never co
 WAITING_UPDATES: Final = 256
 
 
-class Brought(Enum):
+class UpdateEffect(Enum):
     """What an update did to a document."""
 
     NEWS = "changed it"
@@ -31,7 +31,7 @@ class Brought(Enum):
     WAITS = "waits for an earlier one"
 
 
-class Foreign(Exception):
+class ForeignClient(Exception):
     """An update brings something in the name of a client that belongs to another person."""
 
 
@@ -58,7 +58,7 @@ class Replica:
         self._quota = DocumentQuota(self.doc)
         self._known: dict[int, int] = {}
         self._fired = False
-        self._waiting: dict[bytes, tuple[Outline, str]] = {}
+        self._waiting: dict[bytes, tuple[UpdateOutline, str]] = {}
         self._released: list[bytes] = []
         self._subscription = self.doc.observe(self._observed)
 
@@ -67,20 +67,20 @@ class Replica:
         update: bytes,
         author: str,
         holder: Callable[[int], str | None] = lambda _: None,
-        read: Outline | None = None,
-    ) -> Brought:
+        read: UpdateOutline | None = None,
+    ) -> UpdateEffect:
         """Apply an update. `holder` may know whose a client is that has written nothing yet; `read`
         is its outline, where that is known.
 
         Raises Malformed, Foreign, Full, TooMuchWaits, Panicked; the document is then as before.
         """
         if update in self._waiting:
-            return Brought.NOTHING
+            return UpdateEffect.NOTHING
         read = read or outline(update)
         new = {client for client, _, end in read.brings if end > self._known.get(client, 0)}
         for client in new:
             if (self.owners.get(client) or holder(client) or author) != author:
-                raise Foreign(f"client {client} is not {author}'s")
+                raise ForeignClient(f"client {client} is not {author}'s")
         if new:  # what is known is echoed by stock clients, and adds nothing
             self._quota.check(update, read)
         if not read.ready(self._known):
@@ -103,7 +103,7 @@ class Replica:
                 self._apply(*(event.body for event in group))
                 self._known = clocks(self.doc.get_state())
 
-    def begin(self, kept: "Kept") -> None:
+    def begin(self, kept: "ReplicaState") -> None:
         """Take up where a snapshot was made. Raises Malformed, Panicked."""
         self._apply(kept.state)
         self._quota.took(len(kept.state))
@@ -126,7 +126,7 @@ class Replica:
                 together.append(event.body)
         self._apply(*together)
 
-    def _learn(self, read: Outline, size: int) -> None:
+    def _learn(self, read: UpdateOutline, size: int) -> None:
         """What the log holds is not judged again."""
         with suppress(Malformed):
             self.nesting.learn(self.nesting.depths(read.placed, self._known))
@@ -137,22 +137,22 @@ class Replica:
         if len(sizes) >= WAITING_UPDATES or sum(sizes) + len(update) > WAITING_BYTES:
             raise TooMuchWaits
 
-    def _took(self, update: bytes, read: Outline, author: str) -> Brought:
+    def _took(self, update: bytes, read: UpdateOutline, author: str) -> UpdateEffect:
         if not read.ready(self._known):
             self._waiting[update] = read, author
-            return Brought.WAITS
+            return UpdateEffect.WAITS
         if not self._applied(update, read):
-            return Brought.NOTHING
+            return UpdateEffect.NOTHING
         while self._waiting and self._release():
             pass
-        return Brought.NEWS
+        return UpdateEffect.NEWS
 
     def released(self) -> list[bytes]:
         """Updates that waited and do not any more, since this was asked last."""
         released, self._released = self._released, []
         return released
 
-    def freed_by(self, read: Outline) -> list[bytes]:
+    def freed_by(self, read: UpdateOutline) -> list[bytes]:
         """What waits and would not wait any more, had this been applied."""
         known = dict(self._known)
         freed: dict[bytes, None] = {}
@@ -182,7 +182,7 @@ class Replica:
         """Updates that wait for earlier ones."""
         return tuple(self._waiting)
 
-    def _applied(self, update: bytes, read: Outline) -> bool:
+    def _applied(self, update: bytes, read: UpdateOutline) -> bool:
         """Apply what is ready; whether it changed anything."""
         self._fired = False
         depths = self.nesting.depths(read.placed, self._known)
@@ -191,7 +191,7 @@ class Replica:
         self._count(read, len(update))
         return self._fired
 
-    def _count(self, read: Outline, size: int) -> None:
+    def _count(self, read: UpdateOutline, size: int) -> None:
         self._quota.took(size, read.actions, read.fields)
         for client, _, end in read.brings:
             self._known[client] = max(end, self._known.get(client, 0))
@@ -225,7 +225,7 @@ class Replica:
 
     def lacking(self, state: bytes) -> bytes:
         """What somebody with this state vector lacks. Raises Malformed, Panicked."""
-        if Reader(state).number() * 2 > len(state):
+        if ByteReader(state).number() * 2 > len(state):
             raise Malformed("more clients than bytes")
         with applying():
             return self.doc.get_update(state)
@@ -253,7 +253,7 @@ def applying() -> Iterator[None]:
         raise Panicked(str(error)) from error
 
 
-class Kept(msgspec.Struct, frozen=True, array_like=True):
+class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
     """What a snapshot keeps of a document, and of what waits beside it, with who wrote that.
 
     `form` was the number 1 before waiting updates were kept: who only knows that form does not take
@@ -299,7 +299,7 @@ class Kept(msgspec.Struct, frozen=True, array_like=True):
         return NOTHING_NEW if found is None else found.state
 
     @classmethod
-    def _read(cls, kept: bytes) -> "Kept | None":
+    def _read(cls, kept: bytes) -> "ReplicaState | None":
         try:
             return msgspec.msgpack.decode(kept, type=cls)
         except (msgspec.DecodeError, UnicodeDecodeError):
@@ -308,5 +308,5 @@ class Kept(msgspec.Struct, frozen=True, array_like=True):
 
 def clocks(state: bytes) -> dict[int, int]:
     """A state vector as numbers: what is known of each client."""
-    reader = Reader(state)
+    reader = ByteReader(state)
     return {reader.number(): reader.number() for _ in range(reader.number())}

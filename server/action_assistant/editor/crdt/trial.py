@@ -15,7 +15,7 @@ from pycrdt import Doc
 
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import applying
-from action_assistant.editor.crdt.update_scan import Outline, outline
+from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
 
 SECONDS: Final = 0.25  # of a processor that one update may take
 _ENDS: Final = 8 * SECONDS  # of a processor, after which the process that tries it ends
@@ -26,12 +26,12 @@ class TooSlow(Exception):
     """An update that holds everybody up"""
 
 
-def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> Outline:
+def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> UpdateOutline:
     """The outline of an update that may be applied to a document of this state, and after it the
     updates that waited for it. For workers: one that takes far too long ends the process. Raises Malformed, Panicked, TooSlow."""
     read = outline(update)
     if not any(each.inside for each in read.placed):
-        read = Outline(read.brings, read.needs, (), read.actions, read.fields)
+        read = UpdateOutline(read.brings, read.needs, (), read.actions, read.fields)
     elif len(read.placed) > _INSIDE:
         raise Malformed("too much that lies inside something else")
     doc: Doc[Any] = Doc()

@@ -9,7 +9,7 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.editor.crdt.messages import Malformed, Reader
+from action_assistant.editor.crdt.messages import ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Placed
 
 MOST_STRUCTS: Final = 200_000
@@ -23,7 +23,7 @@ _FIXED: Final = {127: 0, 126: 0, 124: 4, 123: 8, 122: 8, 121: 0, 120: 0}  # byte
 _NAMED_TYPES: Final = frozenset({3, 5})
 
 
-class Outline(msgspec.Struct, frozen=True):
+class UpdateOutline(msgspec.Struct, frozen=True):
     """What an update brings, `(client, from clock, to clock)`, and what must be there before it:
     of each client so many clocks. `placed`: what need not lie in a root. `fields`: how many keys that
     may be new are among it, `actions`: how many of them are new actions."""
@@ -47,9 +47,9 @@ class Outline(msgspec.Struct, frozen=True):
         )
 
 
-def outline(update: bytes) -> Outline:
+def outline(update: bytes) -> UpdateOutline:
     """Read an update. Raises Malformed for what is none, or beyond the bounds."""
-    reader = Reader(update)
+    reader = ByteReader(update)
     brings: list[tuple[int, int, int]] = []
     needs: dict[int, int] = {}
     placed: list[Placed] = []
@@ -87,17 +87,17 @@ def outline(update: bytes) -> Outline:
     _deletions(reader, needs)
     if reader.left:
         raise Malformed("something follows the update")
-    return Outline(tuple(brings), needs, tuple(placed), actions, fields)
+    return UpdateOutline(tuple(brings), needs, tuple(placed), actions, fields)
 
 
-def _client(reader: Reader) -> int:
+def _client(reader: ByteReader) -> int:
     client = reader.number()
     if client > MOST_CLIENT:
         raise Malformed("a client that cannot be")
     return client
 
 
-def _deletions(reader: Reader, needs: dict[int, int]) -> None:
+def _deletions(reader: ByteReader, needs: dict[int, int]) -> None:
     for _ in range(reader.number()):
         client = _client(reader)
         for _ in range(reader.number()):
@@ -117,7 +117,7 @@ _ACTION: Final = "action"
 
 
 def _struct(
-    reader: Reader, info: int, needs: dict[int, int]
+    reader: ByteReader, info: int, needs: dict[int, int]
 ) -> tuple[int, _Reference | None, _Fresh]:
     """One struct; how many clocks it takes, and which key may be new with it."""
     kind = info & 31
@@ -144,7 +144,7 @@ def _struct(
     return _content(reader, kind), reference, fresh
 
 
-def _need(reader: Reader, needs: dict[int, int]) -> tuple[int, int]:
+def _need(reader: ByteReader, needs: dict[int, int]) -> tuple[int, int]:
     client, clock = _client(reader), reader.number()
     if clock > MOST_CLOCK:
         raise Malformed("a clock that no client reaches")
@@ -152,7 +152,7 @@ def _need(reader: Reader, needs: dict[int, int]) -> tuple[int, int]:
     return client, clock
 
 
-def _content(reader: Reader, kind: int) -> int:
+def _content(reader: ByteReader, kind: int) -> int:
     match kind:
         case 1:  # deleted
             return _length(reader)
@@ -184,7 +184,7 @@ def _content(reader: Reader, kind: int) -> int:
     return 1
 
 
-def _any(reader: Reader) -> None:
+def _any(reader: ByteReader) -> None:
     """One value, without recursion: a stack of how many members are still to come."""
     open_: list[tuple[int, bool]] = [(1, False)]
     while open_:
@@ -209,14 +209,14 @@ def _any(reader: Reader) -> None:
             raise Malformed(f"there is no value of kind {kind}")
 
 
-def _length(reader: Reader) -> int:
+def _length(reader: ByteReader) -> int:
     length = reader.number()
     if length == 0:
         raise Malformed("a struct of length 0")
     return length
 
 
-def _counted(reader: Reader, count: int) -> int:
+def _counted(reader: ByteReader, count: int) -> int:
     if count > reader.left:
         raise Malformed("more members than bytes")
     return count

@@ -1,4 +1,4 @@
-"""What can be said of a graph at one moment of its log. Everything here is for workers, but `Sight`.
+"""What can be said of a graph at one moment of its log. Everything here is for workers, but `GraphAtSeq`.
 
 The event loop knows a graph only as the bytes of its document; what depends on its size is asked of
 a worker, which remembers the graphs that it read last.
@@ -26,7 +26,7 @@ _LABELS: Final = 20  # of one graph
 _LABEL: Final = 60  # characters
 
 
-class Sight(msgspec.Struct, frozen=True):
+class GraphAtSeq(msgspec.Struct, frozen=True):
     """A graph at one seq of its log: its document as one Yjs update."""
 
     graph: str
@@ -34,7 +34,7 @@ class Sight(msgspec.Struct, frozen=True):
     state: bytes
 
 
-class Moment(msgspec.Struct, frozen=True):
+class ReadGraph(msgspec.Struct, frozen=True):
     """A graph at one seq of its log, read."""
 
     seq: int
@@ -49,7 +49,7 @@ class Counts(msgspec.Struct, frozen=True):
     warning: int
 
 
-class About(msgspec.Struct, frozen=True):
+class GraphInfo(msgspec.Struct, frozen=True):
     """What lists say of a graph."""
 
     name: str
@@ -63,7 +63,7 @@ class About(msgspec.Struct, frozen=True):
 class Read:
     """A moment, and what was found out about it."""
 
-    def __init__(self, moment: Moment) -> None:
+    def __init__(self, moment: ReadGraph) -> None:
         self.moment: Final = moment
 
     @cached_property
@@ -75,13 +75,13 @@ class Read:
 _recent: "Final[OrderedDict[tuple[str, int], Read]]" = OrderedDict()
 
 
-def read(sight: Sight) -> Read:
+def read(sight: GraphAtSeq) -> Read:
     """A graph, read once by each worker."""
     key = sight.graph, sight.seq
     found = _recent.get(key)
     if found is None:
         maps = maps_of(sight.state)
-        found = _recent[key] = Read(Moment(sight.seq, maps, document.read_maps(maps)))
+        found = _recent[key] = Read(ReadGraph(sight.seq, maps, document.read_maps(maps)))
         if len(_recent) > _REMEMBERED:
             _recent.popitem(last=False)
     _recent.move_to_end(key)
@@ -95,16 +95,16 @@ def maps_of(state: bytes) -> Maps:
     return document.maps_of(doc)
 
 
-def about(sight: Sight) -> About:
+def info(sight: GraphAtSeq) -> GraphInfo:
     """What a list shows."""
     found = read(sight)
-    return about_graph(found.moment.graph, found.problems)
+    return info_of(found.moment.graph, found.problems)
 
 
-def about_graph(graph: Graph, problems: list[Problem]) -> About:
-    """As `about`, of a graph that was read already."""
+def info_of(graph: Graph, problems: list[Problem]) -> GraphInfo:
+    """As `info`, of a graph that was read already."""
     errors = sum(problem.severity == "error" for problem in problems)
-    return About(
+    return GraphInfo(
         graph.name,
         graph.description,
         sum(not action.missing for action in graph.actions),
@@ -114,23 +114,23 @@ def about_graph(graph: Graph, problems: list[Problem]) -> About:
     )
 
 
-def problems(sight: Sight) -> bytes:
+def problems(sight: GraphAtSeq) -> bytes:
     """What is wrong, as JSON."""
     return msgspec.json.encode(read(sight).problems)
 
 
-def umrf(sight: Sight) -> bytes:
+def umrf(sight: GraphAtSeq) -> bytes:
     """The canonical text."""
     return codec.write(read(sight).moment.graph).encode()
 
 
-def released(sight: Sight, stamp: codec.Stamp) -> tuple[str, bytes]:
+def released(sight: GraphAtSeq, stamp: codec.Stamp) -> tuple[str, bytes]:
     """The digest and the text of a version."""
     graph = read(sight).moment.graph
     return digest(graph), codec.write(graph, stamp).strip().encode()
 
 
-def differing(before: Sight, after: Sight) -> bytes:
+def differing(before: GraphAtSeq, after: GraphAtSeq) -> bytes:
     """What differs, as JSON."""
     then, later = read(before).moment, read(after).moment
     return msgspec.json.encode(difference((then.seq, then.graph), (later.seq, later.graph)))

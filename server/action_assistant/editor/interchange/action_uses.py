@@ -6,13 +6,13 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.editor.documents.contents import Sight, read
+from action_assistant.editor.documents.contents import GraphAtSeq, read
 from action_assistant.editor.log.document_events import when
 from action_assistant.umrf.json.text import dump, parse_small
 from action_assistant.umrf.model import Action, Graph, JsonText, Parameter
 
 
-class Taking(msgspec.Struct, frozen=True):
+class LibraryParameter(msgspec.Struct, frozen=True):
     """One parameter. `path` joins keys with `/` as in UMRF; no `pvf_type`: the file names none.
 
     `text` is its JSON as a new use begins with it: without a value.
@@ -24,7 +24,7 @@ class Taking(msgspec.Struct, frozen=True):
     text: JsonText
 
 
-class Known(msgspec.Struct, frozen=True):
+class LibraryAction(msgspec.Struct, frozen=True):
     """An action of the library.
 
     Parameters are those of all graphs together; of what they say differently, and of descriptions
@@ -34,13 +34,13 @@ class Known(msgspec.Struct, frozen=True):
     name: str
     description: str
     type: str
-    inputs: tuple[Taking, ...]
-    outputs: tuple[Taking, ...]
+    inputs: tuple[LibraryParameter, ...]
+    outputs: tuple[LibraryParameter, ...]
     used_in: tuple[str, ...]
     first_seen: datetime
 
 
-class Use(msgspec.Struct, frozen=True):
+class GraphUse(msgspec.Struct, frozen=True):
     """A graph that uses actions, and when it was made, in microseconds."""
 
     graph: str
@@ -51,24 +51,24 @@ class Use(msgspec.Struct, frozen=True):
 NOTHING: Final = msgspec.msgpack.encode(())
 
 
-def used(sight: Sight) -> bytes:
+def used(sight: GraphAtSeq) -> bytes:
     """The actions of a graph that differ in what a library says of them."""
     return msgspec.msgpack.encode(_distinct(read(sight).moment.graph))
 
 
-def merged(graphs: list[tuple[Use, bytes]]) -> bytes:
+def merged(graphs: list[tuple[GraphUse, bytes]]) -> bytes:
     """JSON of what several graphs know, the last changed first."""
-    uses: dict[str, list[tuple[Use, Action]]] = {}
+    uses: dict[str, list[tuple[GraphUse, Action]]] = {}
     for graph, actions in graphs:
         for action in msgspec.msgpack.decode(actions, type=tuple[Action, ...]):
             uses.setdefault(action.name, []).append((graph, action))
     return msgspec.json.encode([_known(name, uses[name]) for name in sorted(uses)])
 
 
-def _known(name: str, uses: list[tuple[Use, Action]]) -> Known:
+def _known(name: str, uses: list[tuple[GraphUse, Action]]) -> LibraryAction:
     by_age = sorted({(use.made_at, use.graph) for use, _ in uses})
     actions = [action for _, action in uses]
-    return Known(
+    return LibraryAction(
         name=name,
         description=next((a.description for a in actions if a.description), ""),
         type=actions[0].type,
@@ -79,8 +79,8 @@ def _known(name: str, uses: list[tuple[Use, Action]]) -> Known:
     )
 
 
-def _together(lists: Iterable[tuple[Parameter, ...]]) -> tuple[Taking, ...]:
-    found: dict[str, Taking] = {}
+def _together(lists: Iterable[tuple[Parameter, ...]]) -> tuple[LibraryParameter, ...]:
+    found: dict[str, LibraryParameter] = {}
     for parameters in lists:
         for parameter in parameters:
             if parameter.path not in found:
@@ -88,12 +88,12 @@ def _together(lists: Iterable[tuple[Parameter, ...]]) -> tuple[Taking, ...]:
     return tuple(found.values())
 
 
-def _taking(parameter: Parameter) -> Taking:
+def _taking(parameter: Parameter) -> LibraryParameter:
     leaf = parse_small(parameter.text)
     if not isinstance(leaf, dict):
-        return Taking(parameter.path, None, required=True, text=parameter.text)
+        return LibraryParameter(parameter.path, None, required=True, text=parameter.text)
     kind = leaf.get("pvf_type")
-    return Taking(
+    return LibraryParameter(
         parameter.path,
         kind if isinstance(kind, str) else None,
         required=leaf.get("pvf_required") is not False,

@@ -15,7 +15,7 @@ from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
 
 from action_assistant.editor.documents import document
-from action_assistant.editor.documents.contents import Moment, Sight, read
+from action_assistant.editor.documents.contents import GraphAtSeq, ReadGraph, read
 from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.documents.values import ends_of, is_aid, number
 from action_assistant.editor.interchange import importing
@@ -30,7 +30,7 @@ _WORSE: Final = 20  # problems that are told
 _Wanted: TypeAlias = dict[tuple[str, str], object]
 
 
-class Change(msgspec.Struct, frozen=True):
+class KeyChange(msgspec.Struct, frozen=True):
     """One key of the document. A value that is left out: the key is not there."""
 
     root: str
@@ -39,22 +39,22 @@ class Change(msgspec.Struct, frozen=True):
     after: object | UnsetType = UNSET
 
 
-class Rewriting(msgspec.Struct, frozen=True):
+class TextEdit(msgspec.Struct, frozen=True):
     """What an edited text would change after `seq`, and the errors that the graph would then have
     and does not have yet, with their places in that text."""
 
     seq: int
-    changes: tuple[Change, ...]
+    changes: tuple[KeyChange, ...]
     problems: tuple[Problem, ...]
 
 
-def rewritten(sight: Sight, text: bytes) -> bytes:
-    """What an edited text changes, as JSON of a `Rewriting`. For workers. Raises as `rewriting`."""
+def edited_text(sight: GraphAtSeq, text: bytes) -> bytes:
+    """What an edited text changes, as JSON of a `TextEdit`. For workers. Raises as `text_edit`."""
     found = read(sight)
-    return msgspec.json.encode(rewriting(found.moment, text, found.problems))
+    return msgspec.json.encode(text_edit(found.moment, text, found.problems))
 
 
-def rewriting(moment: Moment, text: bytes, known: Iterable[Problem] = ()) -> Rewriting:
+def text_edit(moment: ReadGraph, text: bytes, known: Iterable[Problem] = ()) -> TextEdit:
     """What `text`, edited from the canonical text of `moment`, changes. `known`: the problems that
     the graph has already.
 
@@ -68,7 +68,7 @@ def rewriting(moment: Moment, text: bytes, known: Iterable[Problem] = ()) -> Rew
     _refuse_ghosts(old, new, wanted.text)
     changes = tuple(_changes(moment.maps, old, new))
     worse = wanted.placed(_worse(known, new)) if changes else []
-    return Rewriting(moment.seq, changes, tuple(worse))
+    return TextEdit(moment.seq, changes, tuple(worse))
 
 
 def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
@@ -189,7 +189,7 @@ def _naming(file: object, ghost: Action) -> str:
 # What differs
 
 
-def _changes(maps: Maps, old: Graph, new: Graph) -> list[Change]:
+def _changes(maps: Maps, old: Graph, new: Graph) -> list[KeyChange]:
     wanted = _fields(old, new) | _orders(maps, old, new) | _leftovers(maps, old, new)
     changes = []
     for (root, key), after in sorted(wanted.items(), key=lambda item: item[0]):
@@ -197,7 +197,7 @@ def _changes(maps: Maps, old: Graph, new: Graph) -> list[Change]:
         if before is UNSET and after is UNSET:
             continue
         if before != after or isinstance(before, bool) != isinstance(after, bool):
-            changes.append(Change(root, key, before, after))
+            changes.append(KeyChange(root, key, before, after))
     return changes
 
 

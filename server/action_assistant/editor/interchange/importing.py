@@ -10,7 +10,7 @@ from action_assistant.editor.crdt.document_quota import (
     refuse_too_wide,
 )
 from action_assistant.editor.documents import document
-from action_assistant.editor.documents.contents import About, about_graph
+from action_assistant.editor.documents.contents import GraphInfo, info_of
 from action_assistant.editor.interchange import changes
 from action_assistant.errors import BadInput, NotUmrf, TooLarge
 from action_assistant.umrf.check import check
@@ -19,7 +19,7 @@ from action_assistant.umrf.files.action_files import ACTION_DIALECTS
 from action_assistant.umrf.model import Note, Problem
 
 
-class Reading(msgspec.Struct, frozen=True):
+class ImportReport(msgspec.Struct, frozen=True):
     """What was found in an imported file: its dialect, what was translated, what is wrong.
 
     `remarks` are the notes with their places; all places are in the file as it was sent.
@@ -57,28 +57,28 @@ class Pieces(msgspec.Struct, frozen=True):
     remarks: tuple[Note, ...] = ()
 
 
-class Brought(msgspec.Struct, frozen=True):
-    """A file as the first update of a document. `reading` is JSON of a `Reading`."""
+class ImportedFile(msgspec.Struct, frozen=True):
+    """A file as the first update of a document. `reading` is JSON of a `ImportReport`."""
 
     dialect: str
     notes: tuple[str, ...]
     reading: bytes
     update: bytes
-    about: About
+    about: GraphInfo
 
 
-def brought(body: bytes) -> Brought:
+def imported(body: bytes) -> ImportedFile:
     """What is stored of a file. Raises BadInput, NotUmrf, TooLarge with the place."""
     found = _fitting(read_graph(body))
     update = changes.first(found.graph)
     refuse_too_long(update)
-    told = Reading(found.dialect, found.notes, found.problems, found.remarks)
-    about = about_graph(found.graph, check(found.graph))
-    return Brought(found.dialect, found.notes, msgspec.json.encode(told), update, about)
+    told = ImportReport(found.dialect, found.notes, found.problems, found.remarks)
+    about = info_of(found.graph, check(found.graph))
+    return ImportedFile(found.dialect, found.notes, msgspec.json.encode(told), update, about)
 
 
 def preview(body: bytes) -> bytes:
-    """What importing a file would make, as JSON of a `Preview`. Raises as `brought` does."""
+    """What importing a file would make, as JSON of a `Preview`. Raises as `imported` does."""
     found = _fitting(read_graph(body))
     graph = found.graph
     problems = (*found.problems, *found.placed(check(graph)))
@@ -89,7 +89,7 @@ def preview(body: bytes) -> bytes:
 
 
 def pieces(body: bytes) -> bytes:
-    """JSON of `Pieces`. Raises as `brought` does."""
+    """JSON of `Pieces`. Raises as `imported` does."""
     found = _fitting(read(body))
     maps = document.flatten(document.with_aids(found.graph))
     return msgspec.json.encode(

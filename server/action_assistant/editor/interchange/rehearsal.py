@@ -4,7 +4,7 @@ from typing import Any, Final, Literal
 
 import msgspec
 
-from action_assistant.editor.documents.contents import Sight, read
+from action_assistant.editor.documents.contents import GraphAtSeq, read
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.umrf import semantics
 from action_assistant.umrf.check import refused_by_parser
@@ -41,7 +41,7 @@ class Rehearsal(msgspec.Struct, frozen=True):
     cut: bool
 
 
-def rehearsed(sight: Sight, wanted: Rehearsing) -> bytes:
+def rehearsed(sight: GraphAtSeq, wanted: Rehearsing) -> bytes:
     """Play a graph to its end, or as far as limits let it: JSON of a `Rehearsal`. For workers.
 
     Raises BadInput, Conflict.

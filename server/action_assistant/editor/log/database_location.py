@@ -16,7 +16,7 @@ import msgspec
 from sqlalchemy import URL, Connection, func, inspect, make_url, select
 from sqlalchemy.exc import ArgumentError
 
-from action_assistant.editor.log.epochs import MARK, Mark
+from action_assistant.editor.log.epochs import MARK, EpochMark
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import cause_of
 from action_assistant.journal.databases import database_of
@@ -33,7 +33,7 @@ _SECRET: Final = "password"  # names of parameters that hold one contain this
 _event, _graph = editor_tables.editor_event.c, editor_tables.graph.c
 
 
-class Kept(msgspec.Struct, frozen=True):
+class StoredLocation(msgspec.Struct, frozen=True):
     """What the file says."""
 
     database: str
@@ -73,7 +73,7 @@ def remembered(data: Path) -> str | None:
     """The URL of a database elsewhere; None when the folder holds its graphs itself, or none.
     Raises CannotStart."""
     try:
-        return msgspec.json.decode((data / FILE).read_bytes(), type=Kept).database
+        return msgspec.json.decode((data / FILE).read_bytes(), type=StoredLocation).database
     except FileNotFoundError:
         return None
     except OSError as error:
@@ -117,7 +117,7 @@ def remember(data: Path, url: str) -> None:
         part = path.with_name(f".{FILE}.part")
         descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
         with os.fdopen(descriptor, "wb") as file:
-            file.write(msgspec.json.encode(Kept(shown(url))))
+            file.write(msgspec.json.encode(StoredLocation(shown(url))))
             file.flush()
             os.fsync(descriptor)
         part.replace(path)
@@ -180,7 +180,7 @@ def _holds(url: str, mark: Path) -> bool:
     if _is_nowhere(url):
         return False
     try:
-        last = msgspec.json.decode(mark.read_bytes(), type=Mark)
+        last = msgspec.json.decode(mark.read_bytes(), type=EpochMark)
     except (OSError, msgspec.DecodeError):
         return False
     found = select(_event.chain).where(_event.position == last.position)

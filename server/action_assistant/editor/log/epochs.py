@@ -33,14 +33,14 @@ _event: Final = editor_tables.editor_event.c
 Why: TypeAlias = Literal["the first", "a backup was restored", "the log had gone back"]
 
 
-class Begun(msgspec.Struct, frozen=True):
+class EpochBegun(msgspec.Struct, frozen=True):
     """An epoch began with the event that says so. `why` is for people who read the log."""
 
     id: str
     why: Why
 
 
-class Mark(msgspec.Struct, frozen=True):
+class EpochMark(msgspec.Struct, frozen=True):
     """The last event that this data folder has seen, and the chain up to it as hex."""
 
     position: int
@@ -49,7 +49,7 @@ class Mark(msgspec.Struct, frozen=True):
 
 async def begin(journal: Journal, why: Why) -> str:
     """Begin an epoch; its id. Raises Unavailable."""
-    begun = Begun(secrets.token_hex(8), why)
+    begun = EpochBegun(secrets.token_hex(8), why)
     await journal.append(_STREAM, [h.draft(h.EPOCH, h.SERVER, begun)])
     return begun.id
 
@@ -78,14 +78,14 @@ async def _epoch(journal: Journal, mark: Path) -> str:
     if newest == 0:
         return await begin(journal, "the first")
     (event,) = await journal.read(_STREAM, after=newest - 1)
-    epoch = msgspec.json.decode(event.body, type=Begun).id
+    epoch = msgspec.json.decode(event.body, type=EpochBegun).id
     if await _follows(journal, _marked(mark)):
         return epoch
     log.warning("the log lacks what was in it before: open pages are told, and begin anew")
     return await begin(journal, "the log had gone back")
 
 
-async def _follows(journal: Journal, mark: Mark | None) -> bool:
+async def _follows(journal: Journal, mark: EpochMark | None) -> bool:
     """Whether the log still holds the event of the mark."""
     return mark is None or await _chain(journal, mark.position) == mark.chain
 
@@ -95,9 +95,9 @@ async def _chain(journal: Journal, position: int) -> str:
     return "".join(bytes(row.chain).hex() for row in rows)
 
 
-def _marked(mark: Path) -> Mark | None:
+def _marked(mark: Path) -> EpochMark | None:
     try:
-        return msgspec.json.decode(mark.read_bytes(), type=Mark)
+        return msgspec.json.decode(mark.read_bytes(), type=EpochMark)
     except (OSError, msgspec.DecodeError):  # a new folder, or one of an older version
         return None
 
@@ -112,7 +112,7 @@ async def _remember(journal: Journal, mark: Path) -> None:
     """Write the mark. Without it only less is noticed, so that nothing fails for it."""
     try:
         position = await journal.position()
-        text = msgspec.json.encode(Mark(position, await _chain(journal, position)))
+        text = msgspec.json.encode(EpochMark(position, await _chain(journal, position)))
         await asyncio.to_thread(_replace, mark, text)
     except (OSError, Unavailable) as error:
         log.warning("cannot write %s: %s", mark, error)

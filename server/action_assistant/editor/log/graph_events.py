@@ -37,7 +37,7 @@ SERVER: Final = "server"
 EXAMPLES: Final = "examples"
 
 
-class Created(msgspec.Struct, frozen=True):
+class GraphCreated(msgspec.Struct, frozen=True):
     """A graph came to be. `dialect` and `notes` speak of the file it was read from."""
 
     name: str
@@ -46,7 +46,7 @@ class Created(msgspec.Struct, frozen=True):
     notes: tuple[str, ...] = ()
 
 
-class Described(msgspec.Struct, frozen=True):
+class GraphDescribed(msgspec.Struct, frozen=True):
     """What the document of a graph calls itself, noticed at `seq`."""
 
     name: str
@@ -54,14 +54,14 @@ class Described(msgspec.Struct, frozen=True):
     seq: int
 
 
-class Restored(msgspec.Struct, frozen=True):
+class GraphRestored(msgspec.Struct, frozen=True):
     """The graph was made again what it had been at `restored`; the edit has the number `seq`."""
 
     restored: int
     seq: int
 
 
-class Published(msgspec.Struct, frozen=True):
+class VersionPublished(msgspec.Struct, frozen=True):
     """A version: what a graph was at `seq`, as UMRF that never changes."""
 
     id: str
@@ -72,7 +72,7 @@ class Published(msgspec.Struct, frozen=True):
     umrf: msgspec.Raw
 
 
-class Named(msgspec.Struct, frozen=True):
+class PersonNamed(msgspec.Struct, frozen=True):
     """Somebody, the event's author, goes by this name."""
 
     name: str
@@ -128,7 +128,7 @@ def fold(event: Event) -> Sequence[Executable]:
     if stream == "about":
         return _about(event, name)
     if event.kind == NAMED:
-        named = msgspec.json.decode(event.body, type=Named)
+        named = msgspec.json.decode(event.body, type=PersonNamed)
         row = {"id": event.author, "name": named.name, "seen_at": event.at}
         return [
             delete(editor_tables.person).where(editor_tables.person.c.id == event.author),
@@ -179,7 +179,7 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
     this = update(editor_tables.graph).where(editor_tables.graph.c.id == graph)
     match event.kind:
         case "graph.created.v1":
-            created = msgspec.json.decode(event.body, type=Created)
+            created = msgspec.json.decode(event.body, type=GraphCreated)
             row: dict[str, Any] = {
                 "id": graph,
                 "name": created.name,
@@ -189,7 +189,7 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
             }
             return [insert(editor_tables.graph).values(row)]
         case "graph.described.v1":
-            now = msgspec.json.decode(event.body, type=Described)
+            now = msgspec.json.decode(event.body, type=GraphDescribed)
             return [this.values(name=now.name, description=now.description)]
         case "graph.deleted.v1":
             return [this.values(deleted_at=event.at)]
@@ -202,7 +202,7 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
 
 
 def _version(event: Event, graph: str) -> dict[str, Any]:
-    version = msgspec.json.decode(event.body, type=Published)
+    version = msgspec.json.decode(event.body, type=VersionPublished)
     return {
         "id": version.id,
         "graph": graph,

@@ -10,9 +10,9 @@ from pycrdt import merge_updates
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.messages import Malformed
-from action_assistant.editor.crdt.replica import Foreign, Panicked, Replica, TooMuchWaits
+from action_assistant.editor.crdt.replica import ForeignClient, Panicked, Replica, TooMuchWaits
 from action_assistant.editor.crdt.trial import TooSlow, tried
-from action_assistant.editor.crdt.update_scan import Outline
+from action_assistant.editor.crdt.update_scan import UpdateOutline
 from action_assistant.editor.rooms.member import Member
 from action_assistant.errors import BadInput, Refused, TooLarge
 from action_assistant.web.auth.access import acting_for
@@ -46,7 +46,7 @@ class Compare(msgspec.Struct, frozen=True):
     """A socket says what it shows, and wants to know whether that is right."""
 
     member: Member
-    shown: messages.Comparison
+    shown: messages.CompareMessage
 
 
 class Look(msgspec.Struct, frozen=True):
@@ -87,7 +87,14 @@ class NotNow(Exception):
 
 #: Why an edit was not taken.
 Objection: TypeAlias = (
-    Malformed | Foreign | QuotaExceeded | TooMuchWaits | Panicked | NotAllowed | TooSlow | NotNow
+    Malformed
+    | ForeignClient
+    | QuotaExceeded
+    | TooMuchWaits
+    | Panicked
+    | NotAllowed
+    | TooSlow
+    | NotNow
 )
 
 
@@ -107,7 +114,7 @@ def _answer(error: Objection) -> tuple[int, Refused, str | None]:
             return messages.MALFORMED, BadInput(f"The update cannot be read: {error}."), None
         case Panicked():
             return messages.MALFORMED, BadInput("The update cannot be read."), None
-        case Foreign():
+        case ForeignClient():
             reason = BadInput("The update speaks for somebody else.")
             return messages.FORBIDDEN, reason, messages.OTHER_CLIENT
         case QuotaExceeded():
@@ -128,7 +135,7 @@ async def tried_for(
     state: bytes,
     update: bytes,
     released: Sequence[bytes] = (),
-) -> Outline:
+) -> UpdateOutline:
     """The outline of an update that may be applied to a document of this state, and after it the
     updates that waited for it.
 

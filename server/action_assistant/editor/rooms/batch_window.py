@@ -11,7 +11,7 @@ from typing import Final
 LENGTH: Final = 0.01  # seconds; nobody sees it, and a busy room needs a fifth of the work
 
 
-class Window:
+class BatchWindow:
     """Opens at most once in `length` seconds."""
 
     def __init__(self, length: float = LENGTH) -> None:

@@ -5,7 +5,7 @@ from enum import Enum
 from typing import Final
 
 from action_assistant.editor.crdt import messages
-from action_assistant.editor.rooms.presence import News, Seat
+from action_assistant.editor.rooms.presence import PresenceNews, Seat
 from action_assistant.web.auth.keys import PersonRef
 
 WAITING_FRAMES: Final = 256
@@ -41,7 +41,7 @@ class Member:
         self._frames: list[bytes] = []
         self._bytes = 0
         self._answer = _Answer.NONE
-        self._presence: News | None = None
+        self._presence: PresenceNews | None = None
         self._ack: bytes | None = None
         self._said = -1, -1  # with the last acknowledgement
         self._news = asyncio.Event()
@@ -87,7 +87,7 @@ class Member:
         if self.acks:
             self.post(messages.read_only(why))
 
-    def post_presence(self, news: News) -> None:
+    def post_presence(self, news: PresenceNews) -> None:
         """Tell who is where; only the last word of each client waits."""
         if news.entries:
             waiting = self._presence

@@ -7,7 +7,7 @@ from typing import Final
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
-from action_assistant.editor.rooms.batch_window import LENGTH, Window
+from action_assistant.editor.rooms.batch_window import LENGTH, BatchWindow
 from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
@@ -36,8 +36,8 @@ class Rooms:
         self._journal = journal
         self._run_in_worker = run_in_worker
         self._tried = tried
-        self._window = Window(window)
-        self._moments = Window(_MOMENTS * window)
+        self._window = BatchWindow(window)
+        self._moments = BatchWindow(_MOMENTS * window)
         self._linger = linger
         self._rooms: dict[str, Room] = {}
         self._loading: dict[str, asyncio.Task[Room]] = {}

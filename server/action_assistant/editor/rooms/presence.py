@@ -8,7 +8,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.editor.crdt import messages
-from action_assistant.editor.crdt.messages import Entry
+from action_assistant.editor.crdt.messages import PresenceEntry
 from action_assistant.web.auth.keys import PersonRef
 
 STATE_LIMIT: Final = 32_768  # bytes of one client's entry
@@ -21,7 +21,7 @@ _COLOURS: Final = (
 _decode: Final = msgspec.json.Decoder(dict[str, msgspec.Raw])
 
 
-class Stamp(msgspec.Struct, frozen=True):
+class PersonStamp(msgspec.Struct, frozen=True):
     """What the server says about a person, in the field `user` of every entry."""
 
     id: str
@@ -36,7 +36,7 @@ def colour_of(person_id: str) -> str:
 
 def stamp_of(person: PersonRef) -> bytes:
     """The stamp as JSON."""
-    return msgspec.json.encode(Stamp(person.id, person.name, colour_of(person.id)))
+    return msgspec.json.encode(PersonStamp(person.id, person.name, colour_of(person.id)))
 
 
 class Seat:
@@ -47,7 +47,7 @@ class Seat:
         self.client: int | None = None
         self._stamp: Final = msgspec.Raw(stamp_of(person))
 
-    def stamped(self, entry: Entry) -> Entry | None:
+    def stamped(self, entry: PresenceEntry) -> PresenceEntry | None:
         """The entry under the person's own name; None when it is none that can be shown."""
         if entry.state == _GONE:
             return entry
@@ -58,13 +58,13 @@ class Seat:
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
             return None
         state["user"] = self._stamp
-        return Entry(entry.client, entry.clock, msgspec.json.encode(state))
+        return PresenceEntry(entry.client, entry.clock, msgspec.json.encode(state))
 
 
-class News:
+class PresenceNews:
     """What many are told about who is where: put into bytes once for all of them."""
 
-    def __init__(self, entries: Iterable[Entry]) -> None:
+    def __init__(self, entries: Iterable[PresenceEntry]) -> None:
         self.entries: Final = {entry.client: entry for entry in entries}
 
     @cached_property
@@ -72,21 +72,21 @@ class News:
         """As a message."""
         return messages.presence(self.entries.values())
 
-    def followed_by(self, later: "News") -> "News":
+    def followed_by(self, later: "PresenceNews") -> "PresenceNews":
         """Both; what is later about the same client counts."""
-        return News((self.entries | later.entries).values())
+        return PresenceNews((self.entries | later.entries).values())
 
 
-class Attendance:
+class RoomPresence:
     """The entries of a room. Each belongs to a seat and vanishes with it."""
 
     def __init__(self) -> None:
-        self._entries: dict[int, Entry] = {}
+        self._entries: dict[int, PresenceEntry] = {}
         self._seats: dict[int, Seat] = {}
 
-    def hear(self, seat: Seat, entries: tuple[Entry, ...]) -> list[Entry]:
+    def hear(self, seat: Seat, entries: tuple[PresenceEntry, ...]) -> list[PresenceEntry]:
         """What the others are to be told; entries that are not this seat's are dropped."""
-        told: list[Entry] = []
+        told: list[PresenceEntry] = []
         for entry in entries:
             if not self._is_own(seat, entry):
                 continue
@@ -102,7 +102,7 @@ class Attendance:
             told.append(stamped)
         return told
 
-    def leave(self, seat: Seat, clock: int | None = None) -> list[Entry]:
+    def leave(self, seat: Seat, clock: int | None = None) -> list[PresenceEntry]:
         """Take a seat's entry away; what the others are to be told."""
         client, seat.client = seat.client, None
         if client is None or self._seats.get(client) is not seat:
@@ -110,7 +110,7 @@ class Attendance:
         del self._seats[client]
         last = self._entries.pop(client)
         # The same clock, so that the client's next word, should it come back, is newer.
-        return [Entry(client, last.clock if clock is None else clock, _GONE)]
+        return [PresenceEntry(client, last.clock if clock is None else clock, _GONE)]
 
     def holder(self, client: int) -> str | None:
         """The person whose socket speaks for a client."""
@@ -125,11 +125,11 @@ class Attendance:
             for person in sorted(there.values(), key=lambda person: (person.name, person.id))
         )
 
-    def everyone(self) -> tuple[Entry, ...]:
+    def everyone(self) -> tuple[PresenceEntry, ...]:
         """Who is there now."""
         return tuple(self._entries.values())
 
-    def _is_own(self, seat: Seat, entry: Entry) -> bool:
+    def _is_own(self, seat: Seat, entry: PresenceEntry) -> bool:
         """Stock clients echo what they hear of others; those entries are not theirs to say.
 
         A socket speaks for the first client id it names. If another socket of the same person

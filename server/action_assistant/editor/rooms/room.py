@@ -13,17 +13,17 @@ from typing import Final, TypeVar
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.loading import Loaded, load
-from action_assistant.editor.crdt.messages import Entry, Malformed
+from action_assistant.editor.crdt.messages import Malformed, PresenceEntry
 from action_assistant.editor.crdt.replica import (
-    Brought,
-    Foreign,
-    Kept,
+    ForeignClient,
     Panicked,
     Replica,
+    ReplicaState,
     TooMuchWaits,
+    UpdateEffect,
 )
 from action_assistant.editor.crdt.trial import TooSlow
-from action_assistant.editor.crdt.update_scan import Outline, outline
+from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
 from action_assistant.editor.documents.contents import shown
 from action_assistant.editor.documents.fingerprint import Fingerprint
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
@@ -42,9 +42,9 @@ from action_assistant.editor.rooms.batch import (
     refuse,
     tried_for,
 )
-from action_assistant.editor.rooms.batch_window import Window
+from action_assistant.editor.rooms.batch_window import BatchWindow
 from action_assistant.editor.rooms.member import Member
-from action_assistant.editor.rooms.presence import Attendance, News
+from action_assistant.editor.rooms.presence import PresenceNews, RoomPresence
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
@@ -69,15 +69,15 @@ class Room:
         journal: Journal,
         loaded: Loaded,
         gone: Callable[["Room"], None],
-        window: Window,
-        moments: Window,
+        window: BatchWindow,
+        moments: BatchWindow,
         run_in_worker: RunInWorker = run_here,
         tried: RunInWorker = run_here,
     ) -> None:
         self.stream: Final = stream
         self.seq = loaded.seq
         self.members: set[Member] = set()
-        self.attendance: Final = Attendance()
+        self.attendance: Final = RoomPresence()
         self._journal = journal
         self._replica = loaded.replica
         self._kept = loaded.kept
@@ -89,7 +89,7 @@ class Room:
         self._tried = tried
         self._unkept = 0  # bytes of updates since the last snapshot
         self._naming = False
-        self._said: dict[int, tuple[Entry, Member]] = {}  # in this window, about themselves
+        self._said: dict[int, tuple[PresenceEntry, Member]] = {}  # in this window, about themselves
         self.divergences = 0
         self._fingerprint: tuple[int, Fingerprint] | None = None
         self._compares: list[Compare] = []
@@ -113,7 +113,7 @@ class Room:
         if member.edits:
             # Not from a batch that is being committed: an older state only asks for more.
             member.post(messages.question(self._replica.doc.get_state()))
-        member.post_presence(News(self.attendance.everyone()))
+        member.post_presence(PresenceNews(self.attendance.everyone()))
 
     def leave(self, member: Member) -> None:
         """A socket is gone, and what it said about itself with it."""
@@ -132,14 +132,14 @@ class Room:
             case messages.Question(state):
                 if member.asks():
                     self._enter(Ask(member, state))
-            case messages.Comparison():
+            case messages.CompareMessage():
                 self._enter(Compare(member, message))
             case messages.Presence(entries):
                 self._tell_presence(self.attendance.hear(member.seat, entries), member)
             case messages.WhoIsThere():
-                member.post_presence(News(self.attendance.everyone()))
+                member.post_presence(PresenceNews(self.attendance.everyone()))
 
-    def _tell_presence(self, entries: Sequence[Entry], speaker: Member) -> None:
+    def _tell_presence(self, entries: Sequence[PresenceEntry], speaker: Member) -> None:
         """Tell the others at the end of this window; of each client only the last word."""
         if entries and not self._said:
             self._window.when_open(self._spread)
@@ -149,12 +149,12 @@ class Room:
     def _spread(self) -> None:
         said, self._said = self._said, {}
         speakers = {speaker for _, speaker in said.values()}
-        everything = News(entry for entry, _ in said.values())
+        everything = PresenceNews(entry for entry, _ in said.values())
         for member in self.members:
             if member not in speakers:
                 member.post_presence(everything)
             elif others := [entry for entry, speaker in said.values() if speaker is not member]:
-                member.post_presence(News(others))
+                member.post_presence(PresenceNews(others))
 
     # --- the door -------------------------------------------------------------------------------
 
@@ -300,7 +300,7 @@ class Room:
         self._take_in(offer, taken, read)
         return taken
 
-    async def _tried_first(self, offer: Offer) -> Outline | None:
+    async def _tried_first(self, offer: Offer) -> UpdateOutline | None:
         """Its outline; None where it has to be read again, since in a document with depth also what
         lies beside something deep counts. Raises Malformed, Panicked, TooSlow, NotNow."""
         large = len(offer.update) > LARGE
@@ -313,12 +313,19 @@ class Room:
         tried = await tried_for(offer.author, self._tried, state, offer.update, waiting)
         return None if self._replica.nesting.spans else tried
 
-    def _take_in(self, offer: Offer, taken: Taken, read: Outline | None = None) -> None:
+    def _take_in(self, offer: Offer, taken: Taken, read: UpdateOutline | None = None) -> None:
         """Apply one edit, or refuse it."""
         begun = time.perf_counter()
         try:
             brought = self._brought(offer, read)
-        except (Malformed, Foreign, QuotaExceeded, TooMuchWaits, Panicked, NotAllowed) as error:
+        except (
+            Malformed,
+            ForeignClient,
+            QuotaExceeded,
+            TooMuchWaits,
+            Panicked,
+            NotAllowed,
+        ) as error:
             log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
             taken.panicked = isinstance(error, Panicked)
             refuse(offer, error)
@@ -329,15 +336,15 @@ class Room:
         if brought is None:
             return
         taken.handled.append(offer)
-        if brought is Brought.WAITS:
+        if brought is UpdateEffect.WAITS:
             taken.news.append((offer, DEFERRED))
-        elif brought is Brought.NEWS:
+        elif brought is UpdateEffect.NEWS:
             taken.news.append((offer, UPDATED))
             released = self._replica.released()
             taken.shown += [offer.update, *released]
             taken.for_all = taken.for_all or bool(released)
 
-    def _brought(self, offer: Offer, read: Outline | None) -> Brought | None:
+    def _brought(self, offer: Offer, read: UpdateOutline | None) -> UpdateEffect | None:
         """Apply one edit; None when it was refused, or comes from a socket that was."""
         member = offer.member
         if member is not None and member.refused:
@@ -345,7 +352,7 @@ class Room:
         if member is not None and not member.edits:
             if not self._replica.adds_nothing(offer.update):
                 raise NotAllowed
-            return Brought.NOTHING
+            return UpdateEffect.NOTHING
         return self._replica.take(offer.update, offer.author, self.attendance.holder, read)
 
     # --- telling --------------------------------------------------------------------------------
@@ -449,7 +456,7 @@ class Room:
         """Cache the document, and what waits beside it: that may be for ever."""
         if self._kept == self.seq or self.damaged is not None:
             return
-        seq, state = self.seq, Kept.of(self._replica)
+        seq, state = self.seq, ReplicaState.of(self._replica)
         try:
             await self._journal.keep_snapshot(self.stream, seq, state)
         except Refused as error:

@@ -47,8 +47,8 @@ class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
     """Run `a` against run `b`. `graph` is the difference of what was sent; `parameters` those of its
     changes that touch the values of actions."""
 
-    a: views.Summary
-    b: views.Summary
+    a: views.RunSummary
+    b: views.RunSummary
     same_graph: bool
     same_engine: bool
     graph: Difference

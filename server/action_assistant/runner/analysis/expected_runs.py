@@ -23,10 +23,10 @@ from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import (
     CUT_OFF,
     Dispatch,
-    GraphResult,
-    GraphState,
-    Hazard,
-    NodeResult,
+    GraphResultEvent,
+    GraphStateEvent,
+    HazardEvent,
+    NodeResultEvent,
     Script,
     Trace,
     simulate,
@@ -192,15 +192,15 @@ def course(graph: Graph, script: Script) -> tuple[ExpectedStep, ...]:
 
 def _step(trace: Trace) -> ExpectedStep | None:
     match trace:
-        case NodeResult():
+        case NodeResultEvent():
             return ExpectedStep(trace.graph, trace.node, "result", trace.result)
         case Dispatch():
             return ExpectedStep(trace.graph, trace.node, "runs", trace.response)
-        case GraphResult():
+        case GraphResultEvent():
             return ExpectedStep(trace.graph, "", "ends", trace.value)
-        case GraphState():
+        case GraphStateEvent():
             return ExpectedStep(trace.graph, "", "state", trace.state)
-        case Hazard(code=code):  # that it was cut off is no part of what was expected before
+        case HazardEvent(code=code):  # that it was cut off is no part of what was expected before
             is_cut = code == CUT_OFF
             return None if is_cut else ExpectedStep(trace.graph, trace.node or "", "hazard", code)
         case _:

@@ -91,7 +91,7 @@ class Beat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
     heard: dict[str, datetime]
 
 
-class Frame(msgspec.Struct, frozen=True):
+class EncodedRun(msgspec.Struct, frozen=True):
     """An encoded run, what encoding it took (seconds), and when it may be encoded again."""
 
     revision: int
@@ -107,7 +107,7 @@ class Hub:
         self.control = control
         self.clock_us = clock_us
         self.boxes: set[Outbox] = set()
-        self._frames: WeakKeyDictionary[OpenRun, Frame] = WeakKeyDictionary()
+        self._frames: WeakKeyDictionary[OpenRun, EncodedRun] = WeakKeyDictionary()
         self._memos: WeakKeyDictionary[OpenRun, views.Memo] = WeakKeyDictionary()
         self._engines: str | None = None
         control.watch(self._changed)
@@ -139,14 +139,14 @@ class Hub:
         for box in self.boxes:
             box.mark(opened)
 
-    def frame(self, opened: OpenRun) -> Frame:
+    def frame(self, opened: OpenRun) -> EncodedRun:
         """A run as text; encoded once for everybody."""
         frame = self._frames.get(opened)
         if frame is None or frame.revision != opened.revision:
             began = anyio.current_time()
             text = msgspec.json.encode(RunMessage(self.shown(opened))).decode()
             now = anyio.current_time()
-            frame = Frame(opened.revision, text, now - began, now + _SHARE * (now - began))
+            frame = EncodedRun(opened.revision, text, now - began, now + _SHARE * (now - began))
             self._frames[opened] = frame
         return frame
 

@@ -43,14 +43,14 @@ class RobotServices(Protocol):
     run_in_worker: RunInWorker
 
 
-class Reached(msgspec.Struct, frozen=True):
+class ReachStatus(msgspec.Struct, frozen=True):
     """All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can."""
 
     engines: list[Robot]
     no_reach: str
 
 
-class Change(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RobotChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What shall be different about a robot."""
 
     domain: int | None = None
@@ -67,7 +67,7 @@ class KnownAction(msgspec.Struct, frozen=True):
     outputs: dict[str, str]
 
 
-class Known(msgspec.Struct, frozen=True):
+class RobotKnowledge(msgspec.Struct, frozen=True):
     """What a robot can do. `unread`: files of its index that cannot be read."""
 
     actions: list[KnownAction]
@@ -75,7 +75,7 @@ class Known(msgspec.Struct, frozen=True):
     unread: int
 
 
-class Told(msgspec.Struct, frozen=True, kw_only=True):
+class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
     """A line of a robot's flight record. `has_graph`: its graph can be fetched."""
 
     seq: int
@@ -91,7 +91,7 @@ class Told(msgspec.Struct, frozen=True, kw_only=True):
     has_graph: bool = False
 
 
-class Stopped(msgspec.Struct, frozen=True):
+class RobotStopped(msgspec.Struct, frozen=True):
     """What a Stop of a robot concerns: runs of ours, and graphs that others started."""
 
     runs: list[str]
@@ -117,8 +117,8 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
         return list(services.control.robots.all())
 
     @get("/api/reach", summary="Whether robots can be reached over ROS 2 from here")
-    async def reach() -> Reached:
-        return Reached(list(services.control.robots.all()), services.control.robots.no_reach)
+    async def reach() -> ReachStatus:
+        return ReachStatus(list(services.control.robots.all()), services.control.robots.no_reach)
 
     @get("/api/candidates", summary="Engines in sight that nobody registered yet")
     async def candidates() -> list[Candidate]:
@@ -130,7 +130,7 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
         return Response(robot, status_code=201, headers={"location": f"/api/robots/{robot.name}"})
 
     @patch("/api/robots/{name:str}", summary="Change a robot", guards=[Needs("register")])
-    async def change(name: str, data: Change, request: _Asking) -> Robot:
+    async def change(name: str, data: RobotChange, request: _Asking) -> Robot:
         known = services.control.robots.registration(name)
         fields = {k: v for k, v in msgspec.structs.asdict(data).items() if v is not None}
         changed = msgspec.structs.asdict(known) | fields
@@ -155,13 +155,13 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
         return services.control.robots.robot(name)
 
     @get("/api/robots/{name:str}/known", summary="Actions and graphs that a robot has indexed")
-    async def known(name: str) -> Known:
+    async def known(name: str) -> RobotKnowledge:
         index = await services.control.robots.index(name)
         actions = [_action(action, index.actions[action]) for action in sorted(index.actions)]
-        return Known(actions, sorted(index.graphs), index.unread)
+        return RobotKnowledge(actions, sorted(index.graphs), index.unread)
 
     @get("/api/robots/{name:str}/events", summary="What others told a robot, newest first")
-    async def events(name: str) -> list[Told]:
+    async def events(name: str) -> list[RobotLogLine]:
         services.control.robots.registration(name)
         found = await services.control.robots.robot_log.newest(name, _EVENTS)
         return [_told(seq, event) for seq, event in reversed(found)]
@@ -196,8 +196,8 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
         summary="Stop whatever a robot runs",
         guards=[Needs("stop")],
     )
-    async def stop(name: str, request: _Asking) -> Stopped:
-        return Stopped(*services.control.stop_robot(name, author_of(request)))
+    async def stop(name: str, request: _Asking) -> RobotStopped:
+        return RobotStopped(*services.control.stop_robot(name, author_of(request)))
 
     return [robot, known, events, commanded, held, recorded, recording, stop]
 
@@ -236,11 +236,11 @@ def _action(name: str, signature: Signature) -> KnownAction:
     return KnownAction(name, signature.inputs, signature.outputs)
 
 
-def _told(seq: int, event: RobotEvent) -> Told:
+def _told(seq: int, event: RobotEvent) -> RobotLogLine:
     at = views.time(event.at)
     match event:
         case Commanded():
-            return Told(
+            return RobotLogLine(
                 seq=seq,
                 at=at,
                 kind="commanded",
@@ -252,14 +252,16 @@ def _told(seq: int, event: RobotEvent) -> Told:
                 has_graph=event.umrf != "",
             )
         case EngineBecame():
-            return Told(seq=seq, at=at, kind="became", state=event.state, why=event.why)
+            return RobotLogLine(seq=seq, at=at, kind="became", state=event.state, why=event.why)
         case StopAsked():
             by = event.author.name
-            return Told(seq=seq, at=at, kind="stop_asked", graph=event.graph, sender=by)
+            return RobotLogLine(seq=seq, at=at, kind="stop_asked", graph=event.graph, sender=by)
         case StopWasProven():
-            return Told(seq=seq, at=at, kind="stop_proven", graph=event.graph)
+            return RobotLogLine(seq=seq, at=at, kind="stop_proven", graph=event.graph)
         case StopUnproven():
-            return Told(seq=seq, at=at, kind="stop_unproven", graph=event.graph, why=event.why)
+            return RobotLogLine(
+                seq=seq, at=at, kind="stop_unproven", graph=event.graph, why=event.why
+            )
         case _:
             assert_never(event)
 

@@ -41,7 +41,7 @@ _ALIVE_S: Final = 15.0  # between two signs of life of an event stream
 _Asking = Request[Any, Any, Any]
 
 
-class StopAsked(msgspec.Struct, frozen=True):
+class StopBody(msgspec.Struct, frozen=True):
     """`stop_id` is made by the page, once per press; the same press may come by several ways."""
 
     stop_id: str = ""
@@ -264,7 +264,7 @@ async def _stop_id(request: _Asking) -> str:
     """Whatever the body is: a Stop is never refused for its form."""
     try:
         body = await start_of(request, _STOP_BYTES, _STOP_S)
-        return msgspec.json.decode(body, type=StopAsked).stop_id[:100]
+        return msgspec.json.decode(body, type=StopBody).stop_id[:100]
     except (msgspec.DecodeError, HTTPException, RecursionError):
         return ""
 

@@ -39,7 +39,7 @@ from action_assistant.runner.emulator.messages import (
 )
 from action_assistant.runner.emulator.view import PublishedGraphs
 from action_assistant.umrf.facts import PINNED, EngineFacts
-from action_assistant.umrf.semantics import Engine, EngineRefused, Execution, Script, Trace
+from action_assistant.umrf.semantics import Engine, Execution, GraphRefused, Script, Trace
 
 _NEXT_MS: Final = 0.2  # between two messages that wait
 _TOLD_MS: Final = 10.0  # from the end of a stop to the line that says so
@@ -296,7 +296,7 @@ class EmulatedEngine:
         try:
             by_name = not message.graph_json
             self._take(self._engine.start(plan.graph, self._now, plan.states, by_name=by_name))
-        except EngineRefused as refused:
+        except GraphRefused as refused:
             self._view.taken = True
             self._take(self._engine.advance(self._now))
             why = refused.message
@@ -338,7 +338,7 @@ class EmulatedEngine:
         except Refusal as refused:
             self._log(str(refused))
             return
-        except EngineRefused as refused:
+        except GraphRefused as refused:
             why = refused.message
             self._take(self._engine.advance(self._now))
 

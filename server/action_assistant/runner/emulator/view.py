@@ -6,7 +6,13 @@ from collections.abc import Sequence
 from typing import Final
 
 from action_assistant.runner.emulator.messages import EmulatedIndex, EngineTraits, GraphPlan
-from action_assistant.umrf.semantics import Engine, GraphState, NodeResult, NodeState, Trace
+from action_assistant.umrf.semantics import (
+    Engine,
+    GraphStateEvent,
+    NodeResultEvent,
+    NodeStateEvent,
+    Trace,
+)
 from action_assistant.umrf.semantics.parts import Running, build
 from action_assistant.umrf.semantics.printing import Sheet
 from action_assistant.umrf.semantics.script import DEFAULT
@@ -61,15 +67,15 @@ class PublishedGraphs:
         ended: list[str] = []
         seen = _as_threads_do(traces)
         connection_limits = sum(
-            isinstance(each, NodeState) and each.state in _SHOWN for each in seen
+            isinstance(each, NodeStateEvent) and each.state in _SHOWN for each in seen
         )
         for trace in seen:
-            if isinstance(trace, NodeResult):
+            if isinstance(trace, NodeResultEvent):
                 self._remember(trace.graph, trace.node, round(self._epoch_ms + now_ms))
         for trace in seen:
-            if isinstance(trace, NodeState):
+            if isinstance(trace, NodeStateEvent):
                 self._node(trace, connection_limits)
-            elif isinstance(trace, GraphState) and (held := self._of(trace.graph)):
+            elif isinstance(trace, GraphStateEvent) and (held := self._of(trace.graph)):
                 held.state = trace.state
                 if trace.state in ENDED and held.running.home is None:
                     ended.append(trace.graph)
@@ -109,7 +115,7 @@ class PublishedGraphs:
             self.plans[name] = GraphPlan(plan.graph, before | plan.attributes)
             held.sheet = self._sheet(held.running)
 
-    def _node(self, trace: NodeState, connection_limits: int) -> None:
+    def _node(self, trace: NodeStateEvent, connection_limits: int) -> None:
         held = self._of(trace.graph)
         if held is None or trace.state == "INITIALIZED":
             return
@@ -150,11 +156,11 @@ class PublishedGraphs:
 
 def _as_threads_do(traces: Sequence[Trace]) -> list[Trace]:
     """Actions begin on threads of their own: what ends at an instant is seen before what begins."""
-    last = {(e.graph, e.node): e for e in traces if isinstance(e, NodeState)}
+    last = {(e.graph, e.node): e for e in traces if isinstance(e, NodeStateEvent)}
 
     def begins(trace: Trace) -> bool:
         return (
-            isinstance(trace, NodeState)
+            isinstance(trace, NodeStateEvent)
             and trace.state == "RUNNING"
             and last[(trace.graph, trace.node)] is trace
         )

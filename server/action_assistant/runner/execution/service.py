@@ -26,7 +26,7 @@ from action_assistant.runner.robots.registry import RegistryContext, Robots
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, MovesAgain
-from action_assistant.runner.runs.history import History, Ledger, Past
+from action_assistant.runner.runs.history import Ledger, Past, RunHistory
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder, booked
@@ -66,7 +66,7 @@ class ExecutionService:
         past: Past | None = None,
     ) -> None:
         self.robots = robots
-        self.history = History(ledger, past)
+        self.history = RunHistory(ledger, past)
         self.open: dict[str, OpenRun] = {}
         self._ledger = ledger
         self._clock_us = clock_us

@@ -105,7 +105,7 @@ class SimulatorLink:
         self._runs[order.graph.name] = order.run
         try:
             self._tell(self._engine.start(graph, self._now()))
-        except semantics.EngineRefused as refused:
+        except semantics.GraphRefused as refused:
             if before is not None:  # that one goes on, or is stopped, under its own identity
                 self._runs[order.graph.name] = before
             self._wake.set()
@@ -132,7 +132,7 @@ class SimulatorLink:
             raise NotSent(self._dead)
         try:
             self._tell(self._engine.modify(_whole(order), self._now(), continue_from=continue_from))
-        except semantics.EngineRefused as refused:
+        except semantics.GraphRefused as refused:
             self._wake.set()
             raise EngineRefused(str(refused)) from refused
 
@@ -211,7 +211,7 @@ class SimulatorLink:
         for run, changes in per_run.items():
             self._subscribers.tell(Transitions(run=run, changes=tuple(changes)))
         for trace in traces:
-            if isinstance(trace, semantics.Hazard) and trace.effect in {"crash", "hang"}:
+            if isinstance(trace, semantics.HazardEvent) and trace.effect in {"crash", "hang"}:
                 self._fail(trace)
 
     def _begun(self, traces: Sequence[semantics.Trace]) -> dict[int, Values]:
@@ -220,7 +220,7 @@ class SimulatorLink:
         last = {
             (trace.graph, trace.node): trace
             for trace in traces
-            if isinstance(trace, semantics.NodeState)
+            if isinstance(trace, semantics.NodeStateEvent)
         }
         found: dict[int, Values] = {}
         for (name, node), trace in last.items():
@@ -229,7 +229,7 @@ class SimulatorLink:
                 found[id(trace)] = values_of(graph.nodes[node].inputs.values())
         return found
 
-    def _fail(self, hazard: semantics.Hazard) -> None:
+    def _fail(self, hazard: semantics.HazardEvent) -> None:
         """From now on nobody answers, as with the real engine; a hung one still exists."""
         what = "has crashed" if hazard.effect == "crash" else "hangs"
         why = f"The simulated engine {what} ({hazard.code}). {hazard.message}".rstrip()
@@ -255,16 +255,16 @@ def _whole(order: Order) -> Graph:
 def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact | None:
     """What of a trace is worth a place in the history; relations follow from results."""
     match trace:
-        case semantics.NodeState():
+        case semantics.NodeStateEvent():
             inputs = begun.get(id(trace))
             return NodeState(at, trace.graph, trace.node, trace.state, inputs)
-        case semantics.NodeResult():
+        case semantics.NodeResultEvent():
             return NodeResult(at, trace.graph, trace.node, trace.result, trace.message)
-        case semantics.GraphState():
+        case semantics.GraphStateEvent():
             return GraphState(at, trace.graph, trace.state)
-        case semantics.GraphResult():
+        case semantics.GraphResultEvent():
             return GraphResult(at, trace.graph, trace.value)
-        case semantics.Hazard():
+        case semantics.HazardEvent():
             return Hazard(at, trace.graph, trace.code, trace.effect, trace.node, trace.message)
         case semantics.EdgeEval() | semantics.Dispatch() | semantics.NotReady():
             return None

@@ -28,7 +28,7 @@ async def listed(
     review_service: ReviewService,
     wanted: queries.Filter,
     limit: int,
-    going: Mapping[str, views.Summary],
+    going: Mapping[str, views.RunSummary],
 ) -> list[views.Listed]:
     """Runs, newest first; those that are `going` are as they are there."""
     rows = await review_service.rows(queries.listed(wanted, limit))

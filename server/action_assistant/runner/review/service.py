@@ -25,7 +25,7 @@ from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.runs.history import History
+from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.recorder import RunRecorder, stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.workers import Crashed
@@ -108,7 +108,7 @@ class OngoingRun(Protocol):
 class OngoingRuns(Protocol):
     """What goes on, as far as looking back needs it: open runs, and how others are read."""
 
-    history: History
+    history: RunHistory
 
     @property
     def open(self) -> Mapping[str, OngoingRun]:

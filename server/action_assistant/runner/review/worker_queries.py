@@ -21,7 +21,7 @@ from action_assistant.journal.reader import FileJournalReader
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.review.service import OngoingRun, ReviewService
-from action_assistant.runner.runs.history import History, Ledger
+from action_assistant.runner.runs.history import Ledger, RunHistory
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.web.workers.lanes import RunInWorker
@@ -173,7 +173,7 @@ class _NoOngoingRuns:
 
     def __init__(self, ledger: Ledger) -> None:
         self.open: Mapping[str, OngoingRun] = {}
-        self.history = History(ledger)
+        self.history = RunHistory(ledger)
 
     def next_number(self) -> int:
         """Nothing begins here."""

@@ -24,7 +24,7 @@ _SERVICE: Final = re.compile(r"(?!.*__)/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-
 RobotState: TypeAlias = EngineState | Literal["no_link"]
 
 
-class Registered(msgspec.Struct, frozen=True, kw_only=True):
+class RobotRegistered(msgspec.Struct, frozen=True, kw_only=True):
     """Somebody registered a robot, or registered it anew."""
 
     kind: ClassVar[str] = "robot.registered.v1"
@@ -37,7 +37,7 @@ class Registered(msgspec.Struct, frozen=True, kw_only=True):
     profile: dict[str, object]
 
 
-class Removed(msgspec.Struct, frozen=True, kw_only=True):
+class RobotRemoved(msgspec.Struct, frozen=True, kw_only=True):
     """Somebody took a robot out of the registry. Its runs stay."""
 
     kind: ClassVar[str] = "robot.removed.v1"
@@ -46,7 +46,7 @@ class Removed(msgspec.Struct, frozen=True, kw_only=True):
     name: str
 
 
-class Held(msgspec.Struct, frozen=True, kw_only=True):
+class HeldGraph(msgspec.Struct, frozen=True, kw_only=True):
     """A graph that an engine holds, ended ones too. `run`: the run of ours that it is.
 
     `stopping`: why a stop of it is not proven yet, "" at first; None when nobody wants that.
@@ -84,7 +84,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     others: int = 0
     actor: str = ""
     pauses: bool = False
-    holds: tuple[Held, ...] = ()
+    holds: tuple[HeldGraph, ...] = ()
     actions: int | None = None
     graphs: int | None = None
 
@@ -128,7 +128,7 @@ def seen(plain: Robot, engine: KnownEngine, stopping: Callable[[str, str], str |
         heard_at=time(answer.at),
         took_ms=engine.took_ms,
         holds=tuple(
-            Held(
+            HeldGraph(
                 graph=each.graph,
                 state=each.state,
                 active=each.active,

@@ -25,9 +25,9 @@ from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registration import (
     STREAM,
-    Registered,
-    Removed,
     Robot,
+    RobotRegistered,
+    RobotRemoved,
     check_registration,
     seen,
 )
@@ -122,7 +122,7 @@ class Robots:
         """Take a robot in, or change it. Raises BadInput, Conflict, Unavailable."""
         check_registration(asked)
         ground = self._standing()
-        body = Registered(at=ground.clock_us(), **msgspec.structs.asdict(asked))
+        body = RobotRegistered(at=ground.clock_us(), **msgspec.structs.asdict(asked))
         draft = Draft(body.kind, author.id, msgspec.json.encode(body))
         await ground.ledger.append(STREAM, [draft])
         self.add(asked)
@@ -133,7 +133,7 @@ class Robots:
         """Take a robot out. Raises NotFound, Unavailable."""
         self.registration(name)
         ground = self._standing()
-        body = Removed(at=ground.clock_us(), name=name)
+        body = RobotRemoved(at=ground.clock_us(), name=name)
         draft = Draft(body.kind, author.id, msgspec.json.encode(body))
         await ground.ledger.append(STREAM, [draft])
         self._let_go(name)

@@ -27,7 +27,7 @@ class Ledger(Store, Protocol):
 Past: TypeAlias = Callable[[str, bool], Awaitable[tuple[Run, int]]]
 
 
-class History:
+class RunHistory:
     """Reads runs. Raises Unavailable while the journal cannot be read. `past` reads those that are
     over; without it they are folded here."""
 

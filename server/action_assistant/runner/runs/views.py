@@ -69,7 +69,7 @@ class AtRestShown(msgspec.Struct, frozen=True):
     how: str
 
 
-class Summary(msgspec.Struct, frozen=True, kw_only=True):
+class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     """A run as a list shows it. `took`: from `started_at` to when nothing of it moved any more, as far
     as that was seen, which is before `ended_at`, when that was proven; null where that is not known."""
 
@@ -108,7 +108,7 @@ class ArchivedShown(msgspec.Struct, frozen=True):
     file: str
 
 
-class Listed(Summary, frozen=True, kw_only=True):
+class Listed(RunSummary, frozen=True, kw_only=True):
     """A run of the list, with what people noted about it, and in one sentence why it did not end
     well, as far as that is recorded."""
 
@@ -119,7 +119,7 @@ class Listed(Summary, frozen=True, kw_only=True):
     archived: ArchivedShown | None
 
 
-class RunShown(Summary, frozen=True, kw_only=True):
+class RunShown(RunSummary, frozen=True, kw_only=True):
     """A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
     robot whose engine the simulator plays."""
 
@@ -153,9 +153,9 @@ def time(us: int) -> datetime:
     return _EPOCH + timedelta(microseconds=us)
 
 
-def summary(run: Run, *, recorded: bool = True) -> Summary:
+def summary(run: Run, *, recorded: bool = True) -> RunSummary:
     """A run without its actions."""
-    return Summary(**_fields(run, recorded))
+    return RunSummary(**_fields(run, recorded))
 
 
 class Memo:
@@ -226,11 +226,11 @@ def whole(
     )
 
 
-def summary_of_row(row: Row[Any]) -> Summary:
+def summary_of_row(row: Row[Any]) -> RunSummary:
     """A run that is over, from its row."""
     more = row.summary
     stopped_by = more.get("stopped_by")
-    return Summary(
+    return RunSummary(
         id=row.id,
         number=row.number,
         graph=row.graph,
@@ -276,9 +276,9 @@ def thinned(run: Run) -> Run:
     return replace(run, actions=actions)
 
 
-def listed(found: Summary, row: Row[Any], labels: list[str]) -> Listed:
+def listed(found: RunSummary, row: Row[Any], labels: list[str]) -> Listed:
     """A summary with the marks of its row."""
-    fields = {name: getattr(found, name) for name in Summary.__struct_fields__}
+    fields = {name: getattr(found, name) for name in RunSummary.__struct_fields__}
     return Listed(
         **fields,
         cause=row.summary.get("cause", ""),

@@ -21,7 +21,7 @@ from action_assistant.runner.links.port import ForeignCommand, NoAnswer
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.robot_events import Commanded, RobotLog
 from action_assistant.runner.runs.events import MovesAgain
-from action_assistant.runner.runs.history import History
+from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.run import Run
 
 log: Final = logging.getLogger(__name__)
@@ -62,7 +62,7 @@ class LateActivity:
     def __init__(
         self,
         open_: Mapping[str, Reopenable],
-        history: History,
+        history: RunHistory,
         robots: RobotRecords,
         tasks: TaskGroup,
         *,

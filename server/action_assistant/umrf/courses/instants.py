@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final, Literal, NamedTuple, TypeAlias
 
-from action_assistant.umrf.courses.network import Asked, Mask, Network
+from action_assistant.umrf.courses.network import EdgeQuestion, Mask, Network
 from action_assistant.umrf.model import Precondition
 
 #: What an action does: nothing; runs until `due`; ends a stop at `due`; is paused; was stopped while
@@ -135,7 +135,7 @@ class Instant:
             self._state(place).does in ACTIVE for place in self._net.last
         )
 
-    def _inform(self, place: int, result: Precondition, edges: list[Asked | None]) -> None:
+    def _inform(self, place: int, result: Precondition, edges: list[EdgeQuestion | None]) -> None:
         ignored = 0
         for edge in edges:
             if edge is None:
@@ -150,7 +150,7 @@ class Instant:
             if self.running == own:
                 self.end = "halted"
 
-    def _ask(self, place: int, edge: Asked, result: Precondition) -> bool:
+    def _ask(self, place: int, edge: EdgeQuestion, result: Precondition) -> bool:
         """One edge; whether the child ignores it."""
         child, net = edge.child, self._net
         before = state = self._state(child)

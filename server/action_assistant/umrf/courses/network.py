@@ -29,7 +29,7 @@ STOP_MS: Final = 50.0
 Mask: TypeAlias = int
 
 
-class Asked(NamedTuple):
+class EdgeQuestion(NamedTuple):
     """One edge as an end of its parent asks it. `link`: its bit among the child's required parents.
     `given`: the child's inputs that it fills from outputs before and after the parent filled them;
     None where the renaming kills the engine."""
@@ -75,7 +75,7 @@ class Network:
         places = {id(node): number for number, node in enumerate(every)}
         empty: dict[str, Slot] = {}
         self.entry = [_asked(edge, running.entry, (empty, empty), places, bits, slots) for edge in running.entry.children]  # fmt: skip
-        self.edges: list[list[Asked | None]] = []
+        self.edges: list[list[EdgeQuestion | None]] = []
         self._bypasses: dict[Precondition, dict[int, list[int]]] = {}
         for node in self.nodes:
             before = {name: slot for name, slot in node.outputs.items() if slot.has_value()}
@@ -168,7 +168,7 @@ def _asked(
     places: dict[int, int],
     bits: Sequence[dict[str, Mask]],
     slots: Sequence[dict[str, Mask]],
-) -> Asked | None:
+) -> EdgeQuestion | None:
     """None where the engine aborts: no such child, or one that does not list its parent."""
     link = edge.child.links.get(parent.full_name) if edge.child is not None else None
     if edge.child is None or link is None:
@@ -179,14 +179,14 @@ def _asked(
     try:
         found = renamed(parent.outputs, edge.remap, edge.child.inputs)
     except RemapUnknown:
-        return Asked(child, responses, bit, None)
+        return EdgeQuestion(child, responses, bit, None)
     before = after = 0
     for name, source in found.items():
         slot = parent.outputs[source]
         if _takes(edge.child.inputs[name], slot):
             after |= slots[child][name]
             before |= slots[child][name] if source in outputs[0] else 0
-    return Asked(child, responses, bit, (before, after))
+    return EdgeQuestion(child, responses, bit, (before, after))
 
 
 def _takes(target: Slot, source: Slot) -> bool:

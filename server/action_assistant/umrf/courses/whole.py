@@ -8,16 +8,16 @@ from action_assistant.umrf.courses.course import LAPS, MORE, Kind, Outcome
 from action_assistant.umrf.courses.network import Network
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics.engine import Engine
-from action_assistant.umrf.semantics.graphs import EngineRefused
+from action_assistant.umrf.semantics.graphs import GraphRefused
 from action_assistant.umrf.semantics.parts import EXIT_NODE, Node, Running
 from action_assistant.umrf.semantics.parts import Outcome as Result
 from action_assistant.umrf.semantics.script import Behaviour, Script
 from action_assistant.umrf.semantics.trace import (
     Dispatch,
     EdgeEval,
-    GraphState,
-    Hazard,
-    NodeState,
+    GraphStateEvent,
+    HazardEvent,
+    NodeStateEvent,
     NotReady,
     Trace,
 )
@@ -61,7 +61,7 @@ def whole(net: Network, graph: Graph, full_name: str, result: str) -> tuple[Outc
     seen = _Seen(net)
     try:
         traces = engine.start(graph, 0.0)
-    except EngineRefused:  # nothing of it begins, whoever ends how
+    except GraphRefused:  # nothing of it begins, whoever ends how
         return Outcome("never", seen.early, cut=False), 0
     events = len(traces)
     kind = seen.take(traces)
@@ -72,7 +72,9 @@ def whole(net: Network, graph: Graph, full_name: str, result: str) -> tuple[Outc
             break
         traces = engine.advance(due)
         events += len(traces)
-        left -= any(isinstance(t, NodeState) and t.state in ("FINISHED", "ERROR") for t in traces)
+        left -= any(
+            isinstance(t, NodeStateEvent) and t.state in ("FINISHED", "ERROR") for t in traces
+        )
         kind = seen.take(traces)
     if kind in (None, "stuck") and (engine.crashed or engine.locked or engine.circles):
         kind = "crashed" if engine.crashed else "locked"
@@ -110,13 +112,13 @@ class _Seen:
                         self.last = self._asked
                 case Dispatch(node=node):
                     self.waiting &= ~(1 << self._place(node))
-                case GraphState(state="FINISHED"):
+                case GraphStateEvent(state="FINISHED"):
                     kind = "finished"
-                case GraphState(state="HALTED"):
+                case GraphStateEvent(state="HALTED"):
                     kind = "halted"
-                case Hazard(code="H12"):
+                case HazardEvent(code="H12"):
                     self.early = True
-                case Hazard(code="H8"):
+                case HazardEvent(code="H8"):
                     kind = "stuck"
                 case _:
                     pass
