@@ -42,8 +42,8 @@ from action_assistant.web.workers.lanes import RunInWorker
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from action_assistant.runner import projection
+from runner.harness import at_once, run_in_virtual_time, sequence
 from runner.record_streams import Place
-from runner.world import at_once, live_through, sequence
 
 TITLE = "Lists of runs, runs of many events, and the room that they take"
 SIZES: Final = (1_000, 10_000, 100_000)
@@ -249,8 +249,8 @@ def _measured(actions: int, took: float) -> list[str]:
     """In virtual time: so many actions, one after the other."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        place, sent = live_through(lambda: _lived(folder, actions, took))
-        (events,) = (v for k, v in place.world.ledger.streams.items() if k.startswith("run/"))
+        place, sent = run_in_virtual_time(lambda: _lived(folder, actions, took))
+        (events,) = (v for k, v in place.harness.ledger.streams.items() if k.startswith("run/"))
         journal = asyncio.run(_stored(folder, events))
         raw = sum(path.stat().st_size for path in folder.glob("recordings/*/*"))
         archived = (folder / "one.jsonl.gz").stat().st_size
@@ -264,7 +264,7 @@ def _measured(actions: int, took: float) -> list[str]:
 async def _lived(folder: Path, actions: int, took: float) -> tuple[Place, int]:
     place = Place({"*": [{"after_s": took, "message": "done"}]})
     recordings = Recordings(folder / "recordings", at_once)
-    link: Any = place.world.links["Robin"]
+    link: Any = place.harness.links["Robin"]
     sent = 0
     asked = link.get
 
@@ -281,11 +281,11 @@ async def _lived(folder: Path, actions: int, took: float) -> tuple[Place, int]:
 
     link.get = get
     async with anyio.create_task_group() as tasks:
-        tasks.start_soon(place.air.blow)
+        tasks.start_soon(place.network.blow)
         tasks.start_soon(recordings.run)
         place.robot("Robin")
         await anyio.sleep(0.5)
-        async with place.world.runner() as place.control:
+        async with place.harness.runner() as place.control:
             await anyio.sleep(1.5)
             with link.listen(hear):
                 await place.start(sequence("hour", actions))

@@ -18,8 +18,8 @@ from action_assistant.journal.journal import Journal
 from action_assistant.runner.projection import fold as runner_fold
 from action_assistant.web.network.certificate import Certificate
 from journal.servers import Server
-from support.lived_in import Guest, answers, differences, live
 from support.product import COMMAND, Product, running
+from support.used_server import Guest, answers, differences, live
 
 
 class Keyed(Product):

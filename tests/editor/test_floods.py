@@ -18,7 +18,7 @@ from pycrdt import Doc, Map
 
 from action_assistant.editor.crdt import messages
 from action_assistant.web.network.connection_limits import AT_ONCE, OF_A_PERSON
-from editor import forge
+from editor import forged_updates
 from editor.process import BEARER, Editor, running
 from editor.test_sockets import acks, closed, eventually, goodbye, masked, upgraded
 
@@ -106,7 +106,9 @@ async def test_a_forger_is_closed_and_the_victims_edit_survives(editor: Editor, 
                 heard := messages.parse(await forger.receive_bytes(5)), messages.Edit
             ) or (b"mine" not in heard.update):
                 pass
-            await forger.send_bytes(messages.change(forge.entry(4711, 1, "late", "stolen")))
+            await forger.send_bytes(
+                messages.change(forged_updates.entry(4711, 1, "late", "stolen"))
+            )
             assert await goodbye(forger) == (messages.FORBIDDEN, messages.OTHER_CLIENT)
         victim.get("things", type=Map)["late"] = "mine"
         reader: Doc[Any] = Doc()
@@ -132,9 +134,9 @@ async def test_what_kills_the_library_is_refused_while_others_edit(
     unlimited: Editor, calm: str
 ) -> None:
     killers = [
-        forge.nested_values(30_000),
-        forge.nested_values(300_000),
-        forge.nested_types(40_000),
+        forged_updates.nested_values(30_000),
+        forged_updates.nested_values(300_000),
+        forged_updates.nested_types(40_000),
         bytes.fromhex("0101cc86dce28bb68f0a6688cc865d7c0000"),
         bytes.fromhex("8be0cc71"),
         b"\xff" * 50,
@@ -154,7 +156,7 @@ async def test_what_kills_the_library_is_refused_while_others_edit(
 async def test_half_open_and_frozen_sockets_cost_little_and_end(
     unlimited: Editor, calm: str
 ) -> None:
-    big = forge.entry(5, 0, "big", "x" * 900_000)
+    big = forged_updates.entry(5, 0, "big", "x" * 900_000)
     async with unlimited.socket(calm, "?acks=1") as session:
         await session.send_bytes(messages.change(big))
         await session.send_bytes(messages.question(b"\x00"))

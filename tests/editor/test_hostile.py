@@ -23,7 +23,7 @@ from action_assistant.web.network.connection_limits import (
     PER_MINUTE,
     ConnectionLimits,
 )
-from editor import forge
+from editor import forged_updates
 from editor.client import Client, settle
 
 STREAM = "graph/g"
@@ -46,7 +46,7 @@ async def test_a_forged_client_id_changes_nothing_and_the_victims_edit_survives(
         await settle(ada, eve)
         ada.map["place"] = "mine too"  # made, not sent yet
         clock = 1
-        eve.deliver(messages.change(forge.entry(1, clock, "place", "stolen")))
+        eve.deliver(messages.change(forged_updates.entry(1, clock, "place", "stolen")))
         await room.quiet()
         assert await ended(eve) == messages.FORBIDDEN
         await settle(ada)
@@ -75,7 +75,7 @@ async def test_ids_are_learned_from_the_log(journal: Journal) -> None:
         async with rooms.enter(STREAM) as room:
             eve.join(room)
             await settle(eve)
-            eve.deliver(messages.change(forge.entry(1, 1 + kept, "stolen", "x")))
+            eve.deliver(messages.change(forged_updates.entry(1, 1 + kept, "stolen", "x")))
             await room.quiet()
             assert await ended(eve) == messages.FORBIDDEN
             eve.leave()
@@ -107,7 +107,7 @@ async def test_an_id_that_somebody_shows_is_theirs_before_they_write(rooms: Room
         for client in (ada, eve):
             client.join(room)
         ada.deliver(messages.presence([messages.PresenceEntry(1, 1, b"{}")]))
-        eve.deliver(messages.change(forge.entry(1, 0, "stolen", "x")))
+        eve.deliver(messages.change(forged_updates.entry(1, 0, "stolen", "x")))
         await room.quiet()
         assert await ended(eve) == messages.FORBIDDEN
         ada.map["k"] = "mine"
@@ -120,12 +120,12 @@ def test_no_forged_header_is_taken() -> None:
     owners = dict.fromkeys(range(1, 40), "ada")
     replica = Replica()
     for client in owners:
-        replica.take(forge.entry(client, 0, f"k{client}", "true"), "ada")
+        replica.take(forged_updates.entry(client, 0, f"k{client}", "true"), "ada")
     before = replica.doc.get_update()
     for _ in range(10_000):
         client, clock = chance.randint(1, 39), chance.choice([1, 1, 2, 50, 2**31 - 2])
         with pytest.raises(ForeignClient):
-            replica.take(forge.entry(client, clock, "forged", "x"), "eve")
+            replica.take(forged_updates.entry(client, clock, "forged", "x"), "eve")
     assert replica.doc.get_update() == before
     assert replica.waiting == ()
     replica.close()
@@ -145,7 +145,7 @@ async def test_viewers_change_nothing_and_are_not_asked(rooms: Rooms) -> None:
         await settle(ada, vic)
         assert vic.member is not None
         assert not vic.member.closed
-        vic.deliver(messages.change(forge.entry(99, 0, "k", "vic's")))
+        vic.deliver(messages.change(forged_updates.entry(99, 0, "k", "vic's")))
         await room.quiet()
         assert await ended(vic) == messages.FORBIDDEN
         assert room.seq == 1
@@ -157,7 +157,7 @@ async def test_whatever_two_bytes_a_viewer_begins_with_nothing_changes(rooms: Ro
         ada.join(room)
         ada.map["k"] = "v"
         await settle(ada)
-        update = forge.entry(99, 0, "k", "vic's")
+        update = forged_updates.entry(99, 0, "k", "vic's")
         for first in range(256):
             for second in range(0, 256, 1 if first < 8 else 51):
                 vic = Client("vic")
@@ -176,30 +176,32 @@ async def test_whatever_two_bytes_a_viewer_begins_with_nothing_changes(rooms: Ro
 
 def test_types_may_lie_in_one_another_but_not_deeply() -> None:
     replica = Replica()
-    replica.take(forge.nested_types(DEEPEST_TYPES), "eve")
+    replica.take(forged_updates.nested_types(DEEPEST_TYPES), "eve")
     for deep in (DEEPEST_TYPES + 2, 1000, 30_000):
         with pytest.raises(Malformed, match="nested"):
-            Replica().take(forge.nested_types(deep), "eve")
+            Replica().take(forged_updates.nested_types(deep), "eve")
     below = DEEPEST_TYPES - 1
-    replica.take(forge.nested_types(1, start=DEEPEST_TYPES, below=below), "eve")
+    replica.take(forged_updates.nested_types(1, start=DEEPEST_TYPES, below=below), "eve")
     with pytest.raises(Malformed, match="nested"):  # not in small steps either
-        replica.take(forge.nested_types(1, start=DEEPEST_TYPES + 1, below=DEEPEST_TYPES), "eve")
+        replica.take(
+            forged_updates.nested_types(1, start=DEEPEST_TYPES + 1, below=DEEPEST_TYPES), "eve"
+        )
     replica.close()
 
 
 async def test_depth_is_known_after_a_snapshot(journal: Journal) -> None:
     rooms = Rooms(journal, linger=60, window=0)
     async with rooms.enter(STREAM) as room:
-        await room.submit(forge.nested_types(DEEPEST_TYPES), "eve")
+        await room.submit(forged_updates.nested_types(DEEPEST_TYPES), "eve")
         await room.submit(
-            forge.nested_types(1, start=DEEPEST_TYPES, below=DEEPEST_TYPES - 1), "eve"
+            forged_updates.nested_types(1, start=DEEPEST_TYPES, below=DEEPEST_TYPES - 1), "eve"
         )
     await rooms.close()
     loaded = await load(journal, STREAM)
     assert loaded.kept == 2
     with pytest.raises(Malformed, match="nested"):
         loaded.replica.take(
-            forge.nested_types(1, start=DEEPEST_TYPES + 1, below=DEEPEST_TYPES), "eve"
+            forged_updates.nested_types(1, start=DEEPEST_TYPES + 1, below=DEEPEST_TYPES), "eve"
         )
     loaded.replica.close()
 
@@ -230,11 +232,11 @@ async def test_what_never_comes_is_not_waited_for_without_end(rooms: Rooms) -> N
         eve.join(room)
         ada.join(room)
         for n in range(WAITING_UPDATES + 1):
-            eve.deliver(messages.change(forge.entry(66, 10 + 2 * n, "k", "x")))
+            eve.deliver(messages.change(forged_updates.entry(66, 10 + 2 * n, "k", "x")))
         await room.quiet()
         assert await ended(eve) == messages.TOO_BIG
         assert room.seq == WAITING_UPDATES
-        ada.deliver(messages.change(forge.entry(67, 10, "k", "x")))
+        ada.deliver(messages.change(forged_updates.entry(67, 10, "k", "x")))
         ada.map["k"] = "v"
         await settle(ada)
         assert ada.things == {"k": "v"}
@@ -243,10 +245,12 @@ async def test_what_never_comes_is_not_waited_for_without_end(rooms: Rooms) -> N
 @pytest.mark.parametrize(
     "update",
     [
-        forge.entry(2**53, 0, "k", "x"),
-        forge.entry(7, 2**31 - 1, "k", "x"),
-        forge.entry(7, 2**63, "k", "x"),
-        b"\x02" + forge.entry(7, 0, "k", "x")[1:-1] + forge.entry(7, 1, "k", "x")[1:],
+        forged_updates.entry(2**53, 0, "k", "x"),
+        forged_updates.entry(7, 2**31 - 1, "k", "x"),
+        forged_updates.entry(7, 2**63, "k", "x"),
+        b"\x02"
+        + forged_updates.entry(7, 0, "k", "x")[1:-1]
+        + forged_updates.entry(7, 1, "k", "x")[1:],
         b"\x00\x01\x07\x01" + messages.number(2**40) + b"\x01",
     ],
 )

@@ -21,7 +21,7 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
-from editor.mortal import NOWHERE, POINTS, Pipe
+from editor.dying_rooms import NOWHERE, POINTS, Pipe
 from editor.process import Editor, running
 
 WRITERS: Final = 3
@@ -131,7 +131,7 @@ class Mortal:
     @classmethod
     async def begun(cls, folder: Path) -> "Mortal":
         process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "editor.mortal", str(folder)),
+            *(sys.executable, "-m", "editor.dying_rooms", str(folder)),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},

@@ -33,7 +33,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.model import Action, Graph, Parameter
 from runner.bounds import GRAPHS, Real, fits
-from runner.world import ANN, BEN, MemoryLedger, at_once, order
+from runner.harness import ANN, BEN, MemoryLedger, at_once, order
 
 RUNS = int(os.environ.get("TEST_BOUNDS_RUNS", "6"))
 DOMAIN = int(os.environ.get("TEST_BOUNDS_DOMAIN", "150"))

@@ -18,7 +18,7 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Ended
 from ros.robots import RobotProcess, robot
 from ros.test_false_confirmations import clock_us
-from runner.world import ANN, BEN, MemoryLedger, at_once, order, sequence
+from runner.harness import ANN, BEN, MemoryLedger, at_once, order, sequence
 
 STUBBORN: dict[str, Any] = {"*": [{"never": True, "ignores_stop": True}]}
 

@@ -41,8 +41,8 @@ from action_assistant.runner.runs.run import ENDED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import Execution
 from ros.robots import robot
-from runner.air import run_of
-from runner.world import ANN, BEN, MemoryLedger, at_once, order, sequence, two_ends
+from runner.fake_network import run_of
+from runner.harness import ANN, BEN, MemoryLedger, at_once, order, sequence, two_ends
 
 HISTORIES = int(os.environ.get("TEST_ROS_HISTORIES", "2"))
 FIRST = int(os.environ.get("TEST_ROS_HISTORIES_FROM", "0"))

@@ -16,7 +16,7 @@ from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Override
 from ros.robots import robot
-from runner.world import ANN, MemoryLedger, at_once, order, sequence
+from runner.harness import ANN, MemoryLedger, at_once, order, sequence
 
 
 def clock_us() -> int:

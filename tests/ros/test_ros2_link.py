@@ -34,7 +34,7 @@ from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from ros.echo_engine import EchoEngine, graph_text
-from runner.world import sequence
+from runner.harness import sequence
 
 
 def clock_us() -> int:

@@ -26,8 +26,8 @@ from websockets.sync.client import connect
 
 from action_assistant.runner.emulator.messages import LogMessage, Said
 from ros.robots import robot
+from runner.harness import order, sequence
 from runner.process import body
-from runner.world import order, sequence
 from support.product import TOKEN, Product, running
 from test_stop_latency import a_frozen_editor, a_large_update, both_cores_busy, quiet
 

@@ -31,10 +31,10 @@ from action_assistant.runner.start.start_checks import GroupRequest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
 from action_assistant.umrf.semantics import script_from
-from runner import world
-from runner.air import Air, now_ms
-from runner.air_link import AirLink
-from runner.world import ANN, BEN, World, carousel, live_through, order, sequence
+from runner import harness
+from runner.fake_link import FakeLink
+from runner.fake_network import FakeNetwork, now_ms
+from runner.harness import ANN, BEN, Harness, carousel, order, run_in_virtual_time, sequence
 
 
 class Line(msgspec.Struct, frozen=True):
@@ -50,9 +50,9 @@ class Place:
     """Two robots with their runner."""
 
     def __init__(self, script: dict[str, Any]) -> None:
-        self.air = Air()
-        links = {name: AirLink(self.air, name, f"/{name}") for name in ("Robin", "Marian")}
-        self.world = World(dict(links))
+        self.network = FakeNetwork()
+        links = {name: FakeLink(self.network, name, f"/{name}") for name in ("Robin", "Marian")}
+        self.harness = Harness(dict(links))
         self.script = script_from({"behaviours": script})
         self.control: ExecutionService
 
@@ -64,9 +64,9 @@ class Place:
             index=index_of([], []),
             quirks=EngineTraits(loss=0.2),
             born_ms=now_ms(),
-            epoch_ms=world.EPOCH // 1000,
+            epoch_ms=harness.EPOCH // 1000,
         )
-        self.air.join(engine, f"/{name}")
+        self.network.join(engine, f"/{name}")
 
     async def start(self, graph: Graph, engine: str = "Robin", **more: Any) -> str:
         """Ann starts it."""
@@ -127,7 +127,7 @@ async def engine_lost(place: Place) -> None:
     """The engine dies, and another one comes up."""
     await place.start(sequence("engine_lost", 2))
     await anyio.sleep(4)
-    place.air.kill(place.air.nodes[0])
+    place.network.kill(place.network.nodes[0])
     await anyio.sleep(16)
     place.robot("Robin")
     await place.at_rest()
@@ -139,9 +139,11 @@ async def foreign(place: Place) -> None:
     plan = sequence("foreign", 2)
     await place.start(plan)
     await anyio.sleep(4)
-    place.air.strangers = 1
+    place.network.strangers = 1
     text = codec.write(plan)
-    place.air.carry(Start(graph_name="foreign", targets=("Robin",), graph_json=text), "terminal")
+    place.network.carry(
+        Start(graph_name="foreign", targets=("Robin",), graph_json=text), "terminal"
+    )
     await place.over()
 
 
@@ -198,19 +200,19 @@ async def told(story: Story) -> list[list[Event]]:
     """The streams of a story."""
     place = Place(STORIES[story])
     async with anyio.create_task_group() as wind:
-        wind.start_soon(place.air.blow)
+        wind.start_soon(place.network.blow)
         place.robot("Robin")
         place.robot("Marian")
         await anyio.sleep(0.5)
-        async with place.world.runner() as place.control:
+        async with place.harness.runner() as place.control:
             await anyio.sleep(1.5)
             await story(place)
         if story is runner_restarted:
             await anyio.sleep(3)
-            async with place.world.runner() as place.control:
+            async with place.harness.runner() as place.control:
                 await place.over()
         wind.cancel_scope.cancel()
-    streams = place.world.ledger.streams
+    streams = place.harness.ledger.streams
     return [streams[name] for name in sorted(streams) if name.startswith("run/")]
 
 
@@ -230,7 +232,7 @@ def recorded() -> Iterator[tuple[str, list[Event]]]:
     """All streams by name."""
     for story in STORIES:
         with _same_every_time(story.__name__):
-            streams = live_through(lambda s=story: told(s))
+            streams = run_in_virtual_time(lambda s=story: told(s))
         for number, events in enumerate(streams, 1):
             yield f"{story.__name__}{number if len(streams) > 1 else ''}", events
 

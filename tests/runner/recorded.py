@@ -31,7 +31,7 @@ from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.runs.fold import begin
 from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
-from runner.world import ANN, BEN, EPOCH, MemoryLedger, at_once, clock_us, live_through
+from runner.harness import ANN, BEN, EPOCH, MemoryLedger, at_once, clock_us, run_in_virtual_time
 
 LETTERS = {
     "U": "UNINITIALIZED", "I": "INITIALIZED", "R": "RUNNING", "Q": "PAUSE_REQUESTED", "P": "PAUSED",
@@ -264,7 +264,7 @@ def history(file: Path) -> Run:
             tasks.cancel_scope.cancel()
         return opened.run
 
-    run: Run = live_through(main)
+    run: Run = run_in_virtual_time(main)
     return run
 
 

@@ -12,7 +12,7 @@ from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Relation
-from runner.world import GO_ON, order, sequence
+from runner.harness import GO_ON, order, sequence
 
 
 def one_sided(name: str = "lopsided") -> Graph:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from runner.harness import order, sequence
 from runner.process import RunnerProcess, over, started
-from runner.world import order, sequence
 
 FORBIDDEN = ("pycrdt", "action_assistant.editor")
 

@@ -6,7 +6,7 @@ from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer
 from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.stop.proof import RestProof
-from runner.world import virtual
+from runner.harness import virtual
 
 
 def held(graph: str, state: str, work: str, run: str | None = None) -> Snapshot:

@@ -4,7 +4,7 @@ import anyio
 
 from action_assistant.runner.runs.events import AlarmRaised
 from action_assistant.runner.runs.recorder import RunRecorder, stream_of
-from runner.world import MemoryLedger, until, virtual
+from runner.harness import MemoryLedger, until, virtual
 
 
 def alarm(number: int) -> AlarmRaised:

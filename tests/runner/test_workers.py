@@ -15,7 +15,7 @@ from action_assistant.errors import Conflict, TooLarge, TooMany, Unavailable
 from action_assistant.runner.workers import Crashed, Lane, RunnerWorkers
 from action_assistant.web.auth import access
 from action_assistant.web.auth.access import Caller, done_for_nobody
-from runner.labour import devour, die, pid, refuse, spin, standing, stumble
+from runner.worker_tasks import devour, die, pid, refuse, spin, standing, stumble
 
 
 @pytest.fixture(scope="module")

@@ -23,9 +23,9 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.links.simulated import SimulatedLink, Simulators
 from action_assistant.umrf.facts import SIMULATED
+from runner.harness import carousel, sequence
 from runner.links.contract import PROMISES, Bench, Promise, has_ended, keep, moves, placed, shown
 from runner.links.test_contract import SCRIPT
-from runner.world import carousel, sequence
 
 pytestmark = pytest.mark.anyio
 

@@ -27,10 +27,10 @@ from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
+from runner.harness import ANN
 from runner.process import RunnerProcess
 from runner.record_examples import graph, line, recorded
-from runner.review.test_desk import eventually
-from runner.world import ANN
+from runner.review.test_service import eventually
 
 EXAMPLES = {
     "wrong_parameter": 'Grip was started with speed = "fast": a number was expected.',

@@ -12,8 +12,8 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
+from runner.harness import sequence
 from runner.test_runs import REQUESTED
-from runner.world import sequence
 
 PLAN = sequence(actions=2)
 

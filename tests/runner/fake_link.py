@@ -20,19 +20,19 @@ from action_assistant.runner.links.port import (
     Standing,
 )
 from action_assistant.runner.links.ros2.ros_values import LogLine, OverheardCommand
-from runner.air import HASH, Air
-from runner.world import clock_us
+from runner.fake_network import HASH, FakeNetwork
+from runner.harness import clock_us
 
 
-class AirLink:
+class FakeLink:
     """A link to one robot through the air, by the rules of the one over rclpy: an answer counts only
     while the same one server stands on the path before and after."""
 
     simulated = False
     pauses = False
 
-    def __init__(self, air: Air, name: str, path: str = "/umrf_graph_get") -> None:
-        self._air = air
+    def __init__(self, network: FakeNetwork, name: str, path: str = "/umrf_graph_get") -> None:
+        self._air = network
         self._name = name
         self._path = path
         self._known = ""

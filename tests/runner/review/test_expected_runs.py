@@ -9,9 +9,9 @@ import pytest
 from action_assistant.runner.analysis.expected_runs import Recorded, fitted, recorded
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
+from runner.harness import order, sequence
 from runner.process import RunnerProcess, over, started
 from runner.review.test_compare import PLAN, went
-from runner.world import order, sequence
 
 RUN, _ = went(1, ("Work_0", "false"), ("Work_1", "error"), said="gripper jammed")
 

@@ -35,7 +35,7 @@ from action_assistant.runner.links.ros2.ros_values import (
     OverheardCommand,
     RosValue,
 )
-from runner.world import clock_us
+from runner.harness import clock_us
 
 LEASE_S = 10.0  # until discovery knows of a death that nobody announced
 GRAIN_MS = 0.01  # clocks are not finer: what is due so soon is due now
@@ -64,12 +64,14 @@ def run_of(robot: EmulatedEngine, graph: str) -> str:
 class Node:
     """An engine node in the air: a stand-in and what discovery knows of it."""
 
-    def __init__(self, air: "Air", robot: EmulatedEngine, path: str, lag_s: float) -> None:
-        air.born += 1
-        self.air = air
+    def __init__(
+        self, network: "FakeNetwork", robot: EmulatedEngine, path: str, lag_s: float
+    ) -> None:
+        network.born += 1
+        self.network = network
         self.robot = robot
         self.path = path
-        self.process = f"process{air.born}"
+        self.process = f"process{network.born}"
         self.type_hash = HASH
         self.matched_at = now() + 0.02  # hears from then on
         self.seen_at = self.matched_at + lag_s  # and is known to be there a little later
@@ -99,8 +101,8 @@ class Node:
 class Outlet:
     """One command topic of ours: messages leave one by one, `GAP_S` apart."""
 
-    def __init__(self, air: "Air") -> None:
-        self._air = air
+    def __init__(self, network: "FakeNetwork") -> None:
+        self._air = network
         self._turn = anyio.Lock()
 
     async def send(self, make: Callable[[], Any]) -> None:
@@ -115,9 +117,9 @@ class Outlet:
 class Outlets:
     """Everything that our commands leave by."""
 
-    def __init__(self, air: "Air") -> None:
-        self.start, self.stop, self.pause = Outlet(air), Outlet(air), Outlet(air)
-        self.resume, self.modify = Outlet(air), Outlet(air)
+    def __init__(self, network: "FakeNetwork") -> None:
+        self.start, self.stop, self.pause = Outlet(network), Outlet(network), Outlet(network)
+        self.resume, self.modify = Outlet(network), Outlet(network)
         self._stopping: dict[str, set[str]] = {}
 
     async def send_stop(self, graph: str, target: str) -> None:
@@ -151,7 +153,7 @@ def wire(message: Any) -> Message:
     return kind(**fields)
 
 
-class Air:
+class FakeNetwork:
     """One domain. `loss` is the chance that a message of that topic, or `get`, gets lost on its way
     to one node; `late_s` how long starts take. Answers and feedback take up to `old_s` and
     `feedback_s`."""

@@ -88,7 +88,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         return self._jumping.now
 
 
-def live_through(main: Callable[[], Awaitable[Any]]) -> Any:
+def run_in_virtual_time(main: Callable[[], Awaitable[Any]]) -> Any:
     """Run a coroutine function in virtual time."""
     return anyio.run(main, backend_options={"loop_factory": VirtualLoop})
 
@@ -97,7 +97,7 @@ def virtual(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
     """Live through a test in virtual time."""
 
     def lived(*args: Any, **kwargs: Any) -> None:
-        live_through(functools.partial(test, *args, **kwargs))
+        run_in_virtual_time(functools.partial(test, *args, **kwargs))
 
     lived.__name__, lived.__doc__ = test.__name__, test.__doc__
     vars(lived)["__signature__"] = inspect.signature(test)
@@ -303,7 +303,7 @@ def engine(script: dict[str, Any] | None = None) -> SimulatorLink:
     return SimulatorLink(Engine(facts=SIMULATED, script=chosen), clock_us=clock_us)
 
 
-class World:
+class Harness:
     """One place with a journal and robots, in which runners come and go."""
 
     def __init__(self, robots: dict[str, Link] | None = None) -> None:

@@ -1,4 +1,4 @@
-"""A crowd that presses hard on a runner: `python -m support.hostile PORT SILENT CLIENTS`.
+"""A crowd that presses hard on a runner: `python -m support.load_on_runner PORT SILENT CLIENTS`.
 
 Every route with the worst body that it takes, from as many people as there are clients, beside
 strangers who hold connections and say nothing, or begin to. Ends when it is killed.
@@ -38,7 +38,7 @@ def long_run(data: Path, events: int) -> None:
 
 async def _stored(data: Path, count: int) -> None:
     from action_assistant.journal.events import Draft
-    from runner.world import ANN, sequence
+    from runner.harness import ANN, sequence
 
     url = f"sqlite:///{data / 'runner.db'}"
     Journal.prepare(url, "runner")
@@ -76,7 +76,7 @@ def _shown(names: list[str], count: int) -> Iterator[RunEvent]:
 
 def graph_text(actions: int, filler: int = 0) -> bytes:
     """A graph of so many actions, of at least so many bytes."""
-    from runner.world import sequence
+    from runner.harness import sequence
 
     value = msgspec.json.decode(codec.write(sequence("hostile", actions)))
     value["graph_description"] = "x" * filler

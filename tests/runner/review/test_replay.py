@@ -22,8 +22,8 @@ from action_assistant.runner.runs.events import (
     encode,
 )
 from action_assistant.runner.runs.fold import replay
+from runner.harness import MemoryLedger, at_once, virtual
 from runner.test_runs import STARTED
-from runner.world import MemoryLedger, at_once, virtual
 
 STATES = ("UNINITIALIZED", "RUNNING", "STOPPING", "FINISHED", "ERROR", "PAUSED")
 NODES = ("Go_0", "Grip_0", "Sub__Go__0")

@@ -9,7 +9,7 @@ from action_assistant import cli
 from action_assistant.commands.simulate_robot import _index, _texts
 from action_assistant.runner.links.ros2.availability import why_not
 from action_assistant.umrf.files import codec
-from runner.world import sequence
+from runner.harness import sequence
 
 
 @pytest.mark.skipif(not why_not(), reason="rclpy is here, so it would run")

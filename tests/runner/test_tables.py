@@ -14,7 +14,7 @@ from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs import queries, views
 from action_assistant.schema.runner_tables import robot, run
-from runner.world import ANN, BEN, order, sequence, until
+from runner.harness import ANN, BEN, order, sequence, until
 
 
 async def _all(journal: Journal) -> list[Any]:

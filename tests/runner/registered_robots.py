@@ -22,7 +22,7 @@ from action_assistant.runner.links.port import (
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph, Parameter
-from runner.world import Robot, clock_us, engine
+from runner.harness import Robot, clock_us, engine
 
 WORK = codec.write_action(Action(key="work", name="Work"))
 
@@ -78,7 +78,7 @@ class Open(Robot):
         self.tell(EngineLog(at=clock_us(), text=text, graph=graph))
 
 
-class Fleet:
+class RegisteredRobots:
     """A reach whose robots are there already, by name."""
 
     rmw = "rmw_test"

@@ -15,8 +15,8 @@ from mcap.reader import make_reader
 from action_assistant.cli import main
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
+from runner.harness import order, sequence
 from runner.process import RunnerProcess, over, started
-from runner.world import order, sequence
 
 GOOD = {"*": [{"after_s": 0.02}]}
 BAD = {"Work_1": [{"after_s": 0.02, "result": "on_error", "message": "gripper jammed"}]} | GOOD

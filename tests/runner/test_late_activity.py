@@ -13,16 +13,16 @@ from action_assistant.runner.emulator.messages import EngineTraits
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Ended, MovesAgain, Proof, StopSent
-from runner.air import now_ms
-from runner.scene import Scene, asked, shown
-from runner.world import ANN, BEN, until, virtual
+from runner.fake_network import now_ms
+from runner.harness import ANN, BEN, until, virtual
+from runner.robots_in_network import RobotsInNetwork, asked, shown
 
 SLOW = EngineTraits(loading_ms=3_000.0)
 TWO_SECONDS = {"*": [{"after_s": 2.0}]}
 
 
-def scene(**more: Any) -> Scene:
-    return Scene(11, **({"quirks": SLOW, "script": TWO_SECONDS} | more))
+def scene(**more: Any) -> RobotsInNetwork:
+    return RobotsInNetwork(11, **({"quirks": SLOW, "script": TWO_SECONDS} | more))
 
 
 async def proven_stopped(control: ExecutionService) -> str:
@@ -48,7 +48,7 @@ async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
         assert (told.state, told.proof_at, told.ended_at) == ("stopping", None, None)
         assert told.moves_again_at is not None
         assert any("MOVES AGAIN: David shows Work_0" in each.text for each in told.alarms)
-        assert [row.id for row in await here.world.ledger.query(queries.open_runs())] == [run]
+        assert [row.id for row in await here.harness.ledger.query(queries.open_runs())] == [run]
         await until(lambda: run not in control.open)
         assert here.nodes["David"].robot.moving == ()
         told = await control.find(run)
@@ -56,13 +56,13 @@ async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
         assert told.proof_at is not None
         assert first is not None
         assert told.proof_at > first
-    kinds = [type(each) for each in here.world.ledger.told(run)]
+    kinds = [type(each) for each in here.harness.ledger.told(run)]
     again = kinds.index(MovesAgain)
     assert kinds[again - 1] is Ended
     assert [kinds.count(each) for each in (MovesAgain, Proof, Ended)] == [1, 2, 2]
     assert StopSent in kinds[again:]
-    assert here.world.ledger.history(run) == told
-    (row,) = await here.world.ledger.query(queries.listed(queries.Filter(), 5))
+    assert here.harness.ledger.history(run) == told
+    (row,) = await here.harness.ledger.query(queries.listed(queries.Filter(), 5))
     assert (row.state, row.summary["proof_at"]) == ("stopped", told.proof_at)
     assert [each["code"] for each in row.summary["alarms"]].count("moves_again") == 1
 
@@ -81,14 +81,14 @@ async def test_it_is_said_also_while_nothing_can_be_recorded() -> None:
     here = scene()
     async with here.played() as control:
         run = await proven_stopped(control)
-        here.world.ledger.down = True
+        here.harness.ledger.down = True
         await until(lambda: run in control.open)
         await until(lambda: not control.open[run].recorder.recorded)
         assert shown(control, run).moves_again_at is not None
         await until(lambda: shown(control, run).state == "stopped")
-        here.world.ledger.down = False
+        here.harness.ledger.down = False
         await until(lambda: run not in control.open)
-        assert here.world.ledger.history(run) == await control.find(run)
+        assert here.harness.ledger.history(run) == await control.find(run)
 
 
 @virtual
@@ -97,14 +97,14 @@ async def test_it_is_said_also_where_the_first_end_is_not_recorded_yet() -> None
     async with here.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await anyio.sleep(0.3)
-        here.world.ledger.down = True
+        here.harness.ledger.down = True
         await control.stop(run, BEN)
         await until(lambda: shown(control, run).state == "stopped")
         await until(lambda: shown(control, run).moves_again_at is not None)
-        here.world.ledger.down = False
+        here.harness.ledger.down = False
         await until(lambda: run not in control.open)
-        assert here.world.ledger.history(run).state == "stopped"
-    kinds = [type(each) for each in here.world.ledger.told(run)]
+        assert here.harness.ledger.history(run).state == "stopped"
+    kinds = [type(each) for each in here.harness.ledger.told(run)]
     assert [kinds.count(each) for each in (MovesAgain, Ended)] == [1, 2]
 
 
@@ -112,11 +112,11 @@ async def test_it_is_said_also_where_the_first_end_is_not_recorded_yet() -> None
 async def test_a_runner_that_was_restarted_meanwhile_stops_it() -> None:
     here = scene()
     async with anyio.create_task_group() as wind:
-        wind.start_soon(here.air.blow)
-        async with here.world.runner() as control:
+        wind.start_soon(here.network.blow)
+        async with here.harness.runner() as control:
             await anyio.sleep(0.5)
             run = await proven_stopped(control)
-        async with here.world.runner() as control:
+        async with here.harness.runner() as control:
             await until(lambda: run in control.open)
             assert shown(control, run).state == "stopping"
             await until(lambda: run not in control.open)
@@ -129,7 +129,7 @@ async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_o
     None
 ):
     here = scene()
-    read = here.world.ledger.read
+    read = here.harness.ledger.read
 
     async def slowly(*given: Any, **more: Any) -> Any:
         """A journal on a busy disk."""
@@ -137,13 +137,13 @@ async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_o
         return await read(*given, **more)
 
     async with anyio.create_task_group() as wind:
-        wind.start_soon(here.air.blow)
-        async with here.world.runner() as control:
+        wind.start_soon(here.network.blow)
+        async with here.harness.runner() as control:
             await anyio.sleep(0.5)
             run = (await control.start(asked(), ANN)).run.id
             await until(lambda: "Work_0" in control.open[run].run.active)
-        here.world.ledger.read = slowly  # type: ignore[method-assign]
-        async with here.world.runner() as control:
+        here.harness.ledger.read = slowly  # type: ignore[method-assign]
+        async with here.harness.runner() as control:
             await until(lambda: run in control.open)
             await until(lambda: not control.open[run].run.active)  # the next one is being loaded
             await control.stop(run, BEN)
@@ -175,7 +175,7 @@ async def test_feedback_that_nobody_can_contradict_is_believed_until_somebody_do
         await until(lambda: run in control.open)
         await until(lambda: shown(control, run).state == "unknown")
         here.nodes["David"].robot.thaw(now_ms())
-        here.air.stir(here.nodes["David"])
+        here.network.stir(here.nodes["David"])
         await until(lambda: run not in control.open)
         assert (await control.find(run)).state == "stopped"
 
@@ -185,15 +185,15 @@ async def test_a_start_of_ours_that_somebody_plays_again_is_theirs() -> None:
     here = scene(quirks=EngineTraits(), script={"*": [{"never": True}]})
     async with here.played() as control:
         run = await proven_stopped(control)
-        here.air.carry(here.starts()[0], "bag")
+        here.network.carry(here.starts()[0], "bag")
         await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
         await anyio.sleep(5)
         assert run not in control.open
         assert here.nodes["David"].robot.moving == ("patrol",)  # a Stop of it is asked for by name
 
 
-def _made_up(here: Scene) -> None:
+def _made_up(here: RobotsInNetwork) -> None:
     """Feedback that shows the run moving, sent by nobody's engine."""
     graph = json.loads(here.starts()[-1].graph_json) | {"graph_state": "STOPPED"}
     graph["actions"] = [each | {"state": "RUNNING"} for each in graph["actions"]]
-    here.air.show("David", [json.dumps(graph)])
+    here.network.show("David", [json.dumps(graph)])

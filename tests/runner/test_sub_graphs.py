@@ -16,16 +16,16 @@ from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
-from runner.air import Node, now_ms
-from runner.scene import PATHS, Scene
-from runner.world import ANN, ended, order, sequence, until, virtual
+from runner.fake_network import Node, now_ms
+from runner.harness import ANN, ended, order, sequence, until, virtual
+from runner.robots_in_network import PATHS, RobotsInNetwork
 
 SUB = sequence("Sub", 1)
 FACTS = msgspec.structs.replace(PINNED, restart_matches=True)
 SCRIPT = {"Work_0": [{"after_s": 4}], "*": [{"after_s": 1}]}
 
 
-class WithSub(Scene):
+class WithSub(RobotsInNetwork):
     """Robots whose engines have indexed a graph called Sub."""
 
     def __init__(self, seed: int, *, script: dict[str, Any], sub: Graph = SUB) -> None:
@@ -42,7 +42,7 @@ class WithSub(Scene):
             facts=FACTS,
             born_ms=now_ms(),
         )
-        return self.air.join(stand_in, PATHS[name])
+        return self.network.join(stand_in, PATHS[name])
 
 
 def named(*names: str) -> Graph:
@@ -55,7 +55,7 @@ def named(*names: str) -> Graph:
     return msgspec.structs.replace(line, actions=actions)
 
 
-async def played(scene: Scene, graph: Graph) -> str:
+async def played(scene: RobotsInNetwork, graph: Graph) -> str:
     codes = ("quiet", "others", "actions", "actors", "H5", "H8", "unknown-action", "restart")
     override = Override(codes=codes, reason="it is a test")
     async with scene.played() as control:
@@ -71,9 +71,9 @@ async def played(scene: Scene, graph: Graph) -> str:
 @virtual
 async def test_a_sub_graph_of_an_earlier_run_is_no_part_of_one_that_has_only_its_name() -> None:
     scene = WithSub(1, script=SCRIPT)
-    first = scene.world.ledger.history(await played(scene, named("Sub")))
+    first = scene.harness.ledger.history(await played(scene, named("Sub")))
     assert set(first.actions) == {"Sub_0", "patrol__Sub__0/Work_0"}
-    second = scene.world.ledger.history(await played(scene, named("Work")))
+    second = scene.harness.ledger.history(await played(scene, named("Work")))
     assert set(second.actions) == {"Work_0"}
     assert second.parts == {}
 
@@ -82,7 +82,7 @@ async def test_a_sub_graph_of_an_earlier_run_is_no_part_of_one_that_has_only_its
 async def test_until_its_own_begins_a_run_does_not_show_the_one_from_before() -> None:
     scene = WithSub(2, script=SCRIPT)
     await played(scene, named("Sub"))
-    run = scene.world.ledger.history(await played(scene, named("Work", "Sub")))
+    run = scene.harness.ledger.history(await played(scene, named("Work", "Sub")))
     (outer,) = run.actions["Work_0"].visits
     (inner,) = run.actions["patrol__Sub__0/Work_0"].visits
     assert outer.until is not None

@@ -9,7 +9,7 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.documents import document
 from action_assistant.editor.documents.fingerprint import Fingerprint, fingerprint
 from action_assistant.editor.rooms.open_rooms import Rooms
-from editor import forge
+from editor import forged_updates
 from editor.client import Client, settle
 
 STREAM = "graph/g"
@@ -62,7 +62,7 @@ async def test_a_page_that_shows_something_else_is_told_and_it_is_reported(rooms
         assert room.divergences == 0
         # Somebody's document came by another way to what the room does not have.
         other: Doc[Any] = Doc()
-        other.apply_update(forge.entry(ada.doc.client_id, 0, "name", "other", root="meta"))
+        other.apply_update(forged_updates.entry(ada.doc.client_id, 0, "name", "other", root="meta"))
         assert other.get_state() == ada.doc.get_state()
         compare(eve, other)
         await room.quiet()

@@ -28,7 +28,7 @@ from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
-from runner.world import sequence
+from runner.harness import sequence
 
 WORK = json.dumps({"name": "Work", "type": "sync", "instance_id": 0})
 ENDLESS = {"*": [{"never": True}]}

@@ -12,9 +12,9 @@ from action_assistant.runner.emulator.messages import EngineTraits, Start
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs import views
 from action_assistant.umrf.semantics import script_from
-from runner.air import Air, Node, now, now_ms
-from runner.air_link import AirLink
-from runner.world import World, order, sequence
+from runner.fake_link import FakeLink
+from runner.fake_network import FakeNetwork, Node, now, now_ms
+from runner.harness import Harness, order, sequence
 
 PATROL, OTHER = sequence("patrol"), sequence("other")
 PATHS = {"David": "/david/umrf_graph_get", "Carol": "/carol/umrf_graph_get"}
@@ -25,7 +25,7 @@ SCRIPT: dict[str, Any] = {
 }
 
 
-class Scene:
+class RobotsInNetwork:
     """Robots in the air, each on a path of its own, and the runner."""
 
     def __init__(
@@ -36,13 +36,13 @@ class Scene:
         script: dict[str, Any] = SCRIPT,
     ) -> None:
         self.chance = random.Random(seed)
-        self.air = Air(self.chance)
+        self.network = FakeNetwork(self.chance)
         self.lines: list[tuple[float, str]] = []
         self.quirks = quirks
         self.script = script
         self.names = names or ("David",)
-        links = {name: AirLink(self.air, name, PATHS[name]) for name in self.names}
-        self.world = World(dict(links))
+        links = {name: FakeLink(self.network, name, PATHS[name]) for name in self.names}
+        self.harness = Harness(dict(links))
         self.nodes = {name: self.robot(name) for name in self.names}
 
     def robot(self, name: str) -> Node:
@@ -54,15 +54,15 @@ class Scene:
             seed=self.chance.getrandbits(32),
             born_ms=now_ms(),
         )
-        return self.air.join(stand_in, PATHS[name])
+        return self.network.join(stand_in, PATHS[name])
 
     @asynccontextmanager
     async def played(self) -> AsyncIterator[ExecutionService]:
         """The runner, with everything alive around it."""
-        with self.air.hearing(self._hear):
+        with self.network.hearing(self._hear):
             async with anyio.create_task_group() as wind:
-                wind.start_soon(self.air.blow)
-                async with self.world.runner() as control:
+                wind.start_soon(self.network.blow)
+                async with self.harness.runner() as control:
                     await anyio.sleep(0.5)
                     yield control
                 wind.cancel_scope.cancel()
@@ -74,7 +74,7 @@ class Scene:
 
     def starts(self) -> list[Start]:
         """Starts of ours that left."""
-        return [each for _, each in self.air.sent if isinstance(each, Start)]
+        return [each for _, each in self.network.sent if isinstance(each, Start)]
 
 
 def asked(name: str = "David", **more: Any) -> Any:

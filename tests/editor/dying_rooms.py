@@ -1,6 +1,6 @@
 """Rooms on a real journal in small processes that die where they are told to.
 
-`python -m editor.mortal FOLDER` reads lines `STREAM POINT COUNT`, and for each forks a process that
+`python -m editor.dying_rooms FOLDER` reads lines `STREAM POINT COUNT`, and for each forks a process that
 serves the room of STREAM on FOLDER/socket and kills itself with SIGKILL when it passes POINT for the
 COUNT-th time. It prints the number of each process, then `dead`. The product knows nothing of this.
 """
