@@ -1,4 +1,4 @@
-"""What is nobody else's business: folders that only this user may enter, files that only they may read."""
+"""Private files: folders that only this user may enter, files that only they may read."""
 
 import os
 import re

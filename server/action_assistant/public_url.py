@@ -1,4 +1,4 @@
-"""The address under which a proxy shows the product to others, and which proxies are believed."""
+"""The public URL, under which a proxy shows the product to others, and the proxies to believe."""
 
 import ipaddress
 import re

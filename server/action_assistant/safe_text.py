@@ -1,4 +1,4 @@
-"""Texts of strangers on terminals and in logs: without what steers a terminal, and without secrets.
+"""Texts of strangers on terminals and in logs: without control sequences, and without secrets.
 
 Names of graphs and robots, paths and headers of requests and what engines say are written by anybody. A
 character that is no text is shown as JSON writes it (`\\u001b`), so that JSON stays the same JSON.

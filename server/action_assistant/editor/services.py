@@ -1,4 +1,4 @@
-"""What one editor process is made of."""
+"""The services of the editor process, and the state that its routes are given."""
 
 from action_assistant.editor.catalogue.catalogue import Catalogue
 from action_assistant.editor.catalogue.graph_reader import GraphReader
@@ -18,7 +18,7 @@ from action_assistant.web.network.connection_limits import ConnectionLimits
 
 
 class EditorServices:
-    """The parts, put together around a journal that is open."""
+    """The services, put together around a journal that is open."""
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class EditorServices:
 
 
 class EditorState:
-    """Leads to the house once it is open: routes are made before the journal is."""
+    """Holds the services once they are open: routes are made before the journal is."""
 
     def __init__(self) -> None:
         self._services: EditorServices | None = None

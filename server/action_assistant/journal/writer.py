@@ -46,7 +46,8 @@ class Job(Generic[T]):
 
 
 class Transaction:
-    """What jobs write with. Events are gathered, and stored together by one statement at the end.
+    """The transaction that jobs write in. Events are gathered, and stored by one statement at the
+    end.
 
     A job that does nothing else costs no round trip of its own. Every other statement of a job is
     inside a savepoint, so that what a job did wrong touches nobody else's work.

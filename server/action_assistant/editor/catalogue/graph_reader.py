@@ -1,4 +1,4 @@
-"""Graphs as they are or were: found in rooms and in the log, asked about aside, remembered for a while."""
+"""Reads graphs as they are or were, from open rooms and the log, with a small cache."""
 
 import logging
 from collections import OrderedDict

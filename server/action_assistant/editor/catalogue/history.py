@@ -1,4 +1,4 @@
-"""What happened to a graph: deeds from its two streams, edits of one person in one go as one."""
+"""The history of a graph: events of its two streams, edits of one person in one go as one entry."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime

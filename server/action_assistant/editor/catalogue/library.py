@@ -1,4 +1,4 @@
-"""The actions that all graphs together know: each name once, with what is said of it."""
+"""The action library: the actions that all graphs use, each name once."""
 
 from sqlalchemy import select
 

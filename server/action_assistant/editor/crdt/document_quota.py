@@ -1,4 +1,4 @@
-"""How full a document is: what it may hold, and who is told when it is more.
+"""The quota of a document: how many actions, fields and bytes it may hold.
 
 Both limits are looked at before an update is applied, and counted anew only when what was added
 since could have reached them: counting is slow. Deletions are always taken, so that a full graph can

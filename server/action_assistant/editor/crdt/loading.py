@@ -1,4 +1,4 @@
-"""Documents read from the log: snapshot and tail, put together aside, piece by piece."""
+"""Loads documents from the log: snapshot and tail, folded in a worker, piece by piece."""
 
 import logging
 from typing import Final

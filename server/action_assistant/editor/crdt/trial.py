@@ -1,4 +1,4 @@
-"""Large updates, tried on a copy of the document in another process before the room takes them.
+"""Applies large updates to a copy in another process before the room takes them.
 
 How long the CRDT library works on an update follows from what the update says: 80,000 values for one
 key, all written at once, are 640 kB and half a minute. And some updates end the process.

@@ -1,4 +1,4 @@
-"""A fingerprint of what a document shows, that a page can make too, without cryptography.
+"""The fingerprint of what a document shows, which a page can make too, without cryptography.
 
 Equal state vectors do not prove equal documents. So pages and rooms compare what is shown: per entry
 of the shared maps the CRC-32 of

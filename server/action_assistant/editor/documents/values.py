@@ -1,4 +1,4 @@
-"""What the values of the document mean: total functions from anything to a value or nothing.
+"""The values of the document: total functions from anything to a value or nothing.
 
 The document can hold whatever some client wrote. A value that does not fit is left where it is and
 read as if it were absent, here and in `frontend/src/graph/values.ts` alike.

@@ -1,4 +1,4 @@
-"""Which history the log holds. An epoch ends when the log goes back: a backup was restored, say.
+"""Epochs: which history the log holds. One ends when the log goes back, as after a restore.
 
 Pages name the epoch they know, so that nobody's edits are merged into a history that they were not
 made on. `action-assistant restore` begins an epoch itself. Files that somebody copied back by hand

@@ -1,4 +1,4 @@
-"""What happens to graphs, versions and people: kinds, bodies, and the tables they fold into.
+"""The events of graphs, versions and people: kinds, bodies, and the tables they fold into.
 
 The stream `graph/ID` holds the document and nothing else, so that its `seq` counts changes of the
 document. Everything else about a graph is in `about/ID`; names of people are in `people`.

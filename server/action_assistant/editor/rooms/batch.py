@@ -1,4 +1,4 @@
-"""What enters a room, and what became of a batch of it."""
+"""What enters a room, and the outcome of a batch of it."""
 
 import asyncio
 from collections.abc import Callable, Sequence

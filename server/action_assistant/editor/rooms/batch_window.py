@@ -1,4 +1,4 @@
-"""When rooms act: the first who has something does at once, whoever comes soon after goes together.
+"""When rooms act: at once for the first edit, then once per window for all that came since.
 
 One window for all rooms of a process: what happens within it becomes one transaction, one broadcast
 of each room, and one write to each socket.

@@ -1,4 +1,4 @@
-"""How much one person may bring in a minute. Who brings more waits; nobody else does."""
+"""Rate limits of rooms: bytes per person and minute. Whoever sends more waits; nobody else does."""
 
 import time
 from collections.abc import Callable

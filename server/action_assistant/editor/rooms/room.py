@@ -1,4 +1,4 @@
-"""A room: one document, the people in it, and the one door through which edits enter.
+"""A room: one document, its sockets, and the queue through which every edit enters.
 
 Rules R1 … R10 of DESIGN 3. Everything that concerns the document happens in one task, batch by
 batch: apply, append, commit, and only then tell anyone.

@@ -1,4 +1,4 @@
-"""What is told about a run besides its own events: marks of people, and its sum after the end.
+"""Annotations of a run besides its own events: marks of people, and its sums after the end.
 
 It has a stream of its own, `about/RUN`: whatever people write down never mixes with what a robot
 did. The tables here are folds of these streams.

@@ -1,4 +1,4 @@
-"""Why a run did not end well, as far as its own events prove it.
+"""The causes of a run's bad end, as far as its own events prove them.
 
 Pure. A cause is named only with its evidence: a moment, and the action that it shows at. What nothing
 proves is not named; no cause is an answer, too.

@@ -1,4 +1,4 @@
-"""A run once more, in the simulator: what it did as a script, and what it is expected to do again.
+"""Expected courses: a run as a script for the simulator, and the steps it has to repeat.
 
 A recorded run becomes a script in which every action does what it was seen to do. An expectation is
 a graph, such a script and the course they took; simulating them later, with a newer graph or a newer

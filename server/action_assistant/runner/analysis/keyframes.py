@@ -1,4 +1,4 @@
-"""A run at every moment: keyframes of its fold, and what changed between them.
+"""Keyframes of a run: its fold at every so many events, and the marks between them.
 
 Folding a long run anew for every question would cost seconds, so the fold is kept at every
 `APART`th event. Keyframes are a cache in the journal: they may vanish at any time.
@@ -99,7 +99,7 @@ class SnapshotJournal(Ledger, Protocol):
 
 
 class KeyframeStore:
-    """The reels of all runs."""
+    """The keyframes of all runs."""
 
     def __init__(self, ledger: SnapshotJournal, run_in_worker: RunInWorker) -> None:
         self.run_in_worker = run_in_worker

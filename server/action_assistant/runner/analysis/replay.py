@@ -1,4 +1,4 @@
-"""A run as a film: what every event changed in what was known, for replay on the page.
+"""The replay of a run: what every event changed in what was known, page by page.
 
 A frame carries only what differs from the one before, so the page shows at every moment exactly
 what the live view showed then: later knowledge never leaks into the past.

@@ -1,4 +1,4 @@
-"""Who asks the runner for something, and from where, as runs record it."""
+"""The caller of a route: who asks the runner, from where, and the body they send."""
 
 import ipaddress
 from collections.abc import AsyncIterator

@@ -1,4 +1,4 @@
-"""The live socket: what goes on, to every page; Stop, from any of them.
+"""The live socket: the state of runs and engines to every page; Stop, from any of them.
 
 Nothing queues up behind a slow page: of each run only the newest state waits, and the answer to a
 Stop goes before it.

@@ -1,4 +1,4 @@
-"""What OpenAPI says of bodies that are read by hand: bytes that must stay as they were sent."""
+"""OpenAPI descriptions of bodies that are read by hand: bytes that must stay as they were sent."""
 
 from dataclasses import dataclass, field
 from typing import Final

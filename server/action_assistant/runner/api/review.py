@@ -1,4 +1,4 @@
-"""Routes for looking back: films, marks, comparisons, statistics, files, expectations."""
+"""The routes of review: replays, marks, comparisons, statistics, files, expectations."""
 
 import time
 from collections.abc import AsyncIterator

@@ -1,4 +1,4 @@
-"""The routes of robots: the registry, what they do, what others told them, and looks before starts."""
+"""The routes of robots: the registry, their state, commands of others, checks before starts."""
 
 from datetime import datetime
 from typing import Any, Final, Protocol, assert_never

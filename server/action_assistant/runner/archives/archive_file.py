@@ -1,4 +1,4 @@
-"""A run in a file of its own: gzipped JSON lines that prove themselves and can be read by anybody.
+"""The archive file of a run: gzipped JSON lines that prove themselves and can be read by anybody.
 
 The first line says what it is, each further one is an event as it was stored, the last one has the
 SHA-256 of all before it. The chain runs through the events as it does in the journal, so a bundle

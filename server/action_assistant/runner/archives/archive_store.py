@@ -1,4 +1,6 @@
-"""The ledger of runs, whose older ones may stand in archives: read as if they were still in it."""
+"""The store of runs, of which older ones may be in archives: read as if they were in the
+journal.
+"""
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Runs as files that can be taken in again: the examples that the product brings along.
+"""Runs as files that can be imported: the examples that the product ships.
 
 One JSON object per line and event: `kind`, `author`, `at` (microseconds UTC) and `body`. What is taken
 in was recorded elsewhere, so it is marked: no robot of this place moved.

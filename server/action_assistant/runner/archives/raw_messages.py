@@ -1,4 +1,4 @@
-"""Where the raw messages of a robot from the time of a run are: here, in an archive, or nowhere."""
+"""The raw messages of a robot from the time of a run: here, in an archive, or nowhere."""
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime

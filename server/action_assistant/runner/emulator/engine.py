@@ -1,4 +1,4 @@
-"""A stand-in for an engine node: messages in, messages out, at times that its caller counts.
+"""The emulated engine: messages in, messages out, at times that its caller counts.
 
 No ROS, no clock, no I/O: the same seed and the same messages give the same answers. What graphs do is
 `umrf.semantics`; here is what the node around it makes of that: one thread that a slow command holds

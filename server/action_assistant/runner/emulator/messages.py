@@ -1,4 +1,4 @@
-"""What goes into a stand-in robot and what comes out of it, and in which ways it is like a real one."""
+"""The messages of the robot emulator, and which traits of a real engine it has."""
 
 import json
 from collections.abc import Container, Iterable

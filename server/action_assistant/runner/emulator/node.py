@@ -1,4 +1,4 @@
-"""A stand-in robot as a node of ROS 2, which nobody can tell from an engine by what it sends.
+"""The robot emulator as a node of ROS 2, which sends what an engine's node would.
 
 All of what it does is `standin_engine`; here are the topics, the service and the clock around it.
 """

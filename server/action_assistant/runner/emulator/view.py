@@ -1,4 +1,4 @@
-"""What others get to see of the graphs of a stand-in robot: a little late, and not all of it."""
+"""What the emulator publishes of its graphs: a little late, and not all of it, as engines do."""
 
 import random
 from collections import deque

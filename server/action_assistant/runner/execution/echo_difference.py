@@ -1,4 +1,6 @@
-"""Whether the graph that an engine shows is the one that was sent (SPEC 1.4). Pure."""
+"""The difference between the graph that an engine shows and the one that was sent (SPEC 1.4).
+Pure.
+"""
 
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.echo import echo

@@ -1,4 +1,4 @@
-"""Feedback may be older than an answer that overtook it: which of it is news. Pure.
+"""The order of feedback and answers: which feedback is news after an answer. Pure.
 
 The engine sends what happened in the last half second, and an answer to a get may have told the end
 of that already. Applied after it, the older states would look like further visits that never were.

@@ -1,4 +1,4 @@
-"""What can be done to a run besides stopping it, where its engine makes that safe."""
+"""Interventions in a run besides Stop: pause, resume, modify, confirm rest; where that is safe."""
 
 from typing import Annotated, Final
 

@@ -1,4 +1,4 @@
-"""Watches a run: asks, listens, and draws the conclusions that the evidence allows, and no others."""
+"""The monitor of a run: asks its engine, listens, and concludes only what the evidence allows."""
 
 import itertools
 import logging

@@ -1,4 +1,4 @@
-"""A run that is not over: keeps it moving, watches it, and stops it until that is proven.
+"""The loop of a run that is not over: starts it, watches it, and stops it until that is proven.
 
 One task listens, one asks, one stops (`stop_loop`), one writes. None of them waits for another: a stop leaves
 while a get hangs, and everything goes on while the journal is down.

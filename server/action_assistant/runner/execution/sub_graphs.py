@@ -1,4 +1,4 @@
-"""Which sub-graphs of an answer belong to a run: they carry no mark, and stay after their run. Pure.
+"""Which sub-graphs of an answer belong to a run: they carry no mark, and outlast it. Pure.
 
 A sub-graph runs as `GRAPH__NAME__ID`, for the node `NAME_ID` of the graph GRAPH. One of an earlier run
 keeps that name until the node begins again, which puts another one in its place.

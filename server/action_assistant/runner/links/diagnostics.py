@@ -1,4 +1,4 @@
-"""What somebody who looked for trouble has found: one sentence, and what to do."""
+"""Diagnostics: one sentence about what was found, and what to do."""
 
 from typing import Literal, TypeAlias
 

@@ -1,4 +1,4 @@
-"""The process of an engine on this computer, told from any other by what the kernel says of it.
+"""The operating system's process of an engine on this computer, identified beyond doubt.
 
 All threads of a process end with it, so that the code of an action is known to have ended when its
 engine's process is seen to. That can only be seen here: on another computer, in another container

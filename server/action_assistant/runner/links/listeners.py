@@ -1,4 +1,4 @@
-"""Who listens to what comes by itself, told in the order in which they began to."""
+"""Listeners of a link, told in the order in which they were added."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

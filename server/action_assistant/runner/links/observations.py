@@ -1,4 +1,4 @@
-"""What a link can see of an engine: exact transitions from the simulator, snapshots from robots.
+"""Observations of an engine: exact transitions from the simulator, snapshots from robots.
 
 Times are microseconds UTC by this process's clock. Graph and node names are the engine's: a graph's
 running name, a node's full name (`NAME_ID`). These values are journaled as they are, so fields are

@@ -1,4 +1,4 @@
-"""The link to a robot that cannot be reached: says so, whatever it is asked."""
+"""The link to a robot that cannot be reached: refuses every command."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext

@@ -1,4 +1,4 @@
-"""What is read page by page, put together in a worker: the list of runs, and the events of one."""
+"""The list of runs and the events of one, page by page. For workers."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime

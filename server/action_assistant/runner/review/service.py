@@ -1,4 +1,4 @@
-"""Where runs are looked back on: sums up what has ended, keeps marks, compares, exports, expects."""
+"""The review service: sums up ended runs, keeps marks, compares, exports, checks expectations."""
 
 import logging
 from collections import Counter

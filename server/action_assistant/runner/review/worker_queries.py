@@ -1,4 +1,4 @@
-"""Questions about stored runs, answered in a worker: it reads the database itself, and never writes.
+"""Queries about stored runs, answered in a worker that reads the database itself, read-only.
 
 A question is a method of `ReviewService`. `WorkerQueries` is the runner's side: it has what was just shown stored
 before it asks, and keeps what the worker folded on the way.

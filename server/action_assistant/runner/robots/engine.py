@@ -1,4 +1,4 @@
-"""The engine of one robot as the runner knows it: whether it answers, what it holds, what it has.
+"""The engine of one robot as watched: whether it answers, its graphs, its index.
 
 A link around the link. Runs use it like any other, and everything that is heard on the way is noted,
 so that nobody asks twice.

@@ -1,4 +1,4 @@
-"""What engines said, as they said it: for people who want to know more than a run tells.
+"""Recordings of raw messages of engines, by the hour.
 
 Beside the journal and with its own retention: one folder per robot, one file of JSON lines per hour,
 compressed. Of an answer only the graphs that are otherwise than in the one before are kept. A file is

@@ -1,4 +1,4 @@
-"""A robot: how it was registered, and how people see it."""
+"""The registration of a robot, and the robot as pages see it."""
 
 import re
 from collections.abc import Callable

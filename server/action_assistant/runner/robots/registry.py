@@ -1,4 +1,4 @@
-"""The engines that runs can go to: the simulator, always, and the robots that somebody registered."""
+"""The registry: the engines that runs can go to, which are the simulator and registered robots."""
 
 import logging
 from collections.abc import Callable, Collection, Iterator, Mapping

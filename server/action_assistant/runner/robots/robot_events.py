@@ -1,4 +1,4 @@
-"""The flight recorder: what others told a robot, and when its engine came, went or was another one.
+"""The log of a robot: commands of others, and changes of its engine's state.
 
 One stream per robot, `robot/NAME`. Bodies are msgspec JSON; fields are only ever added, with a
 default. What our own runs sent stands in their streams.

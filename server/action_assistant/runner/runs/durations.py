@@ -1,4 +1,4 @@
-"""How long something took: between two bounds, since robots are not seen at every moment.
+"""Durations, each between two bounds, since robots are not seen at every moment.
 
 A figure that is told without its bounds is exact. What is not known is no figure: it is neither zero
 nor a failure.

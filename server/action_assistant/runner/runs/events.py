@@ -1,4 +1,4 @@
-"""The events of a run's stream: what was asked, what was sent, what was seen, how it ended.
+"""The events of a run's stream: requests, messages sent, observations, proofs, ends.
 
 Bodies are msgspec JSON; the kind stands in the journal's own column. Fields are only ever added,
 with a default: streams of older versions must fold the same for ever. `at` is microseconds UTC,

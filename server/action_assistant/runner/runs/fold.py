@@ -1,4 +1,4 @@
-"""A run, as the pure fold of its events.
+"""The fold of a run's events.
 
 The same function serves the live view and the history, so both always show the same. Nothing here
 knows a clock, a link or a database.

@@ -1,4 +1,4 @@
-"""Runs as the journal tells them: what is over, and what an earlier process left."""
+"""Runs as the journal has them: those that are over, and those that an earlier process left."""
 
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any, Protocol, TypeAlias

@@ -1,4 +1,4 @@
-"""What was seen of an engine, folded into a run. Pure, and part of the fold of a run."""
+"""Observations folded into a run. Pure, and part of the fold of a run."""
 
 from collections.abc import Iterable, Iterator
 from typing import Final, assert_never

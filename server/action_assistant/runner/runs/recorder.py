@@ -1,4 +1,4 @@
-"""The pen of one stream: writes its events in order, and never makes anybody wait.
+"""Appends the events of one stream in order, without making anybody wait.
 
 What happens to a robot is shown first and stored at once. When the journal fails the pen says so
 (`recorded` is false) and goes on trying with the same events, in the same order.
@@ -47,7 +47,7 @@ def stream_of(run: str) -> str:
 
 
 class StreamAppender:
-    """The pen of a stream that ends at `seq`. `changed` is called when `seq` or `recorded` have
+    """Appends to a stream that ends at `seq`. `changed` is called when `seq` or `recorded` have
     changed."""
 
     def __init__(
@@ -136,7 +136,7 @@ class StreamAppender:
 
 
 class RunRecorder(StreamAppender):
-    """The pen of one run."""
+    """Appends the events of one run."""
 
     def __init__(
         self, store: Store, run: str, seq: int, changed: Callable[[], None] = lambda: None

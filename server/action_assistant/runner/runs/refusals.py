@@ -1,4 +1,4 @@
-"""What an engine's own log says of a start: received, and refused in these words. Pure.
+"""The words in which an engine's log refuses a start. Pure.
 
 No message carries an error, so these lines are the only place that has the reason. They name no run:
 what they prove rests on their order. The thread that takes messages in says "Received request …" and,

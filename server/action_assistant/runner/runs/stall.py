@@ -1,4 +1,4 @@
-"""A graph that runs while none of its actions does: whether it stalls, and what it waits for.
+"""Stalls: a graph that runs while none of its actions does, and what it waits for.
 
 The engine says nothing of it (SPEC 2.3, H7, H8). What it waits for follows from the graph that was
 sent and from what was seen: results are not told, so that an arrow counts by all that its parent may

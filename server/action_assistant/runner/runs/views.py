@@ -1,4 +1,4 @@
-"""Runs as the page and programs see them (DESIGN 7)."""
+"""The views of a run that pages and programs get (DESIGN 7)."""
 
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta

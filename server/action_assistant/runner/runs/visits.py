@@ -1,4 +1,4 @@
-"""What is known of the visits of one action: exactly from transitions, within bounds from snapshots.
+"""The visits of one action: exact from transitions, within bounds from snapshots.
 
 A visit is one execution of an action's own code. Of its begin and its end the fold keeps a lower and
 an upper bound each, and a bound that nothing proves is none:

@@ -1,4 +1,4 @@
-"""What a start must satisfy before anything is stored or sent. Pure: no clock, no I/O."""
+"""The rules of admission: what a start must satisfy before it is stored or sent. Pure."""
 
 import re
 from collections.abc import Sequence

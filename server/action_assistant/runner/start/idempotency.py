@@ -1,4 +1,4 @@
-"""A start becomes a run: stored before anything is sent, once for each request."""
+"""A start becomes a run: stored before anything is sent, once for each request id."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager

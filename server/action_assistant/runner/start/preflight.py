@@ -1,4 +1,4 @@
-"""What is looked at before a start, item by item. Pure: what was asked and answered comes in.
+"""The pre-flight: the items that are checked before a start. Pure: answers come in as values.
 
 The page shows the items, a start refuses by the same ones: nobody is told something else than what
 then happens.

@@ -1,4 +1,4 @@
-"""What must be true before a start is stored and sent, found out for each engine it shall go to."""
+"""The checks before a start is stored and sent, for each engine that it shall go to."""
 
 import secrets
 from collections.abc import Callable, Collection, Sequence

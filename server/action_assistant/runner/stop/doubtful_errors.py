@@ -1,4 +1,4 @@
-"""Where an engine's word may not be taken for rest: an ERROR that a stop or a pause may have caused.
+"""ERRORs that are no proof of rest, since a stop or a pause may have caused them.
 
 An engine waits five seconds for an action to stop, or until its `onStop` throws, and then calls it
 ERROR; the thread of the action goes on, and nothing that the engine says ever tells of its end. An

@@ -1,4 +1,4 @@
-"""Stops what somebody else runs on a robot: a level, like every stop, until a get proves it.
+"""Stops graphs that were not started from here: sent again until a get proves rest.
 
 It ends by itself with the life of the engine, and when a minute since it was last asked for has
 brought no proof; no start from here leaves before: a late stop would hit a run that only has the same

@@ -1,4 +1,4 @@
-"""Runs that are over and move again: an action that was still being loaded begins after the proof.
+"""Late activity: runs that are over and move again, since an action was still being loaded.
 
 An engine neither counts nor shows an action that it loads, so nothing can be proven about one that
 takes longer than people would wait. What can be done is to look on, and to take back what was said.

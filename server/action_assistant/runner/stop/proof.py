@@ -1,4 +1,4 @@
-"""What proves that nothing moves: a get asked after the stop, and how long a look must last."""
+"""The proof of rest: a get asked after the stop, and for how long rest must be seen."""
 
 import hashlib
 import logging

@@ -1,4 +1,5 @@
-"""Stop of one run: wanted from the first press on, and sent until rest is proven or seen.
+"""The loop of Stop of one run: from the first press on, a message again and again until rest is
+proven.
 
 Never waits for anything but its own turn: it is sent while a get hangs and while the journal is down.
 """

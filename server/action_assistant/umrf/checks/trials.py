@@ -1,4 +1,6 @@
-"""Ways through a graph: all actions end with on_true, or one of them, the first time, otherwise."""
+"""Trial courses of a graph: all actions end with on_true, or one of them, the first time,
+otherwise.
+"""
 
 from collections.abc import Iterator
 from typing import Final

@@ -1,4 +1,6 @@
-"""The engine's clockwork: what one action's end sets in motion (SPEC 2.3, 2.4, 2.9)."""
+"""The core of the engine's semantics: what the end of one action sets in motion (SPEC 2.3, 2.4,
+2.9).
+"""
 
 from collections.abc import Callable, Mapping
 from functools import partial

@@ -1,4 +1,6 @@
-"""The door of both processes: Host, Origin and credentials, before any route and any upgrade."""
+"""Access control of both processes: Host, Origin and credentials, before any route and any
+upgrade.
+"""
 
 import asyncio
 import getpass

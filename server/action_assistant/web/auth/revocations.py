@@ -1,5 +1,5 @@
-"""Which invitations were revoked and which sessions have ended, as either process sees it by itself;
-and what that ends.
+"""Revoked invitations and ended sessions, as either process sees them, and closing what they had
+open.
 
 `revoked/` in the data folder holds one empty file for each: `ID` for an invitation, `session-ID` for a
 session. It is made at once or not at all, never changed, and needs neither the other process nor a
@@ -117,7 +117,7 @@ class Revocations:
 
 
 class SessionGuard:
-    """Holds one open socket or stream of a session; is cut when the session ends."""
+    """Guards one open socket or stream of a session; cancels it when the session ends."""
 
     def __init__(self, session: Session, task: "asyncio.Task[object]", *, outlives: bool) -> None:
         self.is_cut = False
@@ -139,7 +139,7 @@ class SessionGuard:
 
 
 class SessionGuards:
-    """Everything that is open in somebody's name. Looks while there is something to look after."""
+    """The guards of everything that is open in somebody's name. Looks while there is any."""
 
     def __init__(self, revoked: Revocations) -> None:
         self._revoked = revoked

@@ -1,4 +1,4 @@
-"""Who is signed in: one small file for each session, beside the cookies, which are valid without it.
+"""Signed-in sessions: one small file for each, beside the cookies, which are valid without it.
 
 A cookie is enough to be let in, so that a full disk, a lost database or a dead editor signs nobody out;
 `revoked/` is enough to end it. What stands here is for people: whose sessions there are, to be listed and

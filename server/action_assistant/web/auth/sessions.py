@@ -1,4 +1,4 @@
-"""Signing in: a token or an invitation is traded for a cookie that either process can verify."""
+"""Sign-in: a token or an invitation is traded for a cookie that either process can verify."""
 
 from collections.abc import Callable
 from typing import Annotated, Any, Final, Protocol
@@ -81,7 +81,7 @@ class InvitationRegistry(Protocol):
 
 
 class Sessions:
-    """Where tokens and invitations are traded for sessions."""
+    """Trades tokens and invitations for sessions."""
 
     def __init__(
         self,

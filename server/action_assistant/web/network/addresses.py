@@ -1,4 +1,4 @@
-"""Under which names this process may be called, and from which pages."""
+"""The names under which this process may be called, and the origins that may call it."""
 
 import ipaddress
 import socket

@@ -1,4 +1,4 @@
-"""How many sockets there may be, and how fast strangers and people may come."""
+"""Limits of connections: how many sockets there may be, and how fast they may be opened."""
 
 import time
 from collections import Counter

@@ -1,4 +1,4 @@
-"""How either process becomes an HTTP application: Litestar inside, the door around it."""
+"""The ASGI application of either process: Litestar inside, access control around it."""
 
 import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Behind a proxy: whose address a request has, and which part of its path is the proxy's."""
+"""Behind a proxy: the address of a request, and the part of its path that is the proxy's."""
 
 import ipaddress
 import re

@@ -1,4 +1,4 @@
-"""What a worker process is, from within: it gives way, is bounded, and does one thing after the other.
+"""A worker process from within: low priority, bounded memory, one task after the other.
 
 Imports little, since every worker begins with it.
 """

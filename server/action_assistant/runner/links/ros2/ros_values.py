@@ -1,4 +1,4 @@
-"""What a domain of robots shows and says, as values: without ROS 2, so that anything can be one.
+"""What is seen and heard on a ROS 2 domain, as values without ROS 2.
 
 `Domain` over rclpy tells its links these, and so does the air of virtual time in which tests fly.
 """
