@@ -18,31 +18,39 @@ from table import Table, seconds
 
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
-from action_assistant.journal.tables import action_sum, review, run_label
-from action_assistant.journal.tables import run as runs
-from action_assistant.runner import archive, shapes
-from action_assistant.runner.events import Author, Ended, Observed, Published, Requested, encode
-from action_assistant.runner.history import Aside
-from action_assistant.runner.recorder import stream_of
-from action_assistant.runner.recordings import Recordings
-from action_assistant.runner.review import bundle
-from action_assistant.runner.review import statistics as sums
-from action_assistant.runner.review.film import film
-from action_assistant.runner.review.reel import APART, Reels
-from action_assistant.runner.runs import replay
-from action_assistant.runner.seen import NodeResult, NodeState
+from action_assistant.runner.analysis import statistics as sums
+from action_assistant.runner.analysis.keyframes import APART, KeyframeStore
+from action_assistant.runner.analysis.replay import run_replay
+from action_assistant.runner.archives import archive_file
+from action_assistant.runner.links.observations import NodeResult, NodeState
+from action_assistant.runner.robots.recordings import Recordings
+from action_assistant.runner.runs import queries, views
+from action_assistant.runner.runs.events import (
+    Author,
+    Ended,
+    Observed,
+    Published,
+    Requested,
+    encode,
+)
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.schema.runner_tables import action_sum, review, run_label
+from action_assistant.schema.runner_tables import run as runs
+from action_assistant.web.workers.lanes import RunInWorker
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+from action_assistant.runner import projection
+from runner.harness import at_once, run_in_virtual_time, sequence
 from runner.record_streams import Place
-from runner.world import at_once, live_through, sequence
 
 TITLE = "Lists of runs, runs of many events, and the room that they take"
 SIZES: Final = (1_000, 10_000, 100_000)
 TIMES: Final = 5
 _GRAPHS: Final = 20
 _ANN: Final = Author("ann", "Ann")
-_ASIDE: Final[Aside] = anyio.to_thread.run_sync
+_ASIDE: Final[RunInWorker] = anyio.to_thread.run_sync
 
 
 def tables() -> Iterator[Table]:
@@ -74,9 +82,9 @@ async def _lists(folder: Path) -> Table:
 def _questions(journal: Journal, middle: str) -> list[Callable[[], Awaitable[Any]]]:
     def page(**wanted: Any) -> Callable[[], Awaitable[Any]]:
         async def ask() -> None:
-            rows = await journal.query(archive.listed(archive.Filter(**wanted), 200))
-            await journal.query(archive.labels_of([row.id for row in rows]))
-            msgspec.json.encode([shapes.listed(shapes.summary_of_row(r), r, []) for r in rows])
+            rows = await journal.query(queries.listed(queries.Filter(**wanted), 200))
+            await journal.query(queries.labels_of([row.id for row in rows]))
+            msgspec.json.encode([views.listed(views.summary_of_row(r), r, []) for r in rows])
 
         return ask
 
@@ -187,22 +195,22 @@ async def _long_runs(folder: Path) -> Table:
 async def _opening(journal: Journal, run: str, size: int) -> list[str]:
     """The first time keyframes are made; after that they are in the journal."""
 
-    async def opened(reels: Reels) -> None:
-        key = (await reels.reel(run)).keys[-1]
-        msgspec.json.encode(shapes.whole(key.run, "{}"))
+    async def opened(keyframe_store: KeyframeStore) -> None:
+        key = (await keyframe_store.keyframes(run)).keys[-1]
+        msgspec.json.encode(views.whole(key.run, "{}"))
 
     started = time.perf_counter()
-    await opened(Reels(journal, _ASIDE))
+    await opened(KeyframeStore(journal, _ASIDE))
     first = seconds(time.perf_counter() - started)
-    known = Reels(journal, _ASIDE)
+    known = KeyframeStore(journal, _ASIDE)
     middle = size // 2 - size // 2 % APART
 
     async def page(after: int) -> None:
-        msgspec.json.encode(await film(known, run, after=after))
+        msgspec.json.encode(await run_replay(known, run, after=after))
 
     return [
         first,
-        await _took(lambda: opened(Reels(journal, _ASIDE))),  # as another process would
+        await _took(lambda: opened(KeyframeStore(journal, _ASIDE))),  # as another process would
         await _took(lambda: page(0)),
         await _took(lambda: page(middle)),
         await _took(lambda: known.at(run, size // 3 + 1)),
@@ -241,8 +249,8 @@ def _measured(actions: int, took: float) -> list[str]:
     """In virtual time: so many actions, one after the other."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        place, sent = live_through(lambda: _lived(folder, actions, took))
-        (events,) = (v for k, v in place.world.ledger.streams.items() if k.startswith("run/"))
+        place, sent = run_in_virtual_time(lambda: _lived(folder, actions, took))
+        (events,) = (v for k, v in place.harness.ledger.streams.items() if k.startswith("run/"))
         journal = asyncio.run(_stored(folder, events))
         raw = sum(path.stat().st_size for path in folder.glob("recordings/*/*"))
         archived = (folder / "one.jsonl.gz").stat().st_size
@@ -256,7 +264,7 @@ def _measured(actions: int, took: float) -> list[str]:
 async def _lived(folder: Path, actions: int, took: float) -> tuple[Place, int]:
     place = Place({"*": [{"after_s": took, "message": "done"}]})
     recordings = Recordings(folder / "recordings", at_once)
-    link: Any = place.world.links["Robin"]
+    link: Any = place.harness.links["Robin"]
     sent = 0
     asked = link.get
 
@@ -273,11 +281,11 @@ async def _lived(folder: Path, actions: int, took: float) -> tuple[Place, int]:
 
     link.get = get
     async with anyio.create_task_group() as tasks:
-        tasks.start_soon(place.air.blow)
+        tasks.start_soon(place.network.blow)
         tasks.start_soon(recordings.run)
         place.robot("Robin")
         await anyio.sleep(0.5)
-        async with place.world.runner() as place.control:
+        async with place.harness.runner() as place.control:
             await anyio.sleep(1.5)
             with link.listen(hear):
                 await place.start(sequence("hour", actions))
@@ -296,7 +304,7 @@ async def _stored(folder: Path, events: Sequence[Any]) -> int:
     for i in range(0, len(drafts), 500):
         await journal.append(events[0].stream, drafts[i : i + 500])
     end, stored = await journal.end(events[0].stream), await journal.read(events[0].stream)
-    file = bundle.Bundle(folder / "one.jsonl.gz", events[0].stream, "one", end)
+    file = archive_file.ArchiveFile(folder / "one.jsonl.gz", events[0].stream, "one", end)
     file.add(stored)
     file.close()
     await journal.close()
@@ -312,7 +320,7 @@ def _size(number: int) -> str:
 
 async def _opened(folder: Path) -> Journal:
     return await Journal.open(
-        f"sqlite:///{folder / 'runner.db'}", branch="runner", fold=archive.fold
+        f"sqlite:///{folder / 'runner.db'}", branch="runner", fold=projection.fold
     )
 
 

@@ -9,8 +9,8 @@ from typing import Any
 from table import Table, seconds
 
 from action_assistant.umrf.check import check
-from action_assistant.umrf.codec import read, write
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files.codec import read, write
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import simulate
 

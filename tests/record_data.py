@@ -20,8 +20,8 @@ from pathlib import Path
 import msgspec
 
 from journal.servers import Server, server
-from support.lived_in import answers, live
 from support.product import TOKEN, Product
+from support.used_server import answers, live
 
 
 def record(folder: Path, name: str, *flags: str) -> None:

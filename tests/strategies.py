@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 from hypothesis import strategies as st
 
+from action_assistant.umrf.files.writing import name_order
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
@@ -21,7 +22,6 @@ from action_assistant.umrf.model import (
     Relation,
     Remap,
 )
-from action_assistant.umrf.writing import name_order
 
 texts = st.text(st.characters(codec="utf-8", exclude_categories=("Cs",)), min_size=0, max_size=12)
 names = st.one_of(st.sampled_from(["Go", "Look", "Go_1", "a>b|c", "Ünï code"]), texts.filter(bool))

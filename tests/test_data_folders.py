@@ -10,8 +10,8 @@ import msgspec
 import pytest
 
 from journal.servers import Server
-from support.lived_in import Guest, answers, differences
 from support.product import TOKEN, Product, running
+from support.used_server import Guest, answers, differences
 
 FOLDERS = sorted(path for path in (Path(__file__).parent / "data" / "folders").glob("2*"))
 

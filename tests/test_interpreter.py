@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant import interpreter, places
+from action_assistant import interpreter, paths
 from action_assistant.errors import CannotStart
 from action_assistant.interpreter import for_runner, rclpy_fits
 from support.product import Product, running
@@ -29,7 +29,7 @@ def test_the_environment_of_make_ros_is_taken_where_it_is_current(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wheels = wheels_of(tmp_path, b"rclpy==1\n")
-    monkeypatch.setattr(places, "wheels", lambda: wheels)
+    monkeypatch.setattr(paths, "wheels", lambda: wheels)
     found = for_runner({})
     assert (found.origin, found.path, found.remark) == ("wheels", wheels / "bin" / "python", "")
 
@@ -39,7 +39,7 @@ def test_a_stale_environment_is_left_alone_and_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wheels = wheels_of(tmp_path, b"rclpy==0\n")
-    monkeypatch.setattr(places, "wheels", lambda: wheels)
+    monkeypatch.setattr(paths, "wheels", lambda: wheels)
     found = for_runner({})
     assert (found.origin, found.path) == ("this", HERE)
     assert "`make ros` renews it" in found.remark

@@ -11,15 +11,10 @@ from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import JSON, Column, Connection, MetaData, insert, inspect, select, text
 
-from action_assistant import places
+from action_assistant import paths
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import database_of
-from action_assistant.journal.migrate import (
-    BRANCHES,
-    Branch,
-    config_for,
-    migrate,
-)
+from action_assistant.journal.databases import database_of, migrate
+from action_assistant.journal.migrate import BRANCHES, Branch, config_for
 
 branches = pytest.mark.parametrize("branch", ["editor", "runner"])
 Deed: TypeAlias = Callable[[Connection], Any]
@@ -176,8 +171,8 @@ def test_scripts_are_found_also_where_the_path_is_unusual(
 ) -> None:
     strange = tmp_path / "100% a:b;c d"
     strange.mkdir()
-    (strange / "migrations").symlink_to(places.migrations())
-    monkeypatch.setattr(places, "migrations", lambda: strange / "migrations")
+    (strange / "migrations").symlink_to(paths.migrations())
+    monkeypatch.setattr(paths, "migrations", lambda: strange / "migrations")
     assert migrate(f"sqlite:///{tmp_path / 'editor.db'}", "editor") == "editor_0002"
 
 

@@ -22,10 +22,10 @@ import httpx
 import psutil
 import pytest
 
-from action_assistant.web.keys import Keys
+from action_assistant.web.auth.keys import Keys
+from runner.harness import order, sequence
 from runner.process import TOKEN, RunnerProcess, body, started
-from runner.world import order, sequence
-from support.hostile import long_run
+from support.load_on_runner import long_run
 
 STOPS = int(os.environ.get("TEST_HOSTILE_STOPS", "20"))
 SILENT = int(os.environ.get("TEST_HOSTILE_SILENT", "300"))
@@ -51,7 +51,7 @@ def crowd(runner: RunnerProcess, *what: str) -> Iterator[subprocess.Popen[bytes]
     """Everybody who presses hard."""
     path = Path(__file__).parent
     process = subprocess.Popen(
-        [sys.executable, "-m", "support.hostile", str(runner.port), *what],
+        [sys.executable, "-m", "support.load_on_runner", str(runner.port), *what],
         env={**os.environ, "PYTHONPATH": str(path)},
         stdout=subprocess.PIPE,
     )

@@ -15,7 +15,7 @@ from httpx_ws import aconnect_ws
 from pycrdt import Doc, Map, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
-from action_assistant.editor import document
+from action_assistant.editor.documents import document
 from action_assistant.umrf.model import Graph
 from support.page import Page, graph_of, open_page
 from support.product import TOKEN, Product, running

@@ -19,9 +19,9 @@ import msgspec
 import pytest
 from websockets.sync.client import connect
 
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
+from runner.harness import order, sequence
 from runner.process import body
-from runner.world import order, sequence
 from support.product import TOKEN, Product, running
 
 CLICKS = int(os.environ.get("TEST_STOP_CLICKS", "3"))

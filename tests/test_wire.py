@@ -9,14 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pycrdt import Doc, Map
 
-from action_assistant.editor import document
-from action_assistant.umrf import codec
+from action_assistant.editor.documents import document
 from action_assistant.umrf.check import check
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph, Parameter, Position, Relation
 from action_assistant.umrf.semantics import (
     Behaviour,
-    GraphState,
+    GraphStateEvent,
     NotReady,
     Script,
     Trace,
@@ -170,7 +170,7 @@ def test_a_decision_that_is_drawn_into_the_end_ends_either_way(page: Page, decid
     graph = codec.read(codec.write(decision(page))).graph
     assert check(graph) == []
     script = Script({"OxWork_0": (Behaviour(result=decided),)})
-    states = [t.state for t in simulate(graph, script=script) if isinstance(t, GraphState)]
+    states = [t.state for t in simulate(graph, script=script) if isinstance(t, GraphStateEvent)]
     assert states[-1] == "FINISHED"
 
 

@@ -11,7 +11,7 @@ from httpx_ws import aconnect_ws
 from pycrdt import Doc, Map, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
-from action_assistant.editor import document
+from action_assistant.editor.documents import document
 
 
 async def main(address: str, token: str, name: str) -> None:

@@ -33,9 +33,9 @@ _stay_out_of_the_working_folder()
 def main() -> int:
     """Run one command; the exit code. What PYTHONPATH offers is put away before anything of ours is
     imported, and comes back for the runner only, as far as it belongs to ROS 2."""
-    from action_assistant import sourced
+    from action_assistant import ros_workspace
 
-    sourced.hide()
+    ros_workspace.hide()
     from action_assistant.cli import main as command
 
     return command()

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from action_assistant.errors import CannotStart
-from action_assistant.plain import make_streams_plain
+from action_assistant.safe_text import make_streams_printable
 from action_assistant.settings import check_environment, hide_password
 from action_assistant.version import VERSION
 
@@ -19,9 +19,9 @@ _MODULES: Final = (
     "files",
     "remote",
     "people",
-    "practice",
+    "simulate_robot",
     "maintenance",
-    "backup",
+    "backups.backup",
     "doctor",
 )
 #: Commands that are started often, and need nothing of the other modules.
@@ -32,7 +32,7 @@ _ALONE: Final[Mapping[str, str]] = {
     "check": "files",
     "convert": "files",
     "simulate": "files",
-    "simulate-robot": "practice",
+    "simulate-robot": "simulate_robot",
 }
 
 
@@ -53,14 +53,14 @@ def parser(command: str = "") -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code."""
-    make_streams_plain()
+    make_streams_printable()
     if arguments is None:
         hide_password()
     asked = sys.argv[1:] if arguments is None else arguments
     options = parser(asked[0] if asked else "").parse_args(asked)
     try:
         check_environment()
-        code: int = options.deed(options)
+        code: int = options.handler(options)
     except CannotStart as error:
         print(f"action-assistant: {error}", file=sys.stderr)
         return 2

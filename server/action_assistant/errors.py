@@ -1,4 +1,4 @@
-"""Every refusal this program can utter.
+"""Every refusal of this program, as one tree of exceptions.
 
     Refused                         400  something was asked that cannot be done
     ├── BadInput                    400  the bytes or values sent are not what the route takes

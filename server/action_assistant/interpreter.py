@@ -10,9 +10,9 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant import places, sourced
+from action_assistant import paths, ros_workspace
 from action_assistant.errors import CannotStart
-from action_assistant.sourced import Workspace
+from action_assistant.ros_workspace import Workspace
 
 VARIABLE: Final = "ACTION_ASSISTANT_RUNNER_PYTHON"
 #: What a sourced ROS 2 puts into the environment. The wheels of `make ros` must not see it.
@@ -54,7 +54,7 @@ def for_runner(environ: Mapping[str, str] = os.environ) -> Interpreter:
     if rclpy_fits(environ):
         return Interpreter(path=this, origin="this")
     remark = Workspace.of(environ).other_python()
-    wheels = places.wheels()
+    wheels = paths.wheels()
     if wheels is None or not (wheels / "bin" / "python").exists():
         return Interpreter(path=this, origin="this", remark=remark)
     if not is_current(wheels):
@@ -69,7 +69,7 @@ def rclpy_fits(environ: Mapping[str, str] = os.environ) -> bool:
     """Whether this interpreter finds an rclpy that was built for it, its own or that of the workspace
     which is sourced, without importing it."""
     own = importlib.util.find_spec("rclpy")
-    if own is not None and sourced.rclpy_fits(own):
+    if own is not None and ros_workspace.rclpy_fits(own):
         return True
     return Workspace.of(environ).rclpy() is not None
 

@@ -9,8 +9,8 @@ from typing import Final
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.private import own_folder
-from action_assistant.public import LOOPBACK_PROXIES, Network, Public, proxies, public_url
+from action_assistant.private_files import own_folder
+from action_assistant.public_url import LOOPBACK_PROXIES, Network, PublicUrl, proxies, public_url
 
 #: Every variable that this program reads, and what it is for.
 VARIABLES: Final[Mapping[str, str]] = {
@@ -38,11 +38,11 @@ EVERYWHERE: Final = "*"
 LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
-class Reached(msgspec.Struct, frozen=True):
+class Reachability(msgspec.Struct, frozen=True):
     """How others come to us: by a public address that a proxy shows, if there is one. `proxies` are
     believed about the address of whoever asks."""
 
-    public: Public | None = None
+    public: PublicUrl | None = None
     proxies: tuple[Network, ...] = ()
 
 
@@ -59,7 +59,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     share: bool = False
     tls: bool = False
     switch_database: bool = False
-    reached: Reached = Reached()
+    reached: Reachability = Reachability()
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -83,7 +83,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     share: bool = False
     tls: bool = False
     keep: Keep | None = None
-    reached: Reached = Reached()
+    reached: Reachability = Reachability()
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
@@ -161,19 +161,19 @@ def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
 
 def reached(
     url: str | None, trusted: str | None, environ: Mapping[str, str] = os.environ
-) -> Reached:
+) -> Reachability:
     """What the command line says, else the environment. Behind a public address the proxies of this
     computer are believed unless others are named. Raises CannotStart."""
     written = url if url is not None else environ.get("ACTION_ASSISTANT_PUBLIC_URL", "")
     public = public_url(written) if written.strip() else None
     named = trusted if trusted is not None else environ.get("ACTION_ASSISTANT_TRUSTED_PROXIES", "")
     if named.strip() or public is None:
-        return Reached(public, proxies(named))
-    return Reached(public, LOOPBACK_PROXIES)
+        return Reachability(public, proxies(named))
+    return Reachability(public, LOOPBACK_PROXIES)
 
 
 def check_host(
-    host: str, hosts: tuple[str, ...], *, share: bool = False, public: Public | None = None
+    host: str, hosts: tuple[str, ...], *, share: bool = False, public: PublicUrl | None = None
 ) -> None:
     """Refuse to listen where strangers are unless somebody said so, or by which names."""
     if host not in LOOPBACK and not hosts and not share and public is None:

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.commands import backup
-from action_assistant.editor import happenings as h
-from action_assistant.editor.app import open_house
+from action_assistant.commands.backups import backup
+from action_assistant.editor.app import open_services
+from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
@@ -94,7 +94,7 @@ def data(tmp_path: Path) -> Path:
         url = f"sqlite:///{tmp_path / 'editor.db'}"
         journal = await Journal.open(url, branch="editor", fold=h.fold)
         for name in ("Ada", "Ada L.", "Ada Lovelace"):
-            await journal.append(h.PEOPLE, [h.draft(h.NAMED, "ada", h.Named(name))])
+            await journal.append(h.PEOPLE, [h.draft(h.NAMED, "ada", h.PersonNamed(name))])
         await journal.close()
 
     asyncio.run(fill())
@@ -149,10 +149,10 @@ async def test_files_that_somebody_copied_back_by_hand_begin_an_epoch_too(data: 
     settings = EditorSettings(data=data, database=f"sqlite:///{data / 'editor.db'}")
 
     async def epoch(*, more: bool = False) -> str:
-        async with open_house(settings) as house:
+        async with open_services(settings) as services:
             if more:
-                await house.catalogue.create(b'{"name": "after"}', "ada")
-            return house.epoch
+                await services.catalogue.create(b'{"name": "after"}', "ada")
+            return services.epoch
 
     first = await epoch()
     shutil.copy(data / "editor.db", data / "copy")

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.editor import happenings as h
+from action_assistant.editor.log import graph_events as h
 from action_assistant.journal.events import Event
 from action_assistant.journal.journal import Journal
-from action_assistant.runner.archive import fold as runner_fold
-from action_assistant.web.certificate import Certificate
+from action_assistant.runner.projection import fold as runner_fold
+from action_assistant.web.network.certificate import Certificate
 from journal.servers import Server
-from support.lived_in import Guest, answers, differences, live
 from support.product import COMMAND, Product, running
+from support.used_server import Guest, answers, differences, live
 
 
 class Keyed(Product):

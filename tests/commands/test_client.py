@@ -10,9 +10,9 @@ from typing import Any
 import httpx
 import pytest
 
-from action_assistant.commands.proven import AfterProof
+from action_assistant.commands.token_proof import AfterProof
 from action_assistant.errors import CannotStart
-from action_assistant.web.keys import Keys
+from action_assistant.web.auth.keys import Keys
 from support.product import TOKEN, Product
 from web.test_access import KEYS, served
 

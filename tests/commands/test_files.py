@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from action_assistant import places
+from action_assistant import paths as places
 from action_assistant.cli import main
-from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 from support.product import COMMAND
 
 EXAMPLES = sorted(places.examples().glob("*.json"))

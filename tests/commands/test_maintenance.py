@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from action_assistant.commands import maintenance
-from action_assistant.editor import happenings as h
+from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.journal import Journal
 
@@ -30,7 +30,7 @@ def data(tmp_path: Path) -> Path:
         url = f"sqlite:///{tmp_path / 'editor.db'}"
         journal = await Journal.open(url, branch="editor", fold=h.fold)
         for name in ("Ada", "Ada L.", "Ada Lovelace"):
-            await journal.append(h.PEOPLE, [h.draft(h.NAMED, "ada", h.Named(name))])
+            await journal.append(h.PEOPLE, [h.draft(h.NAMED, "ada", h.PersonNamed(name))])
         await journal.close()
 
     asyncio.run(fill())

@@ -2,8 +2,8 @@
 
 import pytest
 
-from action_assistant.commands import progress
-from action_assistant.commands.progress import Progress
+from action_assistant.commands.backups import progress
+from action_assistant.commands.backups.progress import Progress
 
 
 def test_a_word_a_second_after_the_first_second(

@@ -16,8 +16,8 @@ from pycrdt.websocket.websocket import HttpxWebsocket
 
 from action_assistant.commands.client import Server
 from action_assistant.commands.remote import insisting, verdict
-from action_assistant.umrf import codec
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 from support.product import TOKEN, Product, running
 
 QUICK = {"behaviours": {"*": [{"after_s": 0.05}]}}

@@ -17,16 +17,16 @@ from typing import Any, Final
 import pytest
 
 from action_assistant import settings
-from action_assistant.commands import backup, restore
-from action_assistant.commands.backup_file import Package
-from action_assistant.commands.data_folder import checked
-from action_assistant.commands.progress import Progress
-from action_assistant.editor import happenings as h
+from action_assistant.commands.backups import backup, restore
+from action_assistant.commands.backups.backup_file import Package
+from action_assistant.commands.backups.data_folder import checked
+from action_assistant.commands.backups.progress import Progress
+from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Draft, Fold
 from action_assistant.journal.journal import Journal
-from action_assistant.runner.archive import fold as runner_fold
+from action_assistant.runner.projection import fold as runner_fold
 from journal.servers import Server
 
 LARGE: Final = 10 << 20
@@ -49,7 +49,7 @@ def filled(data: Path, name: str, body: bytes = b"") -> None:
         for branch, fold in folds.items():
             url = f"sqlite:///{data / f'{branch}.db'}"
             journal = await Journal.open(url, branch=branch, fold=fold)
-            draft = h.draft(h.NAMED, "ada", h.Named(name)) if branch == "editor" else None
+            draft = h.draft(h.NAMED, "ada", h.PersonNamed(name)) if branch == "editor" else None
             await journal.append("people", [draft or Draft("x.y.v1", "ada", name.encode())])
             await journal.append("graph/g", [Draft("x.y.v1", "ada", body)])
             await journal.close()

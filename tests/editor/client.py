@@ -5,11 +5,11 @@ from typing import Any
 
 from pycrdt import Doc, Map
 
-from action_assistant.editor import wire
-from action_assistant.editor.member import Member
-from action_assistant.editor.room import Room
-from action_assistant.editor.sameness import Fingerprint
-from action_assistant.web.keys import Person
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.documents.fingerprint import Fingerprint
+from action_assistant.editor.rooms.member import Member
+from action_assistant.editor.rooms.room import Room
+from action_assistant.web.auth.keys import Person
 
 
 class Client:
@@ -32,15 +32,15 @@ class Client:
         self._subscription = self.doc.observe(self._changed)
 
     def _changed(self, event: Any) -> None:
-        if not self._remote and event.update != wire.NOTHING_NEW:
-            self.out.append(wire.change(event.update))
+        if not self._remote and event.update != messages.NOTHING_NEW:
+            self.out.append(messages.change(event.update))
 
     def join(self, room: Room, *, edits: bool = True) -> None:
         """Connect; what was not delivered before is lost and travels with step 2."""
         self.leave()
         self.member = Member(self.person, edits=edits, acks=True)
         self.room = room
-        self.out = [wire.question(self.doc.get_state())]
+        self.out = [messages.question(self.doc.get_state())]
         self.durable = self.sent = 0
         room.join(self.member)
 
@@ -62,9 +62,9 @@ class Client:
         """Deliver one message to the room."""
         assert self.room is not None
         assert self.member is not None
-        message = wire.parse(frame)
+        message = messages.parse(frame)
         assert message is not None
-        self.sent += isinstance(message, wire.Edit)
+        self.sent += isinstance(message, messages.Edit)
         self.room.hear(self.member, message)
 
     async def listen(self) -> bool:
@@ -78,24 +78,24 @@ class Client:
 
     def take(self, frame: bytes) -> None:
         """One message of the room's."""
-        if frame[0] == wire.ACKS:
-            reader = wire.Reader(frame[1:])
+        if frame[0] == messages.ACKS:
+            reader = messages.ByteReader(frame[1:])
             self.durable, self.seq = reader.number(), reader.number()
             assert self.durable <= self.sent
             return
-        if frame[0] == wire.READ_ONLY:
-            self.read_only = wire.Reader(frame[1:]).text().decode()
+        if frame[0] == messages.READ_ONLY:
+            self.read_only = messages.ByteReader(frame[1:]).text().decode()
             return
-        match wire.parse(frame):
-            case wire.Question(state):
-                self.out.append(wire.answer(self.doc.get_update(state)))
-            case wire.Edit(update):
+        match messages.parse(frame):
+            case messages.Question(state):
+                self.out.append(messages.answer(self.doc.get_update(state)))
+            case messages.Edit(update):
                 self._remote = True
                 self.doc.apply_update(update)
                 self._remote = False
-            case wire.Comparison(_, entries, total):
+            case messages.CompareMessage(_, entries, total):
                 self.told = Fingerprint(entries, total)
-            case wire.Presence(entries):
+            case messages.Presence(entries):
                 for entry in entries:
                     self.others[entry.client] = entry.state
                     if entry.state == b"null":

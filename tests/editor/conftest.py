@@ -6,7 +6,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
 from editor.process import Editor, running

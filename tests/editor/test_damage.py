@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import wire
-from action_assistant.editor.loading import load
-from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.loading import load
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Conflict
 from action_assistant.journal.events import Draft, nothing
 from action_assistant.journal.journal import Journal
-from editor import forge
+from editor import forged_updates
 from editor.client import Client, settle
 from editor.process import Editor
 
@@ -76,7 +76,7 @@ async def test_a_damaged_row_leaves_what_was_before_it(folder: Path, change: str
 
 async def test_a_row_that_was_stored_but_cannot_be_applied_is_damage_too(folder: Path) -> None:
     journal = await opened(folder)
-    bad = [Draft("graph.updated.v1", "ada", body) for body in (b"nonsense", forge.entry(5, 0, "a", "b"))]  # fmt: skip
+    bad = [Draft("graph.updated.v1", "ada", body) for body in (b"nonsense", forged_updates.entry(5, 0, "a", "b"))]  # fmt: skip
     await journal.append(STREAM, bad)
     loaded = await load(journal, STREAM)
     assert loaded.seq == EVENTS
@@ -119,9 +119,9 @@ async def test_the_room_of_a_damaged_graph_can_only_be_read(folder: Path) -> Non
         eve.map["k"] = "new"
         await settle(ada, eve)
         assert eve.member is not None
-        assert await eve.member.ended() == wire.FORBIDDEN
+        assert await eve.member.ended() == messages.FORBIDDEN
         with pytest.raises(Conflict, match="can only be read"):
-            await room.submit(forge.entry(9, 0, "a", "b"), "ada")
+            await room.submit(forged_updates.entry(9, 0, "a", "b"), "ada")
         bob = Client("bob")
         bob.join(other)
         bob.map["new"] = "edit"

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 from pycrdt import Array, Doc, Map
 
-from action_assistant.editor import document
-from action_assistant.umrf import codec
+from action_assistant.editor.documents import document
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,

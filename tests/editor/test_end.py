@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.editor import wire
+from action_assistant.editor.crdt import messages
 from editor.process import Editor, running
 
 SOON = 1.5  # seconds
@@ -38,8 +38,8 @@ async def test_listeners_and_sockets_do_not_delay_the_end(
         for each in listeners:
             each.start()
         async with editor.socket(graph, "?acks=1") as session:
-            await session.send_bytes(wire.question(b"\x00"))
-            while (await session.receive_bytes(timeout=5))[0] != wire.ACKS:
+            await session.send_bytes(messages.question(b"\x00"))
+            while (await session.receive_bytes(timeout=5))[0] != messages.ACKS:
                 pass
             assert all(listening.acquire(timeout=5) for _ in listeners)
             begun = time.monotonic()

@@ -5,7 +5,7 @@ import httpx_ws
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import wire
+from action_assistant.editor.crdt import messages
 from editor.process import Editor
 from editor.test_sockets import acks, closed, got
 
@@ -13,8 +13,8 @@ from editor.test_sockets import acks, closed, got
 async def told(session: httpx_ws.AsyncWebSocketSession) -> str:
     """The name of the history, the first thing that a socket hears."""
     frame = await session.receive_bytes(timeout=5)
-    assert frame[0] == wire.EPOCH
-    return wire.Reader(frame[1:]).text().decode()
+    assert frame[0] == messages.EPOCH
+    return messages.ByteReader(frame[1:]).text().decode()
 
 
 async def entered(editor: Editor, graph: str, query: str) -> tuple[str, int | None]:
@@ -22,7 +22,7 @@ async def entered(editor: Editor, graph: str, query: str) -> tuple[str, int | No
     async with editor.socket(graph, f"?{query}") as session:
         epoch = await told(session) if "acks" in query else ""
         if "lives" in query:
-            await session.send_bytes(wire.question(b"\0"))
+            await session.send_bytes(messages.question(b"\0"))
             await acks(session, 0)
             return epoch, None
         return epoch, await closed(session)
@@ -40,7 +40,7 @@ async def test_a_client_that_knows_another_one_is_sent_away(
     editor: Editor, graph: str, query: str
 ) -> None:
     _, code = await entered(editor, graph, query)
-    assert code == wire.OTHER_EPOCH
+    assert code == messages.OTHER_EPOCH
 
 
 @pytest.mark.parametrize("query", ["seq=x", "seq=-1", "seq=" + "9" * 30, "seq=", "seq=٣"])
@@ -56,6 +56,6 @@ async def test_nothing_that_another_history_brings_is_taken(
     doc: Doc[object] = Doc()
     doc.get("meta", type=Map)["name"] = "of another history"
     async with editor.socket(graph, "?epoch=x") as session:
-        await session.send_bytes(wire.answer(doc.get_update()))
-        assert await closed(session) == wire.OTHER_EPOCH
+        await session.send_bytes(messages.answer(doc.get_update()))
+        assert await closed(session) == messages.OTHER_EPOCH
     assert (await got(http, f"/api/graphs/{graph}")).json()["seq"] == before

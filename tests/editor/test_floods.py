@@ -16,9 +16,9 @@ import psutil
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import wire
-from action_assistant.web.crowd import AT_ONCE, OF_A_PERSON
-from editor import forge
+from action_assistant.editor.crdt import messages
+from action_assistant.web.network.connection_limits import AT_ONCE, OF_A_PERSON
+from editor import forged_updates
 from editor.process import BEARER, Editor, running
 from editor.test_sockets import acks, closed, eventually, goodbye, masked, upgraded
 
@@ -71,11 +71,11 @@ async def healthy(editor: Editor, graph: str) -> AsyncIterator[list[float]]:
     subscription = doc.observe(lambda event: made.append(event.update))
 
     async def edit(session: httpx_ws.AsyncWebSocketSession) -> None:
-        await session.send_bytes(wire.question(b"\x00"))
+        await session.send_bytes(messages.question(b"\x00"))
         while True:
             things["k"] = float(len(taken))
             begun = time.monotonic()
-            await session.send_bytes(wire.change(made[-1]))
+            await session.send_bytes(messages.change(made[-1]))
             await acks(session, len(taken) + 1, patience=60)
             taken.append(time.monotonic() - begun)
             await asyncio.sleep(0.02)
@@ -100,14 +100,16 @@ async def test_a_forger_is_closed_and_the_victims_edit_survives(editor: Editor, 
     async with editor.joined(graph, victim):
         victim.get("things", type=Map)["mine"] = "one"
         async with editor.socket(graph, **eve) as forger:
-            await forger.send_bytes(wire.question(b"\x00"))
+            await forger.send_bytes(messages.question(b"\x00"))
             await eventually(lambda: True)
-            while not isinstance(heard := wire.parse(await forger.receive_bytes(5)), wire.Edit) or (
-                b"mine" not in heard.update
-            ):
+            while not isinstance(
+                heard := messages.parse(await forger.receive_bytes(5)), messages.Edit
+            ) or (b"mine" not in heard.update):
                 pass
-            await forger.send_bytes(wire.change(forge.entry(4711, 1, "late", "stolen")))
-            assert await goodbye(forger) == (wire.FORBIDDEN, wire.OTHER_CLIENT)
+            await forger.send_bytes(
+                messages.change(forged_updates.entry(4711, 1, "late", "stolen"))
+            )
+            assert await goodbye(forger) == (messages.FORBIDDEN, messages.OTHER_CLIENT)
         victim.get("things", type=Map)["late"] = "mine"
         reader: Doc[Any] = Doc()
         async with editor.socket(graph, **token), editor.joined(graph, reader):
@@ -132,21 +134,21 @@ async def test_what_kills_the_library_is_refused_while_others_edit(
     unlimited: Editor, calm: str
 ) -> None:
     killers = [
-        forge.nested_values(30_000),
-        forge.nested_values(300_000),
-        forge.nested_types(40_000),
+        forged_updates.nested_values(30_000),
+        forged_updates.nested_values(300_000),
+        forged_updates.nested_types(40_000),
         bytes.fromhex("0101cc86dce28bb68f0a6688cc865d7c0000"),
         bytes.fromhex("8be0cc71"),
         b"\xff" * 50,
-        b"\x01\x01\x07\x00\x28\x01\x01m\x01k\x01\x75" + wire.number(2**40),
+        b"\x01\x01\x07\x00\x28\x01\x01m\x01k\x01\x75" + messages.number(2**40),
     ]
     before = memory(unlimited)
     async with healthy(unlimited, calm) as taken:
         for killer in killers:
             for graph in (calm, new_graph(unlimited)):
                 async with unlimited.socket(graph) as eve:
-                    await eve.send_bytes(wire.change(killer))
-                    assert await closed(eve) == wire.MALFORMED
+                    await eve.send_bytes(messages.change(killer))
+                    assert await closed(eve) == messages.MALFORMED
     assert max(taken) < 3
     assert memory(unlimited) - before < 100 * MB
 
@@ -154,10 +156,10 @@ async def test_what_kills_the_library_is_refused_while_others_edit(
 async def test_half_open_and_frozen_sockets_cost_little_and_end(
     unlimited: Editor, calm: str
 ) -> None:
-    big = forge.entry(5, 0, "big", "x" * 900_000)
+    big = forged_updates.entry(5, 0, "big", "x" * 900_000)
     async with unlimited.socket(calm, "?acks=1") as session:
-        await session.send_bytes(wire.change(big))
-        await session.send_bytes(wire.question(b"\x00"))
+        await session.send_bytes(messages.change(big))
+        await session.send_bytes(messages.question(b"\x00"))
         await acks(session, 1)
     before = memory(unlimited)
     frozen = [upgraded(unlimited, calm, receive_buffer=4096) for _ in range(20)]
@@ -166,7 +168,7 @@ async def test_half_open_and_frozen_sockets_cost_little_and_end(
         raw.sendall(b"GET /api/graphs/x/room HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgr")
     for raw in frozen:
         for _ in range(50):  # asks for 45 MB and reads none of it
-            raw.sendall(masked(wire.question(b"\x00")))
+            raw.sendall(masked(messages.question(b"\x00")))
     async with healthy(unlimited, calm) as taken:
         await asyncio.sleep(2)
     assert memory(unlimited) - before < 20 * 5 * MB
@@ -234,7 +236,7 @@ async def asked(editor: Editor, graph: str, *, synced: bool = False) -> tuple[by
         if b" 101 " not in head:
             body = await asyncio.wait_for(reader.read(), 60)
         elif synced:
-            writer.write(masked(wire.question(b"\x00")))
+            writer.write(masked(messages.question(b"\x00")))
             await asyncio.wait_for(reader.readexactly(4), 60)
         return head, body
     finally:

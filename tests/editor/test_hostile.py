@@ -7,17 +7,23 @@ from typing import Any
 import pytest
 from pycrdt import Array, Doc, Map
 
-from action_assistant.editor import wire
-from action_assistant.editor.loading import load
-from action_assistant.editor.nesting import DEEPEST_TYPES
-from action_assistant.editor.replica import WAITING_UPDATES, Foreign, Replica
-from action_assistant.editor.rooms import Rooms
-from action_assistant.editor.scan import outline
-from action_assistant.editor.wire import Malformed
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.loading import load
+from action_assistant.editor.crdt.messages import Malformed
+from action_assistant.editor.crdt.nesting import DEEPEST_TYPES
+from action_assistant.editor.crdt.replica import WAITING_UPDATES, ForeignClient, Replica
+from action_assistant.editor.crdt.update_scan import outline
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import TooMany
 from action_assistant.journal.journal import Journal
-from action_assistant.web.crowd import AT_ONCE, OF_A_PERSON, OF_AN_ADDRESS, PER_MINUTE, Crowd
-from editor import forge
+from action_assistant.web.network.connection_limits import (
+    AT_ONCE,
+    OF_A_PERSON,
+    OF_AN_ADDRESS,
+    PER_MINUTE,
+    ConnectionLimits,
+)
+from editor import forged_updates
 from editor.client import Client, settle
 
 STREAM = "graph/g"
@@ -40,9 +46,9 @@ async def test_a_forged_client_id_changes_nothing_and_the_victims_edit_survives(
         await settle(ada, eve)
         ada.map["place"] = "mine too"  # made, not sent yet
         clock = 1
-        eve.deliver(wire.change(forge.entry(1, clock, "place", "stolen")))
+        eve.deliver(messages.change(forged_updates.entry(1, clock, "place", "stolen")))
         await room.quiet()
-        assert await ended(eve) == wire.FORBIDDEN
+        assert await ended(eve) == messages.FORBIDDEN
         await settle(ada)
         assert ada.member is not None
         assert not ada.member.closed
@@ -69,9 +75,9 @@ async def test_ids_are_learned_from_the_log(journal: Journal) -> None:
         async with rooms.enter(STREAM) as room:
             eve.join(room)
             await settle(eve)
-            eve.deliver(wire.change(forge.entry(1, 1 + kept, "stolen", "x")))
+            eve.deliver(messages.change(forged_updates.entry(1, 1 + kept, "stolen", "x")))
             await room.quiet()
-            assert await ended(eve) == wire.FORBIDDEN
+            assert await ended(eve) == messages.FORBIDDEN
             eve.leave()
         await rooms.close()
 
@@ -87,7 +93,7 @@ async def test_who_echoes_what_others_wrote_is_not_blamed(rooms: Rooms) -> None:
             await settle(ada, bob)
         bob.map["own"] = "bob's"
         bob.out = []  # lost on its way: it comes with everything else
-        bob.deliver(wire.answer(bob.doc.get_update()))
+        bob.deliver(messages.answer(bob.doc.get_update()))
         await settle(ada, bob)
         assert bob.member is not None
         assert not bob.member.closed
@@ -100,10 +106,10 @@ async def test_an_id_that_somebody_shows_is_theirs_before_they_write(rooms: Room
     async with rooms.enter(STREAM) as room:
         for client in (ada, eve):
             client.join(room)
-        ada.deliver(wire.presence([wire.Entry(1, 1, b"{}")]))
-        eve.deliver(wire.change(forge.entry(1, 0, "stolen", "x")))
+        ada.deliver(messages.presence([messages.PresenceEntry(1, 1, b"{}")]))
+        eve.deliver(messages.change(forged_updates.entry(1, 0, "stolen", "x")))
         await room.quiet()
-        assert await ended(eve) == wire.FORBIDDEN
+        assert await ended(eve) == messages.FORBIDDEN
         ada.map["k"] = "mine"
         await settle(ada)
         assert room.seq == 1
@@ -114,12 +120,12 @@ def test_no_forged_header_is_taken() -> None:
     owners = dict.fromkeys(range(1, 40), "ada")
     replica = Replica()
     for client in owners:
-        replica.take(forge.entry(client, 0, f"k{client}", "true"), "ada")
+        replica.take(forged_updates.entry(client, 0, f"k{client}", "true"), "ada")
     before = replica.doc.get_update()
     for _ in range(10_000):
         client, clock = chance.randint(1, 39), chance.choice([1, 1, 2, 50, 2**31 - 2])
-        with pytest.raises(Foreign):
-            replica.take(forge.entry(client, clock, "forged", "x"), "eve")
+        with pytest.raises(ForeignClient):
+            replica.take(forged_updates.entry(client, clock, "forged", "x"), "eve")
     assert replica.doc.get_update() == before
     assert replica.waiting == ()
     replica.close()
@@ -134,14 +140,14 @@ async def test_viewers_change_nothing_and_are_not_asked(rooms: Rooms) -> None:
         vic.join(room, edits=False)
         await settle(ada, vic)
         assert vic.things == {"k": "v"}
-        vic.deliver(wire.answer(b"\x00\x00"))
-        vic.deliver(wire.answer(vic.doc.get_update()))  # what all know
+        vic.deliver(messages.answer(b"\x00\x00"))
+        vic.deliver(messages.answer(vic.doc.get_update()))  # what all know
         await settle(ada, vic)
         assert vic.member is not None
         assert not vic.member.closed
-        vic.deliver(wire.change(forge.entry(99, 0, "k", "vic's")))
+        vic.deliver(messages.change(forged_updates.entry(99, 0, "k", "vic's")))
         await room.quiet()
-        assert await ended(vic) == wire.FORBIDDEN
+        assert await ended(vic) == messages.FORBIDDEN
         assert room.seq == 1
 
 
@@ -151,13 +157,13 @@ async def test_whatever_two_bytes_a_viewer_begins_with_nothing_changes(rooms: Ro
         ada.join(room)
         ada.map["k"] = "v"
         await settle(ada)
-        update = forge.entry(99, 0, "k", "vic's")
+        update = forged_updates.entry(99, 0, "k", "vic's")
         for first in range(256):
             for second in range(0, 256, 1 if first < 8 else 51):
                 vic = Client("vic")
                 vic.join(room, edits=False)
                 try:
-                    message = wire.parse(bytes((first, second)) + wire.text(update))
+                    message = messages.parse(bytes((first, second)) + messages.text(update))
                 except Malformed:
                     continue
                 if message is not None and vic.member is not None:
@@ -170,30 +176,32 @@ async def test_whatever_two_bytes_a_viewer_begins_with_nothing_changes(rooms: Ro
 
 def test_types_may_lie_in_one_another_but_not_deeply() -> None:
     replica = Replica()
-    replica.take(forge.nested_types(DEEPEST_TYPES), "eve")
+    replica.take(forged_updates.nested_types(DEEPEST_TYPES), "eve")
     for deep in (DEEPEST_TYPES + 2, 1000, 30_000):
         with pytest.raises(Malformed, match="nested"):
-            Replica().take(forge.nested_types(deep), "eve")
+            Replica().take(forged_updates.nested_types(deep), "eve")
     below = DEEPEST_TYPES - 1
-    replica.take(forge.nested_types(1, start=DEEPEST_TYPES, below=below), "eve")
+    replica.take(forged_updates.nested_types(1, start=DEEPEST_TYPES, below=below), "eve")
     with pytest.raises(Malformed, match="nested"):  # not in small steps either
-        replica.take(forge.nested_types(1, start=DEEPEST_TYPES + 1, below=DEEPEST_TYPES), "eve")
+        replica.take(
+            forged_updates.nested_types(1, start=DEEPEST_TYPES + 1, below=DEEPEST_TYPES), "eve"
+        )
     replica.close()
 
 
 async def test_depth_is_known_after_a_snapshot(journal: Journal) -> None:
     rooms = Rooms(journal, linger=60, window=0)
     async with rooms.enter(STREAM) as room:
-        await room.submit(forge.nested_types(DEEPEST_TYPES), "eve")
+        await room.submit(forged_updates.nested_types(DEEPEST_TYPES), "eve")
         await room.submit(
-            forge.nested_types(1, start=DEEPEST_TYPES, below=DEEPEST_TYPES - 1), "eve"
+            forged_updates.nested_types(1, start=DEEPEST_TYPES, below=DEEPEST_TYPES - 1), "eve"
         )
     await rooms.close()
     loaded = await load(journal, STREAM)
     assert loaded.kept == 2
     with pytest.raises(Malformed, match="nested"):
         loaded.replica.take(
-            forge.nested_types(1, start=DEEPEST_TYPES + 1, below=DEEPEST_TYPES), "eve"
+            forged_updates.nested_types(1, start=DEEPEST_TYPES + 1, below=DEEPEST_TYPES), "eve"
         )
     loaded.replica.close()
 
@@ -224,11 +232,11 @@ async def test_what_never_comes_is_not_waited_for_without_end(rooms: Rooms) -> N
         eve.join(room)
         ada.join(room)
         for n in range(WAITING_UPDATES + 1):
-            eve.deliver(wire.change(forge.entry(66, 10 + 2 * n, "k", "x")))
+            eve.deliver(messages.change(forged_updates.entry(66, 10 + 2 * n, "k", "x")))
         await room.quiet()
-        assert await ended(eve) == wire.TOO_BIG
+        assert await ended(eve) == messages.TOO_BIG
         assert room.seq == WAITING_UPDATES
-        ada.deliver(wire.change(forge.entry(67, 10, "k", "x")))
+        ada.deliver(messages.change(forged_updates.entry(67, 10, "k", "x")))
         ada.map["k"] = "v"
         await settle(ada)
         assert ada.things == {"k": "v"}
@@ -237,11 +245,13 @@ async def test_what_never_comes_is_not_waited_for_without_end(rooms: Rooms) -> N
 @pytest.mark.parametrize(
     "update",
     [
-        forge.entry(2**53, 0, "k", "x"),
-        forge.entry(7, 2**31 - 1, "k", "x"),
-        forge.entry(7, 2**63, "k", "x"),
-        b"\x02" + forge.entry(7, 0, "k", "x")[1:-1] + forge.entry(7, 1, "k", "x")[1:],
-        b"\x00\x01\x07\x01" + wire.number(2**40) + b"\x01",
+        forged_updates.entry(2**53, 0, "k", "x"),
+        forged_updates.entry(7, 2**31 - 1, "k", "x"),
+        forged_updates.entry(7, 2**63, "k", "x"),
+        b"\x02"
+        + forged_updates.entry(7, 0, "k", "x")[1:-1]
+        + forged_updates.entry(7, 1, "k", "x")[1:],
+        b"\x00\x01\x07\x01" + messages.number(2**40) + b"\x01",
     ],
 )
 def test_numbers_that_a_page_cannot_read_are_refused(update: bytes) -> None:
@@ -251,65 +261,67 @@ def test_numbers_that_a_page_cannot_read_are_refused(update: bytes) -> None:
 
 def test_sockets_are_counted_per_person_and_address() -> None:
     now = 0.0
-    crowd = Crowd(limits=True, clock=lambda: now)
+    connection_limits = ConnectionLimits(limits=True, clock=lambda: now)
     held = []
     for n in range(OF_A_PERSON):
-        held.append(crowd.admitted("ada", "a"))
+        held.append(connection_limits.admitted("ada", "a"))
         held[n].__enter__()
-    with pytest.raises(TooMany, match="open already"), crowd.admitted("ada", "a"):
+    with pytest.raises(TooMany, match="open already"), connection_limits.admitted("ada", "a"):
         pass
-    with crowd.admitted("bob", "a"):
+    with connection_limits.admitted("bob", "a"):
         pass
     for n in range(OF_AN_ADDRESS - OF_A_PERSON):
-        held.append(crowd.admitted(f"p{n}", "a"))
+        held.append(connection_limits.admitted(f"p{n}", "a"))
         held[-1].__enter__()
         now += 60 / PER_MINUTE
-    with pytest.raises(TooMany, match="address"), crowd.admitted("cy", "a"):
+    with pytest.raises(TooMany, match="address"), connection_limits.admitted("cy", "a"):
         pass
-    with crowd.admitted("cy", "b"):
+    with connection_limits.admitted("cy", "b"):
         pass
     held.pop().__exit__(None, None, None)
-    with crowd.admitted("cy", "a"):
+    with connection_limits.admitted("cy", "a"):
         pass
 
 
 def test_upgrades_come_in_bursts_and_then_at_a_rate() -> None:
     now = 0.0
-    crowd = Crowd(limits=True, clock=lambda: now)
+    connection_limits = ConnectionLimits(limits=True, clock=lambda: now)
     for _ in range(AT_ONCE):
-        with crowd.admitted("ada", "a"):
+        with connection_limits.admitted("ada", "a"):
             pass
-    with pytest.raises(TooMany, match="short time"), crowd.admitted("ada", "a"):
+    with pytest.raises(TooMany, match="short time"), connection_limits.admitted("ada", "a"):
         pass
     now += 60
     for _ in range(PER_MINUTE):
-        with crowd.admitted("ada", "a"):
+        with connection_limits.admitted("ada", "a"):
             pass
-    with pytest.raises(TooMany), crowd.admitted("ada", "a"):
+    with pytest.raises(TooMany), connection_limits.admitted("ada", "a"):
         pass
-    free = Crowd(limits=False, clock=lambda: now)
+    free = ConnectionLimits(limits=False, clock=lambda: now)
     for _ in range(AT_ONCE * 3):
         with free.admitted("ada", "a"):
             pass
 
 
 def test_where_stop_is_sent_the_first_socket_of_a_person_is_always_admitted() -> None:
-    crowd = Crowd(limits=True, keeps_one=True, clock=lambda: 0.0)
-    held = [crowd.admitted("eve", "a") for _ in range(OF_A_PERSON)]
+    connection_limits = ConnectionLimits(limits=True, keeps_one=True, clock=lambda: 0.0)
+    held = [connection_limits.admitted("eve", "a") for _ in range(OF_A_PERSON)]
     for each in held:
         each.__enter__()
-    with pytest.raises(TooMany, match="open already"), crowd.admitted("eve", "a"):
+    with pytest.raises(TooMany, match="open already"), connection_limits.admitted("eve", "a"):
         pass
     for _ in range(AT_ONCE):  # whoever sits at the same address comes too fast, and is too many
-        with contextlib.suppress(TooMany), crowd.admitted("eve", "a"):
+        with contextlib.suppress(TooMany), connection_limits.admitted("eve", "a"):
             pass
     with (
-        crowd.admitted("ada", "a"),
+        connection_limits.admitted("ada", "a"),
         pytest.raises(TooMany, match="short time"),
-        crowd.admitted("ada", "a"),
+        connection_limits.admitted("ada", "a"),
     ):
         pass
-    with crowd.admitted("ada", "a"):  # once it is closed, the next one is the first again
+    with connection_limits.admitted(
+        "ada", "a"
+    ):  # once it is closed, the next one is the first again
         pass
     for each in held:
         each.__exit__(None, None, None)

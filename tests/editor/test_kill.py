@@ -17,11 +17,11 @@ import pytest
 from pycrdt import Doc, Map
 from wsproto.utilities import LocalProtocolError
 
-from action_assistant.editor import wire
-from action_assistant.editor.loading import load
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.loading import load
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
-from editor.mortal import NOWHERE, POINTS, Pipe
+from editor.dying_rooms import NOWHERE, POINTS, Pipe
 from editor.process import Editor, running
 
 WRITERS: Final = 3
@@ -47,7 +47,7 @@ class Writer:
         """Until the server dies."""
         try:
             async with editor.socket(graph, "?acks=1") as session:
-                await session.send_bytes(wire.question(self.doc.get_state()))
+                await session.send_bytes(messages.question(self.doc.get_state()))
                 await self.converse(session)
         except* (httpx_ws.HTTPXWSException, httpx.TransportError, LocalProtocolError, OSError):
             pass
@@ -56,7 +56,7 @@ class Writer:
         """Until the small process dies."""
         try:
             await pipe.send_bytes(self.name.encode())
-            await pipe.send_bytes(wire.question(self.doc.get_state()))
+            await pipe.send_bytes(messages.question(self.doc.get_state()))
             await self.converse(pipe)
         except (asyncio.IncompleteReadError, ConnectionError):
             pipe.close()
@@ -65,17 +65,17 @@ class Writer:
         sent: list[int] = []  # how much was written when each message left
         while True:
             frame = await session.receive_bytes()
-            if frame[0] == wire.ACKS:
-                durable = wire.Reader(frame[1:]).number()
+            if frame[0] == messages.ACKS:
+                durable = messages.ByteReader(frame[1:]).number()
                 self.acknowledged = max([self.acknowledged, *sent[:durable]])
                 for _ in range(random.randint(1, 4)):
                     sent.append(await self._next(session))
                 continue
-            match wire.parse(frame):
-                case wire.Question(state):
-                    await session.send_bytes(wire.answer(self.doc.get_update(state)))
+            match messages.parse(frame):
+                case messages.Question(state):
+                    await session.send_bytes(messages.answer(self.doc.get_update(state)))
                     sent.append(self.written)
-                case wire.Edit(update):
+                case messages.Edit(update):
                     self.doc.apply_update(update)
                     self.seen = {key for key in self.map if not key.startswith(self.name)}
 
@@ -83,7 +83,7 @@ class Writer:
         self.written += 1
         self._made.clear()
         self.map[f"{self.name}{self.written}"] = self.written
-        await session.send_bytes(wire.change(self._made[0]))
+        await session.send_bytes(messages.change(self._made[0]))
         return self.written
 
 
@@ -131,7 +131,7 @@ class Mortal:
     @classmethod
     async def begun(cls, folder: Path) -> "Mortal":
         process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "editor.mortal", str(folder)),
+            *(sys.executable, "-m", "editor.dying_rooms", str(folder)),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},

@@ -7,10 +7,10 @@ import httpx
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import fullness, wire
-from action_assistant.editor.budget import AT_ONCE, PER_MINUTE, Budget
-from action_assistant.editor.room import Room
-from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.crdt import document_quota, messages
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.rate_limits import AT_ONCE, PER_MINUTE, ByteRateLimits
+from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import TooLarge
 from action_assistant.journal.journal import Journal
 from editor.client import Client, settle
@@ -37,15 +37,15 @@ def add(client: Client, *aids: str) -> None:
 
 
 async def seen(room: Room) -> int:
-    return await room.look(lambda replica, _: fullness.actions_in(replica.doc))
+    return await room.look(lambda replica, _: document_quota.actions_in(replica.doc))
 
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ten actions, 64 KiB."""
-    monkeypatch.setattr(fullness, "MOST_ACTIONS", 10)
-    monkeypatch.setattr(fullness, "MOST_BYTES", 1 << 16)
-    monkeypatch.setattr(fullness, "_WORTH", 1 << 10)
+    monkeypatch.setattr(document_quota, "MOST_ACTIONS", 10)
+    monkeypatch.setattr(document_quota, "MOST_BYTES", 1 << 16)
+    monkeypatch.setattr(document_quota, "_WORTH", 1 << 10)
 
 
 @pytest.mark.usefixtures("small")
@@ -59,7 +59,7 @@ async def test_one_action_too_many_is_refused_to_its_maker_and_others_go_on(room
         assert await seen(room) == 10
         add(eve, "e0")
         await settle(ada, eve, vic)
-        assert await end_of(eve) == wire.FULL
+        assert await end_of(eve) == messages.FULL
         assert eve.member is not None
         assert eve.member.said == "a graph may have 10 actions"
         # Ada renames, deletes, and has room for one more; Vic sees all of it.
@@ -97,7 +97,7 @@ async def test_who_takes_back_what_was_too_much_comes_in_again_with_everything_e
         add(ada, *(f"a{n}" for n in range(11)))
         actions_of(ada)["a0|description"] = "kept"
         await settle(ada)
-        assert await end_of(ada) == wire.FULL
+        assert await end_of(ada) == messages.FULL
         assert await seen(room) == 0
         for key in ("a10", "a10|type"):
             del actions_of(ada)[key]
@@ -121,7 +121,7 @@ async def test_a_document_of_too_many_bytes_takes_deletions_and_then_edits_again
         await settle(ada, eve)
         eve.map["more"] = "y" * 20_000
         await settle(ada, eve)
-        assert await end_of(eve) == wire.FULL
+        assert await end_of(eve) == messages.FULL
         assert "more" not in ada.things
         del ada.map["k0"]
         del ada.map["k1"]
@@ -145,7 +145,7 @@ async def test_an_old_graph_that_is_too_large_opens_and_can_be_made_smaller(
         await settle(ada)
         ada.leave()
     await before.close()
-    monkeypatch.setattr(fullness, "MOST_ACTIONS", 10)
+    monkeypatch.setattr(document_quota, "MOST_ACTIONS", 10)
     rooms = Rooms(journal)
     async with rooms.enter(STREAM) as room:
         ada.join(room)
@@ -157,7 +157,7 @@ async def test_an_old_graph_that_is_too_large_opens_and_can_be_made_smaller(
         await settle(ada)
         assert ada.member is not None
         assert ada.member.closed
-        assert await end_of(ada) == wire.FULL
+        assert await end_of(ada) == messages.FULL
     await rooms.close()
 
 
@@ -175,39 +175,39 @@ async def test_the_limit_is_5000_actions_on_every_way_in(
         for n in range(5_001):
             doc.get("actions", type=Map)[f"a{n:011}"] = "A"
     async with editor.socket(graph) as session:
-        await session.send_bytes(wire.answer(doc.get_update()))
-        assert await closed(session) == wire.FULL
+        await session.send_bytes(messages.answer(doc.get_update()))
+        assert await closed(session) == messages.FULL
     assert (await got(http, f"/api/graphs/{graph}/umrf")).json()["actions"] == []
 
 
 def test_a_person_brings_so_many_bytes_a_minute_and_nobody_else_waits_for_that() -> None:
     now = 0.0
-    budget = Budget(limits=True, clock=lambda: now)
-    assert budget.spend("ada", AT_ONCE) == 0
-    assert budget.spend("ada", PER_MINUTE) == 60
-    assert budget.spend("mari", 1000) == 0
+    rate_limits = ByteRateLimits(limits=True, clock=lambda: now)
+    assert rate_limits.spend("ada", AT_ONCE) == 0
+    assert rate_limits.spend("ada", PER_MINUTE) == 60
+    assert rate_limits.spend("mari", 1000) == 0
     now = 60.0
-    assert budget.spend("ada", PER_MINUTE // 60) == pytest.approx(1)
+    assert rate_limits.spend("ada", PER_MINUTE // 60) == pytest.approx(1)
     now = 600.0
-    assert budget.spend("ada", AT_ONCE) == 0
-    assert Budget(limits=False).spend("ada", 10 * AT_ONCE) == 0
+    assert rate_limits.spend("ada", AT_ONCE) == 0
+    assert ByteRateLimits(limits=False).spend("ada", 10 * AT_ONCE) == 0
 
 
 def test_a_cursor_may_move_two_hundred_times_a_second_for_ever_and_not_faster() -> None:
     now = 0.0
-    budget = Budget(limits=True, clock=lambda: now)
+    rate_limits = ByteRateLimits(limits=True, clock=lambda: now)
     for n in range(200 * 60 * 10):
         now = n / 200
-        assert budget.speak("ada", 100) == 0
-    waits = [budget.speak("eve", 100) for _ in range(60_000)]
+        assert rate_limits.speak("ada", 100) == 0
+    waits = [rate_limits.speak("eve", 100) for _ in range(60_000)]
     assert waits[0] == 0
     assert waits[-1] > 100
 
 
 def test_a_crowd_of_people_is_not_remembered_for_ever() -> None:
     now = 0.0
-    budget = Budget(limits=True, clock=lambda: now)
+    rate_limits = ByteRateLimits(limits=True, clock=lambda: now)
     for n in range(5_000):
         now += 1.0
-        budget.spend(f"person {n}", 1)
-    assert len(budget._left) <= 1_001
+        rate_limits.spend(f"person {n}", 1)
+    assert len(rate_limits._left) <= 1_001

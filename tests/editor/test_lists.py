@@ -9,13 +9,13 @@ import httpx
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.editor import wire
-from action_assistant.editor.app import open_house
-from action_assistant.editor.contents import labels_of
-from action_assistant.editor.happenings import graph_stream
+from action_assistant.editor.app import open_services
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.documents.contents import labels_of
+from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.settings import EditorSettings
 from action_assistant.umrf.model import Graph
-from action_assistant.web.workers import GaveUp
+from action_assistant.web.workers.lanes import GaveUp
 from editor.client import Client
 from editor.test_api import NAV
 
@@ -46,42 +46,42 @@ def test_labels_that_are_none_are_left_out(value: object) -> None:
 
 async def test_the_list_says_who_is_in_a_graph_now(tmp_path: Path) -> None:
     settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
-    async with open_house(settings) as house:
-        made, _ = await house.catalogue.bring(json.dumps(NAV).encode(), "ada")
-        async with house.rooms.enter(graph_stream(made.id)) as room:
+    async with open_services(settings) as services:
+        made, _ = await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
+        async with services.rooms.enter(graph_stream(made.id)) as room:
             here = [Client("mari"), Client("ada"), Client("ada")]
             for number, client in enumerate(here, start=1):
                 client.join(room)
-                client.deliver(wire.presence([wire.Entry(number, 1, b"{}")]))
+                client.deliver(messages.presence([messages.PresenceEntry(number, 1, b"{}")]))
             await asyncio.sleep(0)
-            view = await house.catalogue.get(made.id)
+            view = await services.catalogue.get(made.id)
             assert [person.name for person in view.people] == ["Ada", "Mari"]
             here[0].leave()
-            view = await house.catalogue.get(made.id)
+            view = await services.catalogue.get(made.id)
             assert [person.name for person in view.people] == ["Ada"]
             for client in here[1:]:
                 client.leave()
-        assert (await house.catalogue.get(made.id)).people == ()
+        assert (await services.catalogue.get(made.id)).people == ()
 
 
 async def test_a_graph_of_which_nothing_can_be_found_out_stays_in_the_list_with_the_others(
     tmp_path: Path,
 ) -> None:
     settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
-    async with open_house(settings) as house:
-        made, _ = await house.catalogue.bring(json.dumps(NAV).encode(), "ada")
-        others = {view.id for view in await house.catalogue.all()} - {made.id}
-    async with open_house(settings) as house:
-        asked = house.sights._aside
+    async with open_services(settings) as services:
+        made, _ = await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
+        others = {view.id for view in await services.catalogue.all()} - {made.id}
+    async with open_services(settings) as services:
+        asked = services.graph_reader._run_in_worker
 
         async def ask(work: Any, *values: Any) -> Any:
             if getattr(values[0], "graph", "") == made.id:
                 raise GaveUp("This took longer than it may.")
             return await asked(work, *values)
 
-        house.sights._aside = ask
-        views = {view.id: view for view in await house.catalogue.all()}
+        services.graph_reader._run_in_worker = ask
+        views = {view.id: view for view in await services.catalogue.all()}
         assert views.keys() == others | {made.id}
         assert (views[made.id].name, views[made.id].problems) == (made.name, None)
         assert all(views[other].problems is not None for other in others)
-        assert made.id.encode() not in await house.library.all()
+        assert made.id.encode() not in await services.library.all()

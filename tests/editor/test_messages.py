@@ -7,22 +7,29 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pycrdt import Decoder, YMessageType, YSyncMessageType, create_update_message
 
-from action_assistant.editor import wire
-from action_assistant.editor.wire import Edit, Entry, Malformed, Presence, Question, Reader
+from action_assistant.editor.crdt import messages as wire
+from action_assistant.editor.crdt.messages import (
+    ByteReader,
+    Edit,
+    Malformed,
+    Presence,
+    PresenceEntry,
+    Question,
+)
 
 data = st.binary(max_size=300)
 entries = st.lists(
-    st.builds(Entry, st.integers(0, 2**53), st.integers(0, 2**40), st.binary(max_size=50))
+    st.builds(PresenceEntry, st.integers(0, 2**53), st.integers(0, 2**40), st.binary(max_size=50))
 )
 
 
 @given(st.integers(0, 2**64 - 1))
 def test_a_number_survives(value: int) -> None:
-    assert Reader(wire.number(value)).number() == value
+    assert ByteReader(wire.number(value)).number() == value
 
 
 @given(data, entries)
-def test_messages_survive(content: bytes, said: list[Entry]) -> None:
+def test_messages_survive(content: bytes, said: list[PresenceEntry]) -> None:
     assert wire.parse(wire.question(content)) == Question(content)
     assert wire.parse(wire.answer(content)) == Edit(content)
     assert wire.parse(wire.change(content)) == Edit(content)

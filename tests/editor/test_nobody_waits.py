@@ -10,8 +10,9 @@ import httpx
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import fullness, importing, trial, wire
-from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.crdt import document_quota, messages, trial
+from action_assistant.editor.interchange import importing
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import TooLarge
 from editor.client import Client, settle
 from editor.process import BEARER, Editor
@@ -114,11 +115,11 @@ def test_a_file_with_too_much_is_refused_with_the_place(
     assert len(http.get("/api/graphs").json()) == before
 
 
-@pytest.mark.parametrize("way", [importing.brought, importing.preview, importing.pieces])
+@pytest.mark.parametrize("way", [importing.imported, importing.preview, importing.pieces])
 def test_a_file_whose_actions_say_too_much_together_is_refused(
     way: Callable[[bytes], object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fullness, "MOST_FIELDS", 1_000)
+    monkeypatch.setattr(document_quota, "MOST_FIELDS", 1_000)
     assert way(json.dumps(wide(900)).encode())
     with pytest.raises(TooLarge, match="1,000 fields"):
         way(json.dumps(wide(1_000)).encode())
@@ -127,7 +128,7 @@ def test_a_file_whose_actions_say_too_much_together_is_refused(
 async def test_a_document_takes_so_many_fields_and_no_more(
     rooms: Rooms, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fullness, "MOST_FIELDS", 100)
+    monkeypatch.setattr(document_quota, "MOST_FIELDS", 100)
     ada, eve = Client("ada"), Client("eve")
     async with rooms.enter("graph/g") as room:
         ada.join(room)
@@ -143,7 +144,7 @@ async def test_a_document_takes_so_many_fields_and_no_more(
         eve.doc.get("actions", type=Map)["a|more"] = 1
         await settle(ada, eve)
         assert eve.member is not None
-        assert await eve.member.ended() == wire.FULL
+        assert await eve.member.ended() == messages.FULL
         assert eve.member.said == "a graph may have 100 fields"
         del fields["a|8"]
         fields["a|9 and another"] = 1
@@ -182,7 +183,7 @@ async def test_what_nobody_waits_for_is_not_read_to_its_end(editor: Editor) -> N
 def at_once(count: int, client: int = 7, clock: int = 0, *, needs: int | None = None) -> bytes:
     """So many values for one key, none of which knows of another; perhaps after something that is
     not there."""
-    number, text = wire.number, wire.text
+    number, text = messages.number, messages.text
     items = count + (needs is not None)
     made = b"\x01" + number(items) + number(client) + number(clock)
     if needs is not None:
@@ -203,10 +204,10 @@ async def test_an_update_that_takes_long_is_refused_and_others_go_on(rooms: Room
         ada.join(room)
         eve.join(room)
         await settle(ada, eve)
-        eve.deliver(wire.change(at_once(8_000)))
+        eve.deliver(messages.change(at_once(8_000)))
         await room.quiet()
         assert eve.member is not None
-        assert await eve.member.ended() == wire.TOO_BIG
+        assert await eve.member.ended() == messages.TOO_BIG
         assert "so long" in (eve.member.said or "")
         ada.map["k"] = "v"
         await settle(ada)
@@ -219,8 +220,8 @@ async def test_an_update_that_would_hold_the_process_up_is_refused_to_its_sender
 ) -> None:
     async def bring() -> None:
         async with editor.socket(graph) as session:
-            await session.send_bytes(wire.change(at_once(12_000)))
-            assert await closed(session, 60) == wire.TOO_BIG
+            await session.send_bytes(messages.change(at_once(12_000)))
+            assert await closed(session, 60) == messages.TOO_BIG
 
     await bring()
     longest, took = await longest_silence(editor, bring)
@@ -263,16 +264,16 @@ async def test_what_waits_is_looked_at_before_it_is_let_in(rooms: Rooms) -> None
         for client in (ada, eve):
             client.join(room)
         await settle(ada, eve)
-        eve.deliver(wire.change(at_once(8_000, client=11, needs=9)))
+        eve.deliver(messages.change(at_once(8_000, client=11, needs=9)))
         await settle(ada, eve)
         assert (await room.quiet()).waiting_bytes > 50_000
         ada.map["k"] = "v"
         await settle(ada)
         assert ada.durable == ada.sent
-        eve.deliver(wire.change(first))
+        eve.deliver(messages.change(first))
         await room.quiet()
         assert eve.member is not None
-        assert await eve.member.ended() == wire.TOO_BIG
+        assert await eve.member.ended() == messages.TOO_BIG
         ada.map["k"] = "w"
         await settle(ada)
         assert ada.durable == ada.sent

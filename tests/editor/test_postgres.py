@@ -11,7 +11,7 @@ import httpx_ws
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import wire
+from action_assistant.editor.crdt import messages
 from editor.process import Editor, running
 from journal.servers import Server, binaries, server
 
@@ -55,15 +55,15 @@ class Hand:
         return False
 
     async def _converse(self, session: httpx_ws.AsyncWebSocketSession) -> None:
-        await session.send_bytes(wire.question(self.doc.get_state()))
+        await session.send_bytes(messages.question(self.doc.get_state()))
         while True:
             frame = await session.receive_bytes()
-            if frame[0] == wire.ACKS and wire.Reader(frame[1:]).number() > 0:
+            if frame[0] == messages.ACKS and messages.ByteReader(frame[1:]).number() > 0:
                 return
-            match frame[0] == wire.SYNC and wire.parse(frame):
-                case wire.Question(state):
-                    await session.send_bytes(wire.answer(self.doc.get_update(state)))
-                case wire.Edit(update):
+            match frame[0] == messages.SYNC and messages.parse(frame):
+                case messages.Question(state):
+                    await session.send_bytes(messages.answer(self.doc.get_update(state)))
+                case messages.Edit(update):
                     self.doc.apply_update(update)
 
 

@@ -6,19 +6,19 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.editor import wire
-from action_assistant.editor.presence import STATE_LIMIT, Attendance, Seat, colour_of
-from action_assistant.editor.rooms import Rooms
-from action_assistant.editor.wire import Entry
-from action_assistant.web.keys import Person
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.messages import PresenceEntry
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.presence import STATE_LIMIT, RoomPresence, Seat, colour_of
+from action_assistant.web.auth.keys import Person
 from editor.client import Client, settle
 
 
-def entry(client: int, clock: int = 1, **state: Any) -> Entry:
-    return Entry(client, clock, json.dumps(state).encode())
+def entry(client: int, clock: int = 1, **state: Any) -> PresenceEntry:
+    return PresenceEntry(client, clock, json.dumps(state).encode())
 
 
-def said(entries: list[Entry]) -> dict[int, Any]:
+def said(entries: list[PresenceEntry]) -> dict[int, Any]:
     return {each.client: json.loads(each.state) for each in entries}
 
 
@@ -27,28 +27,28 @@ def seat(name: str) -> Seat:
 
 
 def test_the_server_says_who_it_is() -> None:
-    room, ada = Attendance(), seat("ada")
+    room, ada = RoomPresence(), seat("ada")
     told = room.hear(ada, (entry(7, cursor=[1, 2], user={"id": "bob", "name": "Bob"}),))
     user = {"id": "ada", "name": "Ada", "color": colour_of("ada")}
     assert said(told) == {7: {"cursor": [1, 2], "user": user}}
 
 
 def test_names_of_any_script_arrive_whole() -> None:
-    room = Attendance()
+    room = RoomPresence()
     person = Person("x", "Ülle 🤖 اسم 名前")
     told = room.hear(Seat(person), (entry(1, editing="ключ"),))
-    frame = wire.presence(told)
-    parsed = wire.parse(frame)
-    assert isinstance(parsed, wire.Presence)
+    frame = messages.presence(told)
+    parsed = messages.parse(frame)
+    assert isinstance(parsed, messages.Presence)
     assert json.loads(parsed.entries[0].state)["user"]["name"] == person.name
     assert json.loads(parsed.entries[0].state)["editing"] == "ключ"
 
 
 def test_nobody_speaks_for_others() -> None:
-    room, ada, eve = Attendance(), seat("ada"), seat("eve")
+    room, ada, eve = RoomPresence(), seat("ada"), seat("eve")
     room.hear(ada, (entry(1, cursor=[0, 0]),))
     assert room.hear(eve, (entry(1, 9, cursor=[6, 6]),)) == []
-    assert room.hear(eve, (Entry(1, 9, b"null"),)) == []
+    assert room.hear(eve, (PresenceEntry(1, 9, b"null"),)) == []
     room.hear(eve, (entry(2),))
     assert room.hear(eve, (entry(1, 9, cursor=[6, 6]), entry(3))) == []
     assert said(list(room.everyone()))[1]["cursor"] == [0, 0]
@@ -56,38 +56,38 @@ def test_nobody_speaks_for_others() -> None:
 
 
 def test_who_reconnects_takes_over_from_the_socket_before() -> None:
-    room, old, new = Attendance(), seat("ada"), seat("ada")
+    room, old, new = RoomPresence(), seat("ada"), seat("ada")
     room.hear(old, (entry(1, 5),))
     assert len(room.hear(new, (entry(1, 6, cursor=[1, 1]),))) == 1
     assert room.leave(old) == []
     assert said(list(room.everyone()))[1]["cursor"] == [1, 1]
-    assert room.leave(new) == [Entry(1, 6, b"null")]
+    assert room.leave(new) == [PresenceEntry(1, 6, b"null")]
     assert room.everyone() == ()
 
 
 def test_another_window_of_the_same_person_is_left_alone_by_an_echo() -> None:
-    room, one, two = Attendance(), seat("ada"), seat("ada")
+    room, one, two = RoomPresence(), seat("ada"), seat("ada")
     room.hear(one, (entry(1),))
     room.hear(two, (entry(2),))
     assert room.hear(two, (entry(1, 7),)) == []
-    assert room.leave(two) == [Entry(2, 1, b"null")]
+    assert room.leave(two) == [PresenceEntry(2, 1, b"null")]
     assert set(said(list(room.everyone()))) == {1}
 
 
 def test_who_takes_itself_away_is_gone_and_may_come_back() -> None:
-    room, ada = Attendance(), seat("ada")
+    room, ada = RoomPresence(), seat("ada")
     room.hear(ada, (entry(1, 1),))
-    assert room.hear(ada, (Entry(1, 2, b"null"),)) == [Entry(1, 2, b"null")]
+    assert room.hear(ada, (PresenceEntry(1, 2, b"null"),)) == [PresenceEntry(1, 2, b"null")]
     assert room.everyone() == ()
     assert len(room.hear(ada, (entry(1, 3),))) == 1
 
 
 def test_what_is_no_state_is_not_passed_on() -> None:
-    room = Attendance()
+    room = RoomPresence()
     wrong = [b"", b"5", b"[]", b"{", b'{"a": ' + b"[" * 5000, b"\xff", b'"x"']
     wrong.append(json.dumps({"a": "x" * STATE_LIMIT}).encode())
     for state in wrong:
-        assert room.hear(seat("eve"), (Entry(1, 1, state),)) == []
+        assert room.hear(seat("eve"), (PresenceEntry(1, 1, state),)) == []
     assert room.everyone() == ()
 
 
@@ -95,11 +95,11 @@ def test_what_is_no_state_is_not_passed_on() -> None:
 def test_whatever_is_said_entries_belong_to_seats_that_said_them(
     words: list[tuple[int, int, bool]],
 ) -> None:
-    room = Attendance()
+    room = RoomPresence()
     seats = [seat(f"p{n}") for n in range(4)]
     for who, client, gone in words:
         state = b"null" if gone else b"{}"
-        for told in room.hear(seats[who], (Entry(client, 1, state),)):
+        for told in room.hear(seats[who], (PresenceEntry(client, 1, state),)):
             assert told.client == client
             if not gone:
                 assert json.loads(told.state)["user"]["id"] == f"p{who}"
@@ -115,17 +115,17 @@ async def test_a_newcomer_sees_who_is_there_and_all_see_who_leaves(rooms: Rooms)
     ada, bob = Client("ada"), Client("bob")
     async with rooms.enter("graph/g") as room:
         ada.join(room)
-        ada.deliver(wire.presence([entry(1, selection=["x"])]))
+        ada.deliver(messages.presence([entry(1, selection=["x"])]))
         bob.join(room)
         await settle(ada, bob)
         assert json.loads(bob.others[1])["selection"] == ["x"]
-        bob.deliver(wire.presence([entry(2)]))
+        bob.deliver(messages.presence([entry(2)]))
         await settle(ada, bob)
         assert set(ada.others) == {2}
         ada.leave()
         await settle(bob)
         assert bob.others == {}
-        bob.deliver(bytes((wire.QUERY_AWARENESS,)))
+        bob.deliver(bytes((messages.QUERY_AWARENESS,)))
         await settle(bob)
         assert set(bob.others) == {2}
 
@@ -137,7 +137,7 @@ async def test_of_many_words_of_one_person_only_the_last_waits(rooms: Rooms) -> 
         slow.join(room)
         await settle(ada, slow)
         for n in range(2000):
-            ada.deliver(wire.presence([entry(1, n, cursor=[n, n])]))
+            ada.deliver(messages.presence([entry(1, n, cursor=[n, n])]))
         assert slow.member is not None
         assert not slow.member.closed
         (frame,) = await slow.member.take()

@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import replica, wire
-from action_assistant.editor.loading import load
-from action_assistant.editor.member import WAITING_FRAMES
-from action_assistant.editor.replica import Replica
-from action_assistant.editor.room import Room
-from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.crdt import messages, replica
+from action_assistant.editor.crdt.loading import load
+from action_assistant.editor.crdt.replica import Replica
+from action_assistant.editor.rooms.member import WAITING_FRAMES
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import BadInput, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
@@ -34,8 +34,8 @@ def updates(*changes: tuple[str, str | None]) -> list[bytes]:
 
 
 def frame_update(frame: bytes) -> bytes:
-    message = wire.parse(frame)
-    assert isinstance(message, wire.Edit)
+    message = messages.parse(frame)
+    assert isinstance(message, messages.Edit)
     return message.update
 
 
@@ -121,7 +121,7 @@ async def test_a_change_that_cannot_be_stored_reaches_nobody(
         ada.speak()
         assert ada.member is not None
         assert bob.member is not None
-        assert await ada.member.ended() == await bob.member.ended() == wire.RESTARTING
+        assert await ada.member.ended() == await bob.member.ended() == messages.RESTARTING
         await bob.listen()
         assert bob.things == {}
         assert await journal.newest(STREAM) == 0
@@ -157,7 +157,7 @@ async def test_bytes_are_stored_as_they_came_and_only_if_they_bring_something(
         assert await room.submit(one, "ada") == 1
         assert await room.submit(one, "bob") == 1
         assert await room.submit(two, "ada") == 2
-        assert await room.submit(wire.NOTHING_NEW, "bob") == 2
+        assert await room.submit(messages.NOTHING_NEW, "bob") == 2
     assert await bodies(journal) == [one, two]
 
 
@@ -263,12 +263,12 @@ async def test_what_is_no_update_ends_its_sender_and_nobody_else(
         ada.join(room)
         eve.join(room)
         await settle(ada, eve)
-        eve.deliver(wire.change(b"\x01\x01\x01nonsense"))
-        eve.deliver(wire.change(updates(("later", "x"))[0]))
+        eve.deliver(messages.change(b"\x01\x01\x01nonsense"))
+        eve.deliver(messages.change(updates(("later", "x"))[0]))
         ada.map["a"] = "1"
         await settle(ada)
         assert eve.member is not None
-        assert await eve.member.ended() == wire.MALFORMED
+        assert await eve.member.ended() == messages.MALFORMED
         assert ada.member is not None
         assert not ada.member.closed
     assert len(await bodies(journal)) == 1
@@ -300,12 +300,12 @@ async def test_an_update_that_breaks_the_library_is_refused_and_harms_nobody(
         before = await room.quiet()
         ada.map["b"] = "2"
         ada.speak()
-        eve.deliver(wire.change(poison))
+        eve.deliver(messages.change(poison))
         ada.map["c"] = "3"
         ada.speak()
         await settle(ada)
         assert eve.member is not None
-        assert await eve.member.ended() == wire.MALFORMED
+        assert await eve.member.ended() == messages.MALFORMED
         assert (await room.quiet()) is not before  # read again from the log
         with pytest.raises(BadInput):
             await room.submit(poison, "server")
@@ -331,7 +331,7 @@ async def test_an_update_over_a_mebibyte_is_refused(journal: Journal, rooms: Roo
         eve.map["a"] = "x" * (1 << 20)
         eve.speak()
         assert eve.member is not None
-        assert await eve.member.ended() == wire.TOO_BIG
+        assert await eve.member.ended() == messages.TOO_BIG
         await room.quiet()
     assert await bodies(journal) == []
 
@@ -345,13 +345,13 @@ async def test_a_viewer_sees_everything_and_changes_nothing(journal: Journal, ro
         await settle(ada, vic)
         assert vic.things == {"a": "1"}
         assert not vic.out  # was not asked what it has
-        vic.deliver(wire.answer(wire.NOTHING_NEW))
+        vic.deliver(messages.answer(messages.NOTHING_NEW))
         await settle(ada, vic)
         assert vic.member is not None
         assert not vic.member.closed
         vic.map["a"] = "2"
         vic.speak()
-        assert await vic.member.ended() == wire.FORBIDDEN
+        assert await vic.member.ended() == messages.FORBIDDEN
         await settle(ada)
         assert ada.things == {"a": "1"}
     assert len(await bodies(journal)) == 1
@@ -367,7 +367,7 @@ async def test_who_reads_too_slowly_is_let_go_and_nobody_waits(rooms: Rooms) -> 
             ada.map["a"] = str(n)
             await settle(ada, bob)
         assert slow.member is not None
-        assert await slow.member.ended() == wire.TOO_SLOW
+        assert await slow.member.ended() == messages.TOO_SLOW
         assert bob.things == ada.things
         assert bob.member is not None
         assert not bob.member.closed
@@ -392,7 +392,7 @@ async def test_many_edits_between_two_commits_travel_as_one_message(
         gate.open.set()
         await room.quiet()
         assert bob.member is not None
-        frames = [f for f in await bob.member.take() if f[0] == wire.SYNC]
+        frames = [f for f in await bob.member.take() if f[0] == messages.SYNC]
         assert len(frames) <= 2
         for frame in frames:
             bob.take(frame)
@@ -458,15 +458,15 @@ async def test_when_the_server_ends_everyone_is_told_to_come_again(journal: Jour
         member = ada.member
         assert member is not None
         await rooms.close()
-        assert await member.ended() == wire.RESTARTING
+        assert await member.ended() == messages.RESTARTING
     assert len(await bodies(journal)) == 1
 
 
 async def test_a_silent_socket_hears_something(
     journal: Journal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("action_assistant.editor.rooms._TICK", 0.02)
-    monkeypatch.setattr("action_assistant.editor.rooms._SILENCE", 0.05)
+    monkeypatch.setattr("action_assistant.editor.rooms.open_rooms._TICK", 0.02)
+    monkeypatch.setattr("action_assistant.editor.rooms.open_rooms._SILENCE", 0.05)
     rooms = Rooms(journal)
     ada = Client("ada")
     async with rooms.enter(STREAM) as room:
@@ -474,7 +474,7 @@ async def test_a_silent_socket_hears_something(
         await settle(ada)
         assert ada.member is not None
         async with asyncio.timeout(2):
-            assert await ada.member.take() == [wire.BEAT]
+            assert await ada.member.take() == [messages.BEAT]
         ada.leave()
     await rooms.close()
 

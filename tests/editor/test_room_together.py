@@ -7,10 +7,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pycrdt import Doc, Map
 
-from action_assistant.editor.happenings import DEFERRED, UPDATED
-from action_assistant.editor.loading import load
-from action_assistant.editor.replica import Brought, Replica, clocks
-from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.crdt.loading import load
+from action_assistant.editor.crdt.replica import Replica, UpdateEffect, clocks
+from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.journal.journal import Journal
 from editor.client import Client, settle
 
@@ -128,7 +128,10 @@ async def agree_on_log(journal: Journal, rooms: Rooms, stream: str) -> None:
     plain = Replica()
     for event in await journal.read(stream):
         brought = plain.take(event.body, event.author)
-        assert (brought, event.kind) in {(Brought.NEWS, UPDATED), (Brought.WAITS, DEFERRED)}
+        assert (brought, event.kind) in {
+            (UpdateEffect.NEWS, UPDATED),
+            (UpdateEffect.WAITS, DEFERRED),
+        }
     loaded = await load(journal, stream)
     for other in (loaded.replica, replica):
         if other is not None:

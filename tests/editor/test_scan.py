@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text, get_update, merge_updates
 
-from action_assistant.editor import changes, document
-from action_assistant.editor.scan import DEEPEST, outline
-from action_assistant.editor.wire import Malformed, Reader, number
+from action_assistant.editor.crdt.messages import ByteReader, Malformed, number
+from action_assistant.editor.crdt.update_scan import DEEPEST, outline
+from action_assistant.editor.documents import document
+from action_assistant.editor.interchange import changes
 from action_assistant.umrf.model import Action, Graph
 from action_assistant.umrf.model import Parameter as UmrfParameter
 
@@ -55,7 +56,7 @@ def test_every_update_of_a_document_is_read_to_its_end(changes: list[tuple[str, 
         for client, start, end in read.brings:
             assert start == known.get(client, 0)
             known[client] = end
-    state = Reader(doc.get_state())
+    state = ByteReader(doc.get_state())
     assert {state.number(): state.number() for _ in range(state.number())} == known
     for whole in (doc.get_update(), merge_updates(*updates), get_update(updates[-1], b"\x00")):
         outline(whole)

@@ -12,9 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text, merge_updates
 
-from action_assistant.editor.scan import outline
-from action_assistant.editor.wire import Malformed, number
-from editor import forge
+from action_assistant.editor.crdt.messages import Malformed, number
+from action_assistant.editor.crdt.update_scan import outline
+from editor import forged_updates
 from editor.test_scan import made, values
 
 MUTANTS: Final = int(os.environ.get("TEST_MUTANTS", "20000"))
@@ -45,7 +45,7 @@ def base() -> tuple[bytes, list[bytes]]:
 def devoured(start: bytes, updates: list[bytes]) -> list[tuple[str, float, float]]:
     """What becomes of updates in a process of its own. Fails where the process dies."""
     run = subprocess.run(
-        [sys.executable, "-m", "editor.devour"],
+        [sys.executable, "-m", "editor.apply_updates"],
         input="\n".join(update.hex() for update in (start, *updates)),
         capture_output=True,
         text=True,
@@ -108,7 +108,7 @@ def test_nothing_that_passes_kills_or_costs_much() -> None:
 
 def test_what_kills_the_library_outright_is_never_passed() -> None:
     killers = [
-        *(forge.nested_values(depth) for depth in (100, 1000, 30_000, 300_000)),
+        *(forged_updates.nested_values(depth) for depth in (100, 1000, 30_000, 300_000)),
         bytes.fromhex("8be0cc71"),
         bytes.fromhex("0101cc86dce28bb68f0a6688cc865d7c0000"),
     ]
@@ -116,7 +116,7 @@ def test_what_kills_the_library_outright_is_never_passed() -> None:
         with pytest.raises(Malformed):
             outline(killer)
     start, _ = base()
-    chains = [forge.nested_types(depth, client=9) for depth in (33, 34, 1000, 40_000)]
+    chains = [forged_updates.nested_types(depth, client=9) for depth in (33, 34, 1000, 40_000)]
     assert [found for found, _, _ in devoured(start, chains)] == ["taken", *["refused"] * 3]
 
 

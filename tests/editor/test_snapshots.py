@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor.loading import Loaded, load
-from action_assistant.editor.rooms import Rooms
+from action_assistant.editor.crdt.loading import Loaded, load
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal

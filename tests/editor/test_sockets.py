@@ -11,7 +11,7 @@ import httpx_ws
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor import wire
+from action_assistant.editor.crdt import messages as wire
 from editor.process import BEARER, Editor
 
 
@@ -41,7 +41,7 @@ async def acks(
     while True:
         frame = await session.receive_bytes(timeout=patience)
         if frame[0] == wire.ACKS:
-            reader = wire.Reader(frame[1:])
+            reader = wire.ByteReader(frame[1:])
             durable, seq = reader.number(), reader.number()
             if durable >= messages:
                 return durable, seq
@@ -118,7 +118,7 @@ async def test_an_acknowledged_edit_is_what_other_routes_answer(
 
 async def test_the_server_stamps_who_is_there(editor: Editor, graph: str) -> None:
     async with editor.socket(graph) as one, editor.socket(graph) as two:
-        entry = wire.Entry(9, 1, json.dumps({"user": {"name": "root of all"}}).encode())
+        entry = wire.PresenceEntry(9, 1, json.dumps({"user": {"name": "root of all"}}).encode())
         await one.send_bytes(wire.presence([entry]))
         while (frame := await two.receive_bytes(timeout=5))[0] != wire.AWARENESS:
             pass
@@ -130,7 +130,7 @@ async def test_the_server_stamps_who_is_there(editor: Editor, graph: str) -> Non
         await one.close()
         while (frame := await two.receive_bytes(timeout=5))[0] != wire.AWARENESS:
             pass
-        assert wire.parse(frame) == wire.Presence((wire.Entry(9, 1, b"null"),))
+        assert wire.parse(frame) == wire.Presence((wire.PresenceEntry(9, 1, b"null"),))
 
 
 @pytest.mark.parametrize(
@@ -191,7 +191,7 @@ async def test_a_graph_that_is_deleted_sends_everyone_away(
 async def test_a_socket_that_vanishes_takes_its_entry_along(editor: Editor, graph: str) -> None:
     async with editor.socket(graph) as watcher:
         raw = upgraded(editor, graph)
-        raw.sendall(masked(wire.presence([wire.Entry(77, 1, b"{}")])))
+        raw.sendall(masked(wire.presence([wire.PresenceEntry(77, 1, b"{}")])))
         states: list[bytes] = []
         while b"null" not in states:
             message = wire.parse(await watcher.receive_bytes(timeout=5))

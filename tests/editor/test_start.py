@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from action_assistant.editor import edits
-from action_assistant.editor.app import open_house
-from action_assistant.journal import tables
+from action_assistant.editor.app import open_services
+from action_assistant.editor.catalogue import server_edits
+from action_assistant.schema import editor_tables
 from action_assistant.settings import EditorSettings
-from action_assistant.web.keys import Person
+from action_assistant.web.auth.keys import Person
 from editor.process import Editor, running
 from support.product import COMMAND, free_ports
 
@@ -77,46 +77,48 @@ def test_a_restart_changes_nothing(tmp_path: Path) -> None:
 
 
 async def test_tables_made_again_from_the_log_are_the_same(settings: EditorSettings) -> None:
-    async with open_house(settings) as house:
-        made, _ = await house.catalogue.create(b'{"name": "one"}', "ada")
-        other, _ = await house.catalogue.create(b'{"name": "two"}', "ada")
-        await house.people.seen(Person("ada", "Ada"))
-        await house.people.seen(Person("ada", "Ada L."))
-        await house.catalogue.describe(made.id, "ada", name="renamed", description=None)
-        await house.versions.publish(made.id, Person("ada", "Ada L."), label="v1")
-        await house.catalogue.delete(other.id, "ada")
-        await house.catalogue.delete(made.id, "ada")
-        await house.catalogue.recover(made.id, "ada")
+    async with open_services(settings) as services:
+        made, _ = await services.catalogue.create(b'{"name": "one"}', "ada")
+        other, _ = await services.catalogue.create(b'{"name": "two"}', "ada")
+        await services.people.seen(Person("ada", "Ada"))
+        await services.people.seen(Person("ada", "Ada L."))
+        await services.catalogue.describe(made.id, "ada", name="renamed", description=None)
+        await services.versions.publish(made.id, Person("ada", "Ada L."), label="v1")
+        await services.catalogue.delete(other.id, "ada")
+        await services.catalogue.delete(made.id, "ada")
+        await services.catalogue.recover(made.id, "ada")
         queries = [
             select(table).order_by(table.c.id)
-            for table in (tables.graph, tables.version, tables.person)
+            for table in (editor_tables.graph, editor_tables.version, editor_tables.person)
         ]
-        before = [await house.journal.query(query) for query in queries]
-        await house.journal.rebuild()
-        after = [await house.journal.query(query) for query in queries]
+        before = [await services.journal.query(query) for query in queries]
+        await services.journal.rebuild()
+        after = [await services.journal.query(query) for query in queries]
         assert before == after
         assert [row.name for row in before[0] if row.id == made.id] == ["renamed"]
         assert len(before[1]) == len(before[2]) == 1
 
 
 async def test_examples_come_once(settings: EditorSettings) -> None:
-    async with open_house(settings) as house:
-        first = [view.id for view in await house.catalogue.all()]
+    async with open_services(settings) as services:
+        first = [view.id for view in await services.catalogue.all()]
         assert len(first) >= 3
         for graph in first:
-            await house.catalogue.delete(graph, "ada")
-    async with open_house(settings) as house:
-        assert await house.catalogue.all() == []
+            await services.catalogue.delete(graph, "ada")
+    async with open_services(settings) as services:
+        assert await services.catalogue.all() == []
 
 
 async def test_a_name_that_changed_just_before_the_end_is_noticed_later(
     settings: EditorSettings,
 ) -> None:
-    async with open_house(settings) as house:
-        made, _ = await house.catalogue.create(b'{"name": "old"}', "ada")
-        async with house.rooms.enter(f"graph/{made.id}") as room:
-            await edits.rename(room, "ada", name="new", description=None)
-    async with open_house(settings) as house:
-        assert (await house.catalogue.get(made.id)).name == "new"
-        rows = await house.journal.query(select(tables.graph).where(tables.graph.c.id == made.id))
+    async with open_services(settings) as services:
+        made, _ = await services.catalogue.create(b'{"name": "old"}', "ada")
+        async with services.rooms.enter(f"graph/{made.id}") as room:
+            await server_edits.rename(room, "ada", name="new", description=None)
+    async with open_services(settings) as services:
+        assert (await services.catalogue.get(made.id)).name == "new"
+        rows = await services.journal.query(
+            select(editor_tables.graph).where(editor_tables.graph.c.id == made.id)
+        )
         assert rows[0].name == "new"

@@ -7,13 +7,13 @@ from typing import Any, TypeVar
 import pytest
 from anyio import CapacityLimiter
 
-from action_assistant.editor import trial, wire
-from action_assistant.editor.member import Member
-from action_assistant.editor.rooms import Rooms
-from action_assistant.editor.trial import tried
+from action_assistant.editor.crdt import messages, trial
+from action_assistant.editor.crdt.trial import tried
+from action_assistant.editor.rooms.member import Member
+from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import TooMany
 from action_assistant.journal.journal import Journal
-from action_assistant.web.workers import Crashed, GaveUp, Lane
+from action_assistant.web.workers.lanes import Crashed, GaveUp, Lane
 from editor.client import Client, settle
 from editor.test_nobody_waits import at_once
 
@@ -35,15 +35,17 @@ class Troubled:
 
 
 @asynccontextmanager
-async def edited(journal: Journal, aside: Troubled | Lane, update: bytes) -> AsyncIterator[Member]:
+async def edited(
+    journal: Journal, run_in_worker: Troubled | Lane, update: bytes
+) -> AsyncIterator[Member]:
     """Somebody's socket after such an update, and somebody else who goes on."""
-    rooms = Rooms(journal, linger=60, window=0, tried=aside)
+    rooms = Rooms(journal, linger=60, window=0, tried=run_in_worker)
     ada, eve = Client("ada"), Client("eve")
     async with rooms.enter("graph/g") as room:
         ada.join(room)
         eve.join(room)
         await settle(ada, eve)
-        eve.deliver(wire.change(update))
+        eve.deliver(messages.change(update))
         await room.quiet()
         assert eve.member is not None
         yield eve.member
@@ -62,33 +64,33 @@ def large() -> bytes:
 async def test_whose_edit_finds_the_machine_busy_may_send_it_again(
     journal: Journal, large: bytes, trouble: Exception
 ) -> None:
-    aside = Troubled(trouble)
-    async with edited(journal, aside, large) as member:
-        assert await member.ended() == wire.TOO_SLOW
+    run_in_worker = Troubled(trouble)
+    async with edited(journal, run_in_worker, large) as member:
+        assert await member.ended() == messages.TOO_SLOW
         assert "busy" in (member.said or "")
-    assert aside.asked == 1
+    assert run_in_worker.asked == 1
 
 
 async def test_one_process_that_dies_is_not_taken_for_the_edits_fault(
     journal: Journal, large: bytes
 ) -> None:
-    aside = Troubled(Crashed("killed"))
-    async with edited(journal, aside, large) as member:
+    run_in_worker = Troubled(Crashed("killed"))
+    async with edited(journal, run_in_worker, large) as member:
         assert not member.refused
-    assert aside.asked == 2
+    assert run_in_worker.asked == 2
 
 
 async def test_an_edit_that_ends_two_processes_is_refused(journal: Journal, large: bytes) -> None:
-    aside = Troubled(Crashed("killed"), Crashed("killed"))
-    async with edited(journal, aside, large) as member:
-        assert await member.ended() == wire.MALFORMED
-    assert aside.asked == 2
+    run_in_worker = Troubled(Crashed("killed"), Crashed("killed"))
+    async with edited(journal, run_in_worker, large) as member:
+        assert await member.ended() == messages.MALFORMED
+    assert run_in_worker.asked == 2
 
 
 async def test_an_edit_that_would_take_minutes_costs_seconds(journal: Journal) -> None:
     lane = Lane("edits", 1, 120.0, 0, CapacityLimiter(2), [trial.__name__])
     async with edited(journal, lane, at_once(120_000)) as member:
-        assert await member.ended() == wire.MALFORMED
+        assert await member.ended() == messages.MALFORMED
     lane.close()
 
 

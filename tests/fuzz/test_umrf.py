@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from action_assistant.umrf.codec import read, write
+from action_assistant.umrf.files.codec import read, write
 from action_assistant.umrf.model import Graph
 from fuzz.umrf_mutations import VALUES, WORDS, mutated
 from fuzz.umrf_target import examine

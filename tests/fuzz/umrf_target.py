@@ -4,7 +4,11 @@ import resource
 import time
 
 from action_assistant.umrf.check import blocking, check_action, check_reading, refused_by_parser
-from action_assistant.umrf.codec import (
+from action_assistant.umrf.codes import CODES
+from action_assistant.umrf.digest import digest
+from action_assistant.umrf.echo import echo
+from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import (
     Reading,
     Unreadable,
     read,
@@ -13,12 +17,8 @@ from action_assistant.umrf.codec import (
     write,
     write_action,
 )
-from action_assistant.umrf.codes import CODES
-from action_assistant.umrf.digest import digest
-from action_assistant.umrf.echo import echo
-from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.fixes import fix
-from action_assistant.umrf.jsontext import MAX_BYTES
+from action_assistant.umrf.json.text import MAX_BYTES
 from action_assistant.umrf.semantics import simulate
 from action_assistant.umrf.signatures import signature_of
 

@@ -8,9 +8,9 @@ import pytest
 from sqlalchemy import Executable, insert, select
 
 from action_assistant.errors import BadInput, CannotStart, Conflict
-from action_assistant.journal import tables
 from action_assistant.journal.events import Addition, Draft, Event
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 
 Open = Callable[..., Awaitable[Journal]]
 
@@ -22,7 +22,9 @@ def draft(text: str = "x", *, kind: str = "thing.happened.v1", author: str = "ad
 def people(event: Event) -> Sequence[Executable]:
     """A fold with one row per event; the same body twice is a clash."""
     return [
-        insert(tables.person).values(id=event.body.decode(), name=event.author, seen_at=event.seq)
+        insert(editor_tables.person).values(
+            id=event.body.decode(), name=event.author, seen_at=event.seq
+        )
     ]
 
 
@@ -111,7 +113,9 @@ async def test_a_journal_has_one_writing_process(open_journal: Open) -> None:
 async def test_the_fold_is_written_with_its_event(open_journal: Open) -> None:
     journal = await open_journal(fold=people)
     await journal.append("a", [draft("one"), draft("two")])
-    rows = await journal.query(select(tables.person.c.id).order_by(tables.person.c.seen_at))
+    rows = await journal.query(
+        select(editor_tables.person.c.id).order_by(editor_tables.person.c.seen_at)
+    )
     assert [row.id for row in rows] == ["one", "two"]
 
 
@@ -129,7 +133,7 @@ async def test_an_event_whose_fold_clashes_is_not_stored_and_harms_no_other(
     assert outcomes[0] == 1
     assert isinstance(outcomes[1], Conflict)
     assert outcomes[2] == 2
-    rows = await journal.query(select(tables.person.c.id))
+    rows = await journal.query(select(editor_tables.person.c.id))
     assert {row.id for row in rows} == {"taken", "before", "after"}
     assert [e.position for e in await journal.read_all()] == [1, 2, 3]
 
@@ -166,9 +170,9 @@ async def test_a_name_that_no_database_can_hold_is_refused_and_harms_no_other(
 async def test_tables_made_again_are_the_same(open_journal: Open) -> None:
     journal = await open_journal(fold=people)
     await journal.append("a", [draft(f"p{n}") for n in range(1200)])
-    before = await journal.query(select(tables.person).order_by(tables.person.c.id))
+    before = await journal.query(select(editor_tables.person).order_by(editor_tables.person.c.id))
     assert await journal.rebuild() == 1200
-    after = await journal.query(select(tables.person).order_by(tables.person.c.id))
+    after = await journal.query(select(editor_tables.person).order_by(editor_tables.person.c.id))
     assert before == after
     assert len(after) == 1200
 

@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from sqlalchemy import select, text
 
-from action_assistant.editor import happenings as h
+from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
-from action_assistant.journal import tables
 from action_assistant.journal.copying import copy
-from action_assistant.journal.database import database_of
+from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Event
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from journal.servers import Server
 
 
@@ -38,9 +38,9 @@ async def filled(url: str, events: int = 300) -> None:
     dice = random.Random(7)
     for number in range(events // 3):
         graph, name = f"g{number % 20}", f"Zoë {number} 🤖\x01'\""
-        made = h.draft(h.CREATED, "ann", h.Created(name, "what it does"))
+        made = h.draft(h.CREATED, "ann", h.GraphCreated(name, "what it does"))
         additions = [
-            Addition(h.PEOPLE, (h.draft(h.NAMED, f"p{number % 7}", h.Named(name)),)),
+            Addition(h.PEOPLE, (h.draft(h.NAMED, f"p{number % 7}", h.PersonNamed(name)),)),
             Addition(
                 h.graph_stream(graph), (h.Draft(h.UPDATED, "ben", dice.randbytes(number * 20)),)
             ),
@@ -62,7 +62,7 @@ async def everything(url: str) -> tuple[list[Event], dict[str, list[Any]]]:
             events += more
         rows = {
             name: sorted(map(tuple, await journal.query(select(table))), key=repr)
-            for name, table in tables.EDITOR.tables.items()
+            for name, table in editor_tables.EDITOR.tables.items()
         }
         return events, rows
     finally:
@@ -95,7 +95,7 @@ async def test_what_is_written_meanwhile_is_in_the_copy_wholly_or_not_at_all(
 
     async def write() -> None:
         for number in range(10_000):
-            names = [h.draft(h.NAMED, f"w{number}", h.Named(str(number)))] * 3
+            names = [h.draft(h.NAMED, f"w{number}", h.PersonNamed(str(number)))] * 3
             await journal.append(h.PEOPLE, names)
 
     writing = asyncio.create_task(write())
@@ -139,7 +139,7 @@ async def test_a_damaged_journal_is_not_copied(ways: tuple[str, str], harm: str)
 
 
 async def test_an_older_journal_is_copied_without_being_changed(ways: tuple[str, str]) -> None:
-    from action_assistant.journal.migrate import migrate
+    from action_assistant.journal.databases import migrate
 
     source, target = ways
     await asyncio.to_thread(migrate, source, "editor", "editor_0001")

@@ -10,10 +10,9 @@ import pytest
 from sqlalchemy import Connection, text
 
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import database_of
+from action_assistant.journal.databases import database_of, migrate
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
-from action_assistant.journal.migrate import migrate
 from journal.servers import Server
 
 

@@ -11,9 +11,9 @@ from sqlalchemy import insert
 
 from action_assistant.errors import BadInput, CannotStart, Unavailable
 from action_assistant.journal import postgres as module
-from action_assistant.journal import tables
 from action_assistant.journal.events import Draft, Event, nothing
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from journal.proxy import Verdict, proxy
 from journal.servers import Server, binaries, server
 
@@ -150,7 +150,7 @@ async def test_a_connection_that_dies_in_a_commit_stores_exactly_once(
 
     def fold(event: Event) -> list[object]:
         row = {"id": str(event.position), "name": "x", "seen_at": event.at}
-        return [insert(tables.person).values(row)] if folded else []
+        return [insert(editor_tables.person).values(row)] if folded else []
 
     async with proxy(postgres.port, judge) as way:
         through = url.replace(f":{postgres.port}/", f":{way.port}/")
@@ -230,7 +230,7 @@ async def test_text_that_postgres_cannot_hold_is_the_callers_error_and_harms_no_
 ) -> None:
     def fold(event: Event) -> list[object]:
         row = {"id": event.body.decode(), "name": "", "seen_at": event.at}
-        return [insert(tables.person).values(row)]
+        return [insert(editor_tables.person).values(row)]
 
     journal = await Journal.open(postgres.new_database(), branch="editor", fold=fold)  # type: ignore[arg-type]
     outcomes = await asyncio.gather(

@@ -10,7 +10,7 @@ import pytest
 from action_assistant.errors import Conflict
 from action_assistant.journal.events import Addition, Draft, nothing
 from action_assistant.journal.journal import Journal
-from action_assistant.journal.removal import Removed
+from action_assistant.journal.removal import StreamRemoved
 
 Open = Callable[..., Awaitable[Journal]]
 
@@ -22,9 +22,9 @@ async def filled(journal: Journal) -> None:
             await journal.append(name, [Draft("it.was.v1", "ada", b"%d" % n)] * 100)
 
 
-async def removed(journal: Journal, stream: str) -> Removed:
+async def removed(journal: Journal, stream: str) -> StreamRemoved:
     end = await journal.end(stream)
-    return Removed(stream, end.seq, end.chain.hex(), "elsewhere", "00")
+    return StreamRemoved(stream, end.seq, end.chain.hex(), "elsewhere", "00")
 
 
 def note(by: int) -> Addition:

@@ -23,7 +23,7 @@ os.environ.pop("ROS_DOMAIN_ID", None)
 def soon_settled(monkeypatch: pytest.MonkeyPatch) -> None:
     """On loopback a second is enough to see who was there before, and a test knows who will come."""
     if importlib.util.find_spec("rclpy"):
-        from action_assistant.runner.links import ros2_domain
+        from action_assistant.runner.links.ros2 import domain as ros2_domain
 
         monkeypatch.setattr(ros2_domain, "DISCOVERY_S", 0.5)
 

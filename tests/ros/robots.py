@@ -12,9 +12,9 @@ from typing import Any
 
 import msgspec
 
-from action_assistant.runner.standin import StandInNode
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Quirks, Said
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, Said
+from action_assistant.runner.emulator.node import EmulatorNode
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.semantics import script_from
 
@@ -26,13 +26,13 @@ def robot(
     *,
     name: str = "David",
     namespace: str = "",
-    quirks: Quirks = Quirks(),  # noqa: B008 - frozen
+    quirks: EngineTraits = EngineTraits(),  # noqa: B008 - frozen
     seed: int = 0,
     told: Callable[[Said], None] = lambda _: None,
-) -> Iterator[StandInNode]:
+) -> Iterator[EmulatorNode]:
     """A robot on a thread."""
-    node = StandInNode(
-        lambda epoch_ms: StandIn(
+    node = EmulatorNode(
+        lambda epoch_ms: EmulatedEngine(
             name,
             script=script_from({"behaviours": script or {}}),
             quirks=quirks,

@@ -23,13 +23,13 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from action_assistant.runner.links import ros2_reach
 from action_assistant.runner.links.port import Link, Registration
+from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.model import Action, Graph, Parameter
 from ros.robots import robot
+from runner.harness import sequence
 from runner.links.contract import PROMISES, Bench, answer, keep
-from runner.world import sequence
 
 SCRIPT = {
     **{f"endless/Work_{i}": [{"never": True}] for i in range(3)},

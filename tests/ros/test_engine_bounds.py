@@ -25,16 +25,16 @@ pytest.importorskip(
 )
 
 from action_assistant.errors import Refused
-from action_assistant.runner.control import Control
-from action_assistant.runner.links import ros2_reach
+from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
-from action_assistant.runner.robots import Robots
-from action_assistant.runner.runs import Run
-from action_assistant.runner.steering import RestRequest
-from action_assistant.runner.visits import Visit
+from action_assistant.runner.links.ros2.availability import ros2_reach
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.model import Action, Graph, Parameter
 from runner.bounds import GRAPHS, Real, fits
-from runner.world import ANN, BEN, MemoryLedger, at_once, order
+from runner.harness import ANN, BEN, MemoryLedger, at_once, order
 
 RUNS = int(os.environ.get("TEST_BOUNDS_RUNS", "6"))
 DOMAIN = int(os.environ.get("TEST_BOUNDS_DOMAIN", "150"))
@@ -52,7 +52,7 @@ pytestmark = [
 ]
 
 
-def wall() -> int:
+def clock_us() -> int:
     """Microseconds UTC."""
     return time.time_ns() // 1000
 
@@ -112,11 +112,13 @@ class Driven:
             self.log.close()
 
     async def _drive(self, runs: int) -> None:
-        reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(self.domain)})
+        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(self.domain)})
         assert not isinstance(reach, str), reach
         robots = Robots(reach=reach)
         try:
-            async with Control.opened(self.ledger, robots, wall=wall, aside=at_once) as control:
+            async with ExecutionService.opened(
+                self.ledger, robots, clock_us=clock_us, run_in_worker=at_once
+            ) as control:
                 await robots.register(Registration(name="David", domain=self.domain), ANN)
                 for n in range(runs):
                     with anyio.fail_after(60):
@@ -127,7 +129,7 @@ class Driven:
             with anyio.CancelScope(shield=True):
                 await reach.aclose()
 
-    async def _run(self, control: Control, n: int) -> None:
+    async def _run(self, control: ExecutionService, n: int) -> None:
         graph, stop = plan(self.chance, n)
         try:
             started = await control.start(order(graph, engine="David", graph=None), ANN)

@@ -11,14 +11,14 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from action_assistant.runner.control import Control
-from action_assistant.runner.events import Ended
-from action_assistant.runner.links import ros2_reach
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.links.ros2.availability import ros2_reach
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import Ended
 from ros.robots import RobotProcess, robot
-from ros.test_false_confirmations import wall
-from runner.world import ANN, BEN, MemoryLedger, at_once, order, sequence
+from ros.test_false_confirmations import clock_us
+from runner.harness import ANN, BEN, MemoryLedger, at_once, order, sequence
 
 STUBBORN: dict[str, Any] = {"*": [{"never": True, "ignores_stop": True}]}
 
@@ -37,10 +37,12 @@ def test_a_run_that_did_not_obey_ends_with_the_process_of_its_engine(
     ledger = MemoryLedger()
 
     async def live() -> None:
-        reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(domain)})
+        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(domain)})
         assert not isinstance(reach, str), reach
         robots = Robots(reach=reach)
-        async with Control.opened(ledger, robots, wall=wall, aside=at_once) as control:
+        async with ExecutionService.opened(
+            ledger, robots, clock_us=clock_us, run_in_worker=at_once
+        ) as control:
             await _answering(robots, domain)
             run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
             await control.stop(run, BEN)
@@ -68,10 +70,12 @@ def test_an_engine_that_was_not_started_by_its_name_is_of_no_known_process(domai
     """One on a thread of this test: the process is right, and nothing says that it is David's."""
 
     async def live() -> None:
-        reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(domain)})
+        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(domain)})
         assert not isinstance(reach, str), reach
         robots = Robots(reach=reach)
-        async with Control.opened(MemoryLedger(), robots, wall=wall, aside=at_once):
+        async with ExecutionService.opened(
+            MemoryLedger(), robots, clock_us=clock_us, run_in_worker=at_once
+        ):
             await _answering(robots, domain)
             engine = robots.link("David")
             assert engine is not None

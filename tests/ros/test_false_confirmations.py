@@ -28,21 +28,21 @@ from rclpy.context import Context
 from temoto_msgs.msg import UmrfGraphFeedback, UmrfGraphStart, UmrfGraphStop
 
 from action_assistant.errors import Refused
-from action_assistant.runner.control import Control
-from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.events import Override
-from action_assistant.runner.links import ros2_reach
+from action_assistant.runner.emulator.messages import EngineTraits
+from action_assistant.runner.emulator.node import EmulatorNode
+from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
-from action_assistant.runner.robots import Robots
-from action_assistant.runner.runs import ENDED
-from action_assistant.runner.standin import StandInNode
-from action_assistant.runner.standin_wire import Quirks
-from action_assistant.runner.steering import RestRequest, confirm_rest
-from action_assistant.umrf import codec
+from action_assistant.runner.links.ros2.availability import ros2_reach
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.run import ENDED
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import Execution
 from ros.robots import robot
-from runner.air import run_of
-from runner.world import ANN, BEN, MemoryLedger, at_once, order, sequence, two_ends
+from runner.fake_network import run_of
+from runner.harness import ANN, BEN, MemoryLedger, at_once, order, sequence, two_ends
 
 HISTORIES = int(os.environ.get("TEST_ROS_HISTORIES", "2"))
 FIRST = int(os.environ.get("TEST_ROS_HISTORIES_FROM", "0"))
@@ -61,7 +61,7 @@ STILL = ENDED - {"lost", "refused"}
 KNOWINGLY = Override(codes=("proof", "quiet", "others"), reason="it is a test")
 
 
-def wall() -> int:
+def clock_us() -> int:
     """Microseconds UTC."""
     return time.time_ns() // 1000
 
@@ -106,8 +106,8 @@ class Story:
         self.chance = random.Random(seed)
         self.domain = domain
         self.script = self.chance.choice(SCRIPTS)
-        self.quirks = Quirks(loading_ms=self.chance.choice([1.0, 60.0, 400.0]))
-        self.robots: list[tuple[StandInNode, ExitStack]] = []
+        self.quirks = EngineTraits(loading_ms=self.chance.choice([1.0, 60.0, 400.0]))
+        self.robots: list[tuple[EmulatorNode, ExitStack]] = []
         self.false: list[str] = []
         self.judged: set[str] = set()
         self.still: set[str] = set()
@@ -125,12 +125,14 @@ class Story:
     async def live(self) -> None:
         """All steps; then somebody stops everything."""
         await anyio.to_thread.run_sync(self.robot)
-        reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(self.domain)})
+        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(self.domain)})
         assert not isinstance(reach, str), reach
         stranger = await anyio.to_thread.run_sync(Stranger, self.domain)
         try:
             robots = Robots(reach=reach)
-            async with Control.opened(self.ledger, robots, wall=wall, aside=at_once) as control:
+            async with ExecutionService.opened(
+                self.ledger, robots, clock_us=clock_us, run_in_worker=at_once
+            ) as control:
                 control.watch(self.judge)
                 await robots.register(Registration(name="David", domain=self.domain), ANN)
                 with anyio.fail_after(20):
@@ -150,7 +152,7 @@ class Story:
                     await anyio.to_thread.run_sync(stack.close)
                 await anyio.to_thread.run_sync(stranger.leave)
 
-    async def step(self, control: Control, stranger: Stranger) -> None:
+    async def step(self, control: ExecutionService, stranger: Stranger) -> None:
         """Something happens."""
         name = self.chance.choice(list(GRAPHS))
         what = self.chance.choices(

@@ -97,7 +97,9 @@ async def test_an_engine_of_the_older_generation_gets_no_start_and_the_reason_is
 def test_a_workspace_of_the_older_generation_is_refused_with_a_sentence(
     with_older: dict[str, str],
 ) -> None:
-    question = "from action_assistant.runner.links import why_not; print(why_not())"
+    question = (
+        "from action_assistant.runner.links.ros2.availability import why_not; print(why_not())"
+    )
     answer = subprocess.run(
         [sys.executable, "-c", question], env=with_older, capture_output=True, text=True, check=True
     )

@@ -16,7 +16,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from temoto_msgs.msg import UmrfGraphStop
 
-from action_assistant.runner.links.ros2_outlets import Outlets, Topics
+from action_assistant.runner.links.ros2.outlets import Outlets, Topics
 
 
 @pytest.fixture

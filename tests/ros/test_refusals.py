@@ -10,21 +10,21 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from action_assistant.runner.control import Control
-from action_assistant.runner.events import Override
-from action_assistant.runner.links import ros2_reach
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
-from action_assistant.runner.robots import Robots
+from action_assistant.runner.links.ros2.availability import ros2_reach
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import Override
 from ros.robots import robot
-from runner.world import ANN, MemoryLedger, at_once, order, sequence
+from runner.harness import ANN, MemoryLedger, at_once, order, sequence
 
 
-def wall() -> int:
+def clock_us() -> int:
     return time.time_ns() // 1000
 
 
 async def refused(domain: int) -> MemoryLedger:
-    reach = ros2_reach(wall, {"ROS_DOMAIN_ID": str(domain)})
+    reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(domain)})
     assert not isinstance(reach, str), reach
     ledger, robots = MemoryLedger(), Robots(reach=reach)
     graph = sequence()
@@ -32,7 +32,9 @@ async def refused(domain: int) -> MemoryLedger:
     graph = msgspec.structs.replace(graph, actions=(carols, *graph.actions[1:]))
     override = Override(codes=("actors", "others", "actions"), reason="it is a test")
     try:
-        async with Control.opened(ledger, robots, wall=wall, aside=at_once) as control:
+        async with ExecutionService.opened(
+            ledger, robots, clock_us=clock_us, run_in_worker=at_once
+        ) as control:
             await robots.register(Registration(name="David", domain=domain), ANN)
             with anyio.fail_after(30):
                 while robots.robot("David").state != "answering":  # noqa: ASYNC110

@@ -16,8 +16,6 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from action_assistant.runner.links import ros2_reach
-from action_assistant.runner.links.absent import AbsentLink
 from action_assistant.runner.links.port import (
     EngineChanged,
     EngineLog,
@@ -30,14 +28,16 @@ from action_assistant.runner.links.port import (
     Registration,
     Report,
 )
-from action_assistant.runner.links.ros2 import Ros2
-from action_assistant.umrf import codec
+from action_assistant.runner.links.ros2.availability import ros2_reach
+from action_assistant.runner.links.ros2.reach import Ros2
+from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files import codec
 from ros.echo_engine import EchoEngine, graph_text
-from runner.world import sequence
+from runner.harness import sequence
 
 
-def wall() -> int:
+def clock_us() -> int:
     return time.time_ns() // 1000
 
 
@@ -52,7 +52,7 @@ def engine(domain: int, **options: Any) -> Iterator[EchoEngine]:
 
 @asynccontextmanager
 async def reach() -> AsyncIterator[Ros2]:
-    found = ros2_reach(wall)
+    found = ros2_reach(clock_us)
     assert isinstance(found, Ros2), found
     try:
         yield found
@@ -118,9 +118,9 @@ async def test_an_answer_holds_what_the_engine_holds_under_our_identity(domain: 
         node.running = [graph_text(), graph_text("other", "FINISHED", None, Work="FINISHED")]
         async with robot(domain) as link:
             await answering(link)
-            before = wall()
+            before = clock_us()
             answer = await link.get()
-            assert before <= answer.asked_at <= answer.at <= wall()
+            assert before <= answer.asked_at <= answer.at <= clock_us()
             ours, other = answer.graphs
             assert (ours.graph, ours.run, ours.source, ours.active) == ("patrol", "r1", "get", True)
             assert ours.nodes == {"Work_0": "RUNNING"}
@@ -330,7 +330,7 @@ async def test_another_middleware_is_refused_with_what_to_do(domain: int) -> Non
         link = ros2.link(
             Registration(name="robot", domain=domain, rmw="rmw_cyclonedds_cpp"), PINNED
         )
-        assert isinstance(link, AbsentLink)
+        assert isinstance(link, UnreachableLink)
         with pytest.raises(NotSent, match="RMW_IMPLEMENTATION"):
             await link.start(placed())
 

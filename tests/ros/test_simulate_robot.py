@@ -13,8 +13,8 @@ pytest.importorskip(
 from action_assistant.runner.links.port import NoAnswer
 from ros.robots import RobotProcess
 from ros.test_contract import SCRIPT, reached
+from runner.harness import sequence
 from runner.links.contract import Bench, answer, moves, placed, shown
-from runner.world import sequence
 
 
 async def test_it_answers_falls_silent_when_frozen_and_tells_afterwards_what_it_did(

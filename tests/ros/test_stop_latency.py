@@ -24,10 +24,10 @@ pytest.importorskip(
 
 from websockets.sync.client import connect
 
-from action_assistant.runner.standin_wire import Line, Said
+from action_assistant.runner.emulator.messages import LogMessage, Said
 from ros.robots import robot
+from runner.harness import order, sequence
 from runner.process import body
-from runner.world import order, sequence
 from support.product import TOKEN, Product, running
 from test_stop_latency import a_frozen_editor, a_large_update, both_cores_busy, quiet
 
@@ -44,7 +44,7 @@ class Robot:
 
     def told(self, said: Said) -> None:
         """Something that he says."""
-        if isinstance(said, Line) and said.text.startswith("Received request to stop"):
+        if isinstance(said, LogMessage) and said.text.startswith("Received request to stop"):
             self.heard.append(time.time_ns())
 
 

@@ -5,22 +5,22 @@ from typing import Any
 import anyio
 import msgspec
 
-from action_assistant.runner.runs import Run
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Quirks, index_of
-from action_assistant.runner.visits import Visit
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, index_of
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, EXIT, Conditions, Graph, Relation
-from action_assistant.umrf.semantics import NodeState, script_from
-from runner import world
-from runner.air import now_ms
+from action_assistant.umrf.semantics import NodeStateEvent, script_from
+from runner import harness
+from runner.fake_network import now_ms
+from runner.harness import BEN, GO_ON, carousel, run_in_virtual_time, sequence, two_ends
 from runner.record_streams import Place
-from runner.world import BEN, GO_ON, carousel, live_through, sequence, two_ends
 
 #: One execution of an action's code: microseconds of its begin and its end; None: it went on.
 Real = tuple[int, int | None]
 
 
-class Air(msgspec.Struct, frozen=True, kw_only=True):
+class NetworkFaults(msgspec.Struct, frozen=True, kw_only=True):
     """What gets lost, and how late things are."""
 
     loss: float = 0.0
@@ -62,39 +62,41 @@ def join(name: str = "join") -> Graph:
 GRAPHS = {"line": lambda: sequence("line", 4), "join": join, "loop": carousel, "ends": two_ends}
 
 
-def lived(graph: str, script: dict[str, Any], air: Air, stop: float | None) -> Lived:
+def lived(graph: str, script: dict[str, Any], network: NetworkFaults, stop: float | None) -> Lived:
     """A run of that graph, stopped after so many seconds, up to its end or for some time."""
-    found: Lived = live_through(lambda: _lived(GRAPHS[graph](), script, air, stop))
+    found: Lived = run_in_virtual_time(lambda: _lived(GRAPHS[graph](), script, network, stop))
     return found
 
 
-async def _lived(graph: Graph, script: dict[str, Any], air: Air, stop: float | None) -> Lived:
+async def _lived(
+    graph: Graph, script: dict[str, Any], network: NetworkFaults, stop: float | None
+) -> Lived:
     place = Place(script)
-    place.air.chance.seed(air.seed)
-    place.air.loss["get"] = air.get_loss
-    place.air.old_s, place.air.feedback_s = air.old_s, air.feedback_s
-    robot = StandIn(
+    place.network.chance.seed(network.seed)
+    place.network.loss["get"] = network.get_loss
+    place.network.old_s, place.network.feedback_s = network.old_s, network.feedback_s
+    robot = EmulatedEngine(
         "Robin",
         script=script_from({"behaviours": script}),
         index=index_of([], []),
-        quirks=Quirks(loss=air.loss),
-        seed=air.seed,
+        quirks=EngineTraits(loss=network.loss),
+        seed=network.seed,
         born_ms=now_ms(),
-        epoch_ms=world.EPOCH // 1000,
+        epoch_ms=harness.EPOCH // 1000,
     )
-    traces: list[NodeState] = []
+    traces: list[NodeStateEvent] = []
     take = robot._take
 
     def overheard(told: Any) -> None:
-        traces.extend(each for each in told if isinstance(each, NodeState))
+        traces.extend(each for each in told if isinstance(each, NodeStateEvent))
         take(told)
 
     robot._take = overheard  # type: ignore[method-assign]
     async with anyio.create_task_group() as tasks:
-        tasks.start_soon(place.air.blow)
-        place.air.join(robot, "/Robin")
+        tasks.start_soon(place.network.blow)
+        place.network.join(robot, "/Robin")
         await anyio.sleep(0.5)
-        async with place.world.runner() as place.control:
+        async with place.harness.runner() as place.control:
             await anyio.sleep(1.5)
             run = await _started(place, graph)
             with anyio.move_on_after(40):
@@ -102,7 +104,7 @@ async def _lived(graph: Graph, script: dict[str, Any], air: Air, stop: float | N
                     await anyio.sleep(stop)
                     await place.control.stop(run, BEN)
                 await place.over()
-            history = place.world.ledger.history(run)
+            history = place.harness.ledger.history(run)
         tasks.cancel_scope.cancel()
     return Lived(history, place, {name: _real(name, traces, script) for name in history.actions})
 
@@ -119,12 +121,12 @@ async def _started(place: Place, graph: Graph) -> str:
     raise AssertionError("it could not be started")
 
 
-def _real(name: str, traces: list[NodeState], script: dict[str, Any]) -> list[Real]:
+def _real(name: str, traces: list[NodeStateEvent], script: dict[str, Any]) -> list[Real]:
     """When the code of an action ran. One that ignores stop goes on after the engine has given up."""
     found: list[Real] = []
     state = ""
     for trace in (each for each in traces if each.node == name):
-        at = world.EPOCH + round(trace.t_ms * 1000)
+        at = harness.EPOCH + round(trace.t_ms * 1000)
         if trace.state == "RUNNING":
             found.append((at, None))
         elif trace.state in {"FINISHED", "ERROR"} and found and found[-1][1] is None:

@@ -13,7 +13,7 @@ import httpx
 import msgspec
 from websockets.sync.client import ClientConnection, connect
 
-from action_assistant.runner.admission import StartRequest
+from action_assistant.runner.start.admission import StartRequest
 
 TOKEN = "test-token-" + "0123456789abcdef" * 2
 BEARER = {"authorization": f"Bearer {TOKEN}"}

@@ -15,15 +15,15 @@ from typing import Any
 import anyio
 import msgspec
 
-from action_assistant.places import examples
-from action_assistant.runner import recorded_runs
-from action_assistant.runner.control import Control
-from action_assistant.runner.events import Author, Override
-from action_assistant.runner.recorder import stream_of
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Quirks, Start, index_of
-from action_assistant.runner.steering import RestRequest
-from action_assistant.umrf import codec
+from action_assistant.paths import examples
+from action_assistant.runner.archives import examples as recorded_runs
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, Start, index_of
+from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.runs.events import Author, Override
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
@@ -35,10 +35,10 @@ from action_assistant.umrf.model import (
     Relation,
 )
 from action_assistant.umrf.semantics import script_from
-from runner import world
-from runner.air import Air, Node, now_ms
-from runner.air_link import AirLink
-from runner.world import World, live_through, order
+from runner import harness
+from runner.fake_link import FakeLink
+from runner.fake_network import FakeNetwork, Node, now_ms
+from runner.harness import Harness, order, run_in_virtual_time
 
 ROBOT = "Robin"
 ADA, BEN = Author("example-ada", "Ada"), Author("example-ben", "Ben")
@@ -91,23 +91,23 @@ class Stage:
     """One robot with its runner, and the time."""
 
     def __init__(self, script: dict[str, Any], *known: Action) -> None:
-        self.air = Air()
-        self.world = World({ROBOT: AirLink(self.air, ROBOT)})
+        self.network = FakeNetwork()
+        self.harness = Harness({ROBOT: FakeLink(self.network, ROBOT)})
         self.script = script_from({"behaviours": script})
         self.index = index_of([codec.write_action(each) for each in known], [])
-        self.control: Control
+        self.control: ExecutionService
 
     def robot(self) -> Node:
         """The engine comes up."""
-        robot = StandIn(
+        robot = EmulatedEngine(
             ROBOT,
             script=self.script,
             index=self.index,
-            quirks=Quirks(loss=0.0),
+            quirks=EngineTraits(loss=0.0),
             born_ms=now_ms(),
-            epoch_ms=world.EPOCH // 1000,
+            epoch_ms=harness.EPOCH // 1000,
         )
-        return self.air.join(robot)
+        return self.network.join(robot)
 
     async def start(self, task: Graph, *codes: str, reason: str = "") -> str:
         """Ada starts it."""
@@ -165,7 +165,7 @@ async def engine_restart(stage: Stage) -> None:
     task = graph("night_watch", *line("Undock", "Patrol", "Dock"))
     await stage.start(task)
     await anyio.sleep(14)
-    stage.air.kill(stage.air.nodes[0])
+    stage.network.kill(stage.network.nodes[0])
     await anyio.sleep(16)  # discovery has to forget the dead one first
     stage.robot()
     await stage.at_rest()
@@ -178,8 +178,8 @@ async def foreign_start(stage: Stage) -> None:
     await stage.start(task)
     await anyio.sleep(9)
     text = codec.write(task)
-    stage.air.strangers = 1
-    stage.air.carry(Start(graph_name="inspect", targets=(ROBOT,), graph_json=text), "terminal")
+    stage.network.strangers = 1
+    stage.network.carry(Start(graph_name="inspect", targets=(ROBOT,), graph_json=text), "terminal")
     await stage.over()
 
 
@@ -209,18 +209,18 @@ STORIES: dict[Story, tuple[dict[str, Any], tuple[Action, ...]]] = {
 async def played(story: Story, begins: int) -> bytes:
     """A story as the file that is shipped."""
     script, known = STORIES[story]
-    world.EPOCH = begins
+    harness.EPOCH = begins
     stage = Stage(script, *known)
     async with anyio.create_task_group() as wind:
-        wind.start_soon(stage.air.blow)
+        wind.start_soon(stage.network.blow)
         stage.robot()
         await anyio.sleep(0.5)
-        async with stage.world.runner() as stage.control:
+        async with stage.harness.runner() as stage.control:
             await anyio.sleep(1.5)
             await story(stage)
         wind.cancel_scope.cancel()
-    (run,) = [each for each in stage.world.ledger.streams if each.startswith("run/")]
-    events = stage.world.ledger.streams[run]
+    (run,) = [each for each in stage.harness.ledger.streams if each.startswith("run/")]
+    events = stage.harness.ledger.streams[run]
     assert run == stream_of(run.removeprefix("run/"))
     return recorded_runs.written(events)
 
@@ -243,8 +243,8 @@ def recorded() -> dict[str, bytes]:
         files[f"{name}.run.jsonl"] = b""
         begins = MORNING + place * 1_380_000_000
         with _named(name.replace("_", "-")):
-            files[f"{name}.run.jsonl"] = live_through(lambda s=story, b=begins: played(s, b))
-    world.EPOCH = 1_800_000_000_000_000
+            files[f"{name}.run.jsonl"] = run_in_virtual_time(lambda s=story, b=begins: played(s, b))
+    harness.EPOCH = 1_800_000_000_000_000
     return files
 
 

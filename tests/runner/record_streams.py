@@ -19,21 +19,22 @@ import anyio
 import msgspec
 
 from action_assistant.journal.events import Event
-from action_assistant.runner import shapes
-from action_assistant.runner.control import Control
-from action_assistant.runner.events import decode
-from action_assistant.runner.runs import Run, replay
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Quirks, Start, index_of
-from action_assistant.runner.starting import GroupRequest
-from action_assistant.runner.steering import RestRequest
-from action_assistant.umrf import codec
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, Start, index_of
+from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import decode
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.start.start_checks import GroupRequest
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
 from action_assistant.umrf.semantics import script_from
-from runner import world
-from runner.air import Air, now_ms
-from runner.air_link import AirLink
-from runner.world import ANN, BEN, World, carousel, live_through, order, sequence
+from runner import harness
+from runner.fake_link import FakeLink
+from runner.fake_network import FakeNetwork, now_ms
+from runner.harness import ANN, BEN, Harness, carousel, order, run_in_virtual_time, sequence
 
 
 class Line(msgspec.Struct, frozen=True):
@@ -49,23 +50,23 @@ class Place:
     """Two robots with their runner."""
 
     def __init__(self, script: dict[str, Any]) -> None:
-        self.air = Air()
-        links = {name: AirLink(self.air, name, f"/{name}") for name in ("Robin", "Marian")}
-        self.world = World(dict(links))
+        self.network = FakeNetwork()
+        links = {name: FakeLink(self.network, name, f"/{name}") for name in ("Robin", "Marian")}
+        self.harness = Harness(dict(links))
         self.script = script_from({"behaviours": script})
-        self.control: Control
+        self.control: ExecutionService
 
     def robot(self, name: str) -> None:
         """An engine comes up."""
-        engine = StandIn(
+        engine = EmulatedEngine(
             name,
             script=self.script,
             index=index_of([], []),
-            quirks=Quirks(loss=0.2),
+            quirks=EngineTraits(loss=0.2),
             born_ms=now_ms(),
-            epoch_ms=world.EPOCH // 1000,
+            epoch_ms=harness.EPOCH // 1000,
         )
-        self.air.join(engine, f"/{name}")
+        self.network.join(engine, f"/{name}")
 
     async def start(self, graph: Graph, engine: str = "Robin", **more: Any) -> str:
         """Ann starts it."""
@@ -126,7 +127,7 @@ async def engine_lost(place: Place) -> None:
     """The engine dies, and another one comes up."""
     await place.start(sequence("engine_lost", 2))
     await anyio.sleep(4)
-    place.air.kill(place.air.nodes[0])
+    place.network.kill(place.network.nodes[0])
     await anyio.sleep(16)
     place.robot("Robin")
     await place.at_rest()
@@ -138,9 +139,11 @@ async def foreign(place: Place) -> None:
     plan = sequence("foreign", 2)
     await place.start(plan)
     await anyio.sleep(4)
-    place.air.strangers = 1
+    place.network.strangers = 1
     text = codec.write(plan)
-    place.air.carry(Start(graph_name="foreign", targets=("Robin",), graph_json=text), "terminal")
+    place.network.carry(
+        Start(graph_name="foreign", targets=("Robin",), graph_json=text), "terminal"
+    )
     await place.over()
 
 
@@ -197,19 +200,19 @@ async def told(story: Story) -> list[list[Event]]:
     """The streams of a story."""
     place = Place(STORIES[story])
     async with anyio.create_task_group() as wind:
-        wind.start_soon(place.air.blow)
+        wind.start_soon(place.network.blow)
         place.robot("Robin")
         place.robot("Marian")
         await anyio.sleep(0.5)
-        async with place.world.runner() as place.control:
+        async with place.harness.runner() as place.control:
             await anyio.sleep(1.5)
             await story(place)
         if story is runner_restarted:
             await anyio.sleep(3)
-            async with place.world.runner() as place.control:
+            async with place.harness.runner() as place.control:
                 await place.over()
         wind.cancel_scope.cancel()
-    streams = place.world.ledger.streams
+    streams = place.harness.ledger.streams
     return [streams[name] for name in sorted(streams) if name.startswith("run/")]
 
 
@@ -222,14 +225,14 @@ def expected(events: list[Event]) -> Any:
 
 def as_told(run: Run) -> Any:
     """A run as people and programs see it, and the lines of its engine."""
-    return msgspec.to_builtins(shapes.shown(run))
+    return msgspec.to_builtins(views.shown(run))
 
 
 def recorded() -> Iterator[tuple[str, list[Event]]]:
     """All streams by name."""
     for story in STORIES:
         with _same_every_time(story.__name__):
-            streams = live_through(lambda s=story: told(s))
+            streams = run_in_virtual_time(lambda s=story: told(s))
         for number, events in enumerate(streams, 1):
             yield f"{story.__name__}{number if len(streams) > 1 else ''}", events
 

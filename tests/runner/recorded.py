@@ -14,10 +14,10 @@ from typing import Any, Literal, NamedTuple
 
 import anyio
 
-from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.events import Requested
-from action_assistant.runner.links.ears import Ears
+from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.engine_text import snapshot
+from action_assistant.runner.links.listeners import Listeners
+from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
     EngineLog,
@@ -27,10 +27,11 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
-from action_assistant.runner.runs import Run, begin
-from action_assistant.runner.seen import Snapshot
-from action_assistant.umrf import codec
-from runner.world import ANN, BEN, EPOCH, MemoryLedger, at_once, live_through, wall
+from action_assistant.runner.runs.events import Requested
+from action_assistant.runner.runs.fold import begin
+from action_assistant.runner.runs.run import Run
+from action_assistant.umrf.files import codec
+from runner.harness import ANN, BEN, EPOCH, MemoryLedger, at_once, clock_us, run_in_virtual_time
 
 LETTERS = {
     "U": "UNINITIALIZED", "I": "INITIALIZED", "R": "RUNNING", "Q": "PAUSE_REQUESTED", "P": "PAUSED",
@@ -100,7 +101,7 @@ class Recording:
             each["t_ms"] for each in self.sent if each["op"] == "start" and each is not start
         ]
         self._gets = list(self._answers())
-        self._ears = Ears[Report]()
+        self._subscribers = Listeners[Report]()
 
     def _answers(self) -> Iterator[tuple[float, float, list[Any] | None]]:
         """Asked and answered at (ms), and the graphs; None for no answer."""
@@ -123,7 +124,7 @@ class Recording:
         actions = [each | {"gui_attributes": mark} for each in full]
         told = {"graph_name": graph["graph_name"], "graph_state": graph["graph_state"]}
         text = json.dumps(told | {"actions": actions})
-        return snapshot(text, at=wall(), source=source, asked_at=wall())
+        return snapshot(text, at=clock_us(), source=source, asked_at=clock_us())
 
     def _ours(self) -> bool:
         """Whether what is shown now was started by us: somebody may have started it again."""
@@ -131,7 +132,7 @@ class Recording:
 
     def now_ms(self) -> float:
         """In the recording's own time."""
-        return (wall() - EPOCH) / 1_000
+        return (clock_us() - EPOCH) / 1_000
 
     @property
     def _incarnation(self) -> str:
@@ -155,7 +156,7 @@ class Recording:
                 await anyio.sleep(max(0.0, answered - self.now_ms()) / 1_000)
                 if running is None:
                     break
-                at = wall()
+                at = clock_us()
                 graphs = tuple(self._snapshot(each, "get") for each in running)
                 return Answer(
                     asked_at=EPOCH + round(asked * 1_000),
@@ -173,14 +174,14 @@ class Recording:
                 continue
             await anyio.sleep(max(0.0, line["t_ms"] - self.now_ms()) / 1_000)
             if line["kind"] == "rosout":
-                self._ears.tell(EngineLog(at=wall(), text=str(line.get("msg", ""))))
+                self._subscribers.tell(EngineLog(at=clock_us(), text=str(line.get("msg", ""))))
                 continue
             shown = tuple(self._snapshot(each, "feedback") for each in reversed(line["history"]))
-            self._ears.tell(Feedback(actor=line["actor"], snapshots=shown))
+            self._subscribers.tell(Feedback(actor=line["actor"], snapshots=shown))
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Everything that came by itself."""
-        return self._ears.listening(hear)
+        return self._subscribers.listening(hear)
 
     async def start(self, order: Order) -> None:
         """It was."""
@@ -228,7 +229,7 @@ def history(file: Path) -> Run:
         link = Recording(file)
         graph = link.graph
         asked = Requested(
-            at=wall(),
+            at=clock_us(),
             run="r1",
             number=1,
             request_id="q1",
@@ -248,8 +249,8 @@ def history(file: Path) -> Run:
             owns_link=False,
             store=MemoryLedger(),
             seq=0,
-            wall=wall,
-            aside=at_once,
+            clock_us=clock_us,
+            run_in_worker=at_once,
             changed=lambda _: None,
         )
         ends = max(each["t_ms"] for each in link.lines) / 1_000
@@ -263,7 +264,7 @@ def history(file: Path) -> Run:
             tasks.cancel_scope.cancel()
         return opened.run
 
-    run: Run = live_through(main)
+    run: Run = run_in_virtual_time(main)
     return run
 
 

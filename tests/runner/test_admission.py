@@ -6,13 +6,13 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotUmrf
-from action_assistant.runner.admission import admit, read_request
-from action_assistant.runner.events import Override
-from action_assistant.umrf import codec
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.start.admission import admit, read_request
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, SIMULATED
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Relation
-from runner.world import GO_ON, order, sequence
+from runner.harness import GO_ON, order, sequence
 
 
 def one_sided(name: str = "lopsided") -> Graph:

@@ -8,10 +8,10 @@ import httpx
 import msgspec
 import pytest
 
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import EXIT, Action
+from runner.harness import carousel, order, sequence
 from runner.process import RunnerProcess, body, over, started
-from runner.world import carousel, order, sequence
 
 FAST = {"*": [{"after_s": 0.02}]}
 ENDLESS = {"*": [{"never": True}]}

@@ -7,7 +7,7 @@ import msgspec
 from hypothesis import HealthCheck, Phase, example, given, settings
 from hypothesis import strategies as st
 
-from runner.bounds import GRAPHS, Air, fits, lived
+from runner.bounds import GRAPHS, NetworkFaults, fits, lived
 
 CALL = st.fixed_dictionaries(
     {
@@ -23,14 +23,14 @@ SCRIPTS = st.dictionaries(
     max_size=4,
 )
 AIRS = st.builds(
-    Air,
+    NetworkFaults,
     loss=st.sampled_from([0.0, 0.15, 0.5, 0.95]),
     get_loss=st.sampled_from([0.0, 0.0, 0.3]),
     old_s=st.sampled_from([0.0, 0.05, 0.9]),
     feedback_s=st.sampled_from([0.0, 0.02, 1.5]),
     seed=st.integers(0, 10_000),
 )
-CALM = Air()
+CALM = NetworkFaults()
 
 
 @settings(
@@ -42,20 +42,27 @@ CALM = Air()
 @given(
     graph=st.sampled_from(sorted(GRAPHS)),
     script=SCRIPTS,
-    air=AIRS,
+    network=AIRS,
     stop=st.none() | st.floats(0.1, 15.0),
 )
-@example(graph="line", script={"*": [{"after_s": 0.1}]}, air=CALM, stop=None)
-@example(graph="line", script={"*": [{"after_s": 3.0}]}, air=CALM, stop=None)
-@example(graph="line", script={"*": [{"after_s": 20.0, "ignores_stop": True}]}, air=CALM, stop=3.0)
-@example(graph="loop", script={"*": [{"after_s": 0.2}]}, air=Air(loss=0.5), stop=14.0)
-@example(graph="loop", script={"*": [{"after_s": 0.3}]}, air=Air(feedback_s=1.5, seed=3), stop=12.0)
+@example(graph="line", script={"*": [{"after_s": 0.1}]}, network=CALM, stop=None)
+@example(graph="line", script={"*": [{"after_s": 3.0}]}, network=CALM, stop=None)
+@example(
+    graph="line", script={"*": [{"after_s": 20.0, "ignores_stop": True}]}, network=CALM, stop=3.0
+)
+@example(graph="loop", script={"*": [{"after_s": 0.2}]}, network=NetworkFaults(loss=0.5), stop=14.0)
+@example(
+    graph="loop",
+    script={"*": [{"after_s": 0.3}]},
+    network=NetworkFaults(feedback_s=1.5, seed=3),
+    stop=12.0,
+)
 def test_every_visit_holds_what_the_code_of_the_action_did(
-    graph: str, script: dict[str, list[dict[str, Any]]], air: Air, stop: float | None
+    graph: str, script: dict[str, list[dict[str, Any]]], network: NetworkFaults, stop: float | None
 ) -> None:
     if graph == "loop" and stop is None:
         stop = 12.0  # else it never ends
-    told = lived(graph, script, air, stop)
+    told = lived(graph, script, network, stop)
     for name, action in told.run.actions.items():
         real = told.real[name]
         if graph != "loop":
@@ -85,8 +92,8 @@ def test_what_outlasts_a_stop_has_no_end() -> None:
 
 
 def test_no_bound_is_lost_when_it_is_stored(tmp_path: Any) -> None:
-    told = lived("join", {"*": [{"after_s": 0.7}]}, Air(loss=0.3), None)
-    events = told.place.world.ledger.told(told.run.id)
+    told = lived("join", {"*": [{"after_s": 0.7}]}, NetworkFaults(loss=0.3), None)
+    events = told.place.harness.ledger.told(told.run.id)
     seen = [item for event in events for item in getattr(event, "seen", ())]
     assert any(item.source == "feedback" and item.since_asked is not None for item in seen)
     assert any(item.source == "get" and item.since_asked is not None for item in seen)

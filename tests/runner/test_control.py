@@ -4,15 +4,15 @@ import anyio
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
-from action_assistant.runner import shapes
-from action_assistant.runner.events import Published, Requested
 from action_assistant.runner.links.port import Order
-from action_assistant.runner.runs import ENDED
-from runner.world import (
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import Published, Requested
+from action_assistant.runner.runs.run import ENDED
+from runner.harness import (
     ANN,
     BEN,
+    Harness,
     Robot,
-    World,
     ended,
     engine,
     order,
@@ -24,8 +24,8 @@ from runner.world import (
 
 @virtual
 async def test_a_simulated_run_goes_through_its_actions_to_the_end() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         started = await control.start(order(sequence(actions=3)), ANN)
         assert await ended(control, started.run.id) == "finished"
         run = await control.find(started.run.id)
@@ -42,39 +42,39 @@ async def test_a_simulated_run_goes_through_its_actions_to_the_end() -> None:
 
 @virtual
 async def test_what_was_shown_last_is_what_the_history_tells() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         started = await control.start(order(sequence(), script={"Work_1": [{"never": True}]}), ANN)
         await anyio.sleep(5)
         control.stop_all(BEN)
         await ended(control, started.run.id)
-    assert world.shown[-1][1] == world.ledger.history(started.run.id)
-    assert world.shown[-1][1].state == "stopped"
+    assert harness.shown[-1][1] == harness.ledger.history(started.run.id)
+    assert harness.shown[-1][1].state == "stopped"
 
 
 @virtual
 async def test_the_run_is_stored_before_anything_is_sent() -> None:
     robot = Robot(engine())
-    world = World({"David": robot})
-    async with world.runner() as control:
-        world.ledger.down = True
+    harness = Harness({"David": robot})
+    async with harness.runner() as control:
+        harness.ledger.down = True
         with pytest.raises(Unavailable, match="could not be recorded"):
             await control.start(order(sequence(), engine="David"), ANN)
         assert robot.starts == []
-        world.ledger.down = False
+        harness.ledger.down = False
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
-        assert [type(each) for each in world.ledger.told(run.id)][:1] == [Requested]
+        assert [type(each) for each in harness.ledger.told(run.id)][:1] == [Requested]
 
 
 @virtual
 async def test_a_run_whose_record_was_in_doubt_is_told_as_refused() -> None:
-    world = World()
-    async with world.runner() as control:
-        world.ledger.forgetful = True
+    harness = Harness()
+    async with harness.runner() as control:
+        harness.ledger.forgetful = True
         with pytest.raises(Unavailable):
             await control.start(order(sequence()), ANN)
-        (stream,) = world.ledger.streams
-        world.ledger.forgetful = False
+        (stream,) = harness.ledger.streams
+        harness.ledger.forgetful = False
         await anyio.sleep(3)
         assert (await control.find(stream.removeprefix("run/"))).state == "refused"
 
@@ -83,11 +83,11 @@ async def test_a_run_whose_record_was_in_doubt_is_told_as_refused() -> None:
 @virtual
 async def test_equal_requests_at_once_make_exactly_one_start(askers: int) -> None:
     robot = Robot(engine())
-    world = World({"David": robot})
-    world.ledger.slow = 0.05
+    harness = Harness({"David": robot})
+    harness.ledger.slow = 0.05
     asked = order(sequence(), engine="David")
     answers = []
-    async with world.runner() as control:
+    async with harness.runner() as control:
 
         async def ask() -> None:
             answers.append(await control.start(asked, ANN))
@@ -102,20 +102,20 @@ async def test_equal_requests_at_once_make_exactly_one_start(askers: int) -> Non
 
 @virtual
 async def test_a_request_repeated_after_a_restart_is_the_same_run() -> None:
-    world = World()
+    harness = Harness()
     asked = order(sequence(actions=1))
-    async with world.runner() as control:
+    async with harness.runner() as control:
         first = await control.start(asked, ANN)
         await ended(control, first.run.id)
-    async with world.runner() as control:
+    async with harness.runner() as control:
         again = await control.start(asked, ANN)
     assert (again.run.id, again.run.state, again.fresh) == (first.run.id, "finished", False)
 
 
 @virtual
 async def test_a_request_id_belongs_to_one_start_only() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         await control.start(order(sequence("one"), request_id="same"), ANN)
         with pytest.raises(Conflict, match="request_id"):
             await control.start(order(sequence("two"), request_id="same"), ANN)
@@ -124,9 +124,9 @@ async def test_a_request_id_belongs_to_one_start_only() -> None:
 @virtual
 async def test_a_robot_takes_one_run_and_the_loser_learns_whose_it_is() -> None:
     robot = Robot(engine())
-    world = World({"David": robot})
+    harness = Harness({"David": robot})
     outcomes = []
-    async with world.runner() as control:
+    async with harness.runner() as control:
 
         async def ask(name: str) -> None:
             try:
@@ -146,8 +146,8 @@ async def test_a_robot_takes_one_run_and_the_loser_learns_whose_it_is() -> None:
 
 @virtual
 async def test_simulated_runs_do_not_exclude_each_other() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         one = await control.start(order(sequence()), ANN)
         two = await control.start(order(sequence()), BEN)
         assert await ended(control, one.run.id) == await ended(control, two.run.id) == "finished"
@@ -158,19 +158,19 @@ async def test_simulated_runs_do_not_exclude_each_other() -> None:
 async def test_an_engine_that_does_not_answer_is_not_started() -> None:
     robot = Robot(engine())
     robot.silent = True
-    world = World({"David": robot})
-    async with world.runner() as control:
+    harness = Harness({"David": robot})
+    async with harness.runner() as control:
         with pytest.raises(Unavailable, match="does not answer"):
             await control.start(order(sequence(), engine="David"), ANN)
     assert robot.starts == []
-    assert not any(stream.startswith("run/") for stream in world.ledger.streams)
+    assert not any(stream.startswith("run/") for stream in harness.ledger.streams)
 
 
 @virtual
 async def test_the_graph_on_the_wire_names_run_version_and_action() -> None:
     robot = Robot(engine())
-    world = World({"David": robot})
-    async with world.runner() as control:
+    harness = Harness({"David": robot})
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), engine="David", version="v7"), ANN)).run
     sent = robot.starts[0].umrf
     assert f'"run": "{run.id}"' in sent
@@ -181,8 +181,8 @@ async def test_the_graph_on_the_wire_names_run_version_and_action() -> None:
 
 @virtual
 async def test_a_robot_nobody_knows_and_one_without_a_link_are_refused() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         with pytest.raises(BadInput, match="No robot"):
             await control.start(order(sequence(), engine="Nobody"), ANN)
 
@@ -195,8 +195,8 @@ async def test_what_the_engine_refuses_is_told_as_refused() -> None:
             await self.engine.start(Order(run="theirs", graph=sequence("busy"), umrf=""))
             await super().start(order)
 
-    world = World({"David": Contested(engine())})
-    async with world.runner() as control:
+    harness = Harness({"David": Contested(engine())})
+    async with harness.runner() as control:
         run = (await control.start(order(sequence("busy"), engine="David"), ANN)).run
         assert run.state == "refused"
         assert "already active" in run.detail
@@ -207,8 +207,8 @@ async def test_what_the_engine_refuses_is_told_as_refused() -> None:
 
 @virtual
 async def test_a_simulated_run_pauses_and_goes_on() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(actions=1)), ANN)).run
         await anyio.sleep(0.5)
         await control.pause(run.id, ANN)
@@ -216,7 +216,7 @@ async def test_a_simulated_run_pauses_and_goes_on() -> None:
         assert control.open[run.id].run.state == "paused"
         await control.resume(run.id, ANN)
         assert await ended(control, run.id) == "finished"
-    found = world.ledger.history(run.id)
+    found = harness.ledger.history(run.id)
     assert found.ended_at is not None
     assert found.started_at is not None
     assert (found.ended_at - found.started_at) / 1e6 > 20
@@ -225,8 +225,8 @@ async def test_a_simulated_run_pauses_and_goes_on() -> None:
 
 @virtual
 async def test_pausing_is_refused_where_it_is_not_safe() -> None:
-    world = World({"David": Robot(engine())})
-    async with world.runner() as control:
+    harness = Harness({"David": Robot(engine())})
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await until(lambda: control.open[run.id].run.state == "running")
         with pytest.raises(Conflict, match="not safe"):
@@ -236,9 +236,9 @@ async def test_pausing_is_refused_where_it_is_not_safe() -> None:
 @virtual
 async def test_an_engine_that_hangs_is_unknown_and_stop_says_why_it_is_unconfirmed() -> None:
     """H5: an action without onPause holds the engine's lock for ever."""
-    world = World()
+    harness = Harness()
     script = {"*": [{"pauses": False, "never": True}]}
-    async with world.runner() as control:
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), script=script), ANN)).run
         await anyio.sleep(1)
         await control.pause(run.id, ANN)
@@ -256,11 +256,11 @@ async def test_an_engine_that_hangs_is_unknown_and_stop_says_why_it_is_unconfirm
 
 @virtual
 async def test_after_a_restart_a_simulated_run_is_lost_and_never_finished() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         run = (await control.start(order(sequence()), ANN)).run
         await anyio.sleep(1.5)
-    async with world.runner() as control:
+    async with harness.runner() as control:
         assert await ended(control, run.id) == "lost"
         found = await control.find(run.id)
     assert "Nothing shows how" in found.detail
@@ -271,14 +271,14 @@ async def test_after_a_restart_a_simulated_run_is_lost_and_never_finished() -> N
 @virtual
 async def test_a_robot_that_goes_on_without_the_runner_is_taken_up_again() -> None:
     robot = Robot(engine())
-    world = World({"David": robot})
+    harness = Harness({"David": robot})
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(robot.engine.run)
-        async with world.runner() as control:
+        async with harness.runner() as control:
             run = (await control.start(order(sequence(actions=5), engine="David"), ANN)).run
             await anyio.sleep(1.5)
         await anyio.sleep(1)
-        async with world.runner() as control:
+        async with harness.runner() as control:
             assert control.open[run.id].run.state == "running"
             assert await ended(control, run.id) == "finished"
         tasks.cancel_scope.cancel()
@@ -288,15 +288,15 @@ async def test_a_robot_that_goes_on_without_the_runner_is_taken_up_again() -> No
 @virtual
 async def test_a_pending_stop_goes_on_after_a_crash() -> None:
     robot = Robot(engine({"*": [{"never": True}]}))
-    world = World({"David": robot})
-    async with world.runner() as control:
+    harness = Harness({"David": robot})
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await anyio.sleep(1.5)
         robot.loss = 1.0
         await control.stop(run.id, BEN)
         await anyio.sleep(1)
     robot.loss, robot.delivered = 0.0, 0
-    async with world.runner() as control:
+    async with harness.runner() as control:
         now = control.open[run.id].run
         assert (now.desired, now.stopped_by) == ("stopped", BEN)
         assert await ended(control, run.id) == "stopped"
@@ -306,12 +306,12 @@ async def test_a_pending_stop_goes_on_after_a_crash() -> None:
 @virtual
 async def test_a_run_on_a_robot_without_a_link_stays_unknown_and_its_stop_unconfirmed() -> None:
     robot = Robot(engine({"*": [{"never": True}]}))
-    world = World({"David": robot})
-    async with world.runner() as control:
+    harness = Harness({"David": robot})
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await anyio.sleep(1)
-    world.links = {}
-    async with world.runner() as control:
+    harness.links = {}
+    async with harness.runner() as control:
         await control.stop(run.id, ANN)
         await anyio.sleep(30)
         now = control.open[run.id].run
@@ -322,37 +322,37 @@ async def test_a_run_on_a_robot_without_a_link_stays_unknown_and_its_stop_unconf
 
 @virtual
 async def test_numbers_go_on_after_a_restart() -> None:
-    world = World()
+    harness = Harness()
     for number in (1, 2, 3):
-        async with world.runner() as control:
+        async with harness.runner() as control:
             run = (await control.start(order(sequence(actions=1)), ANN)).run
             assert run.number == number
             assert await ended(control, run.id) in ENDED
-            assert Published in [type(each) for each in world.ledger.told(run.id)]
+            assert Published in [type(each) for each in harness.ledger.told(run.id)]
 
 
 @virtual
 async def test_a_simulated_run_that_is_paused_can_be_stopped() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), script={"*": [{"after_s": 20}]}), ANN)).run.id
         await anyio.sleep(1)
         await control.pause(run, ANN)
         await until(lambda: control.open[run].run.state == "paused")
         await control.stop(run, BEN)
         assert await ended(control, run) == "stopped"
-    assert world.ledger.history(run).alarms == ()
+    assert harness.ledger.history(run).alarms == ()
 
 
 @virtual
 async def test_where_the_simulator_plays_a_robot_it_pauses_only_as_safely_as_that() -> None:
-    world = World({"David": Robot(engine())})
-    async with world.runner() as control:
+    harness = Harness({"David": Robot(engine())})
+    async with harness.runner() as control:
         asked = order(sequence(), like="David", script={"*": [{"after_s": 20}]})
         run = (await control.start(asked, ANN)).run.id
         await anyio.sleep(1)
         with pytest.raises(Conflict, match="not safe"):
             await control.pause(run, ANN)
-        assert shapes.shown(control.open[run].run).like == "David"
+        assert views.shown(control.open[run].run).like == "David"
         control.stop_all(BEN)
         assert await ended(control, run) == "stopped"

@@ -18,20 +18,29 @@ import anyio
 import pytest
 
 from action_assistant.errors import Refused
-from action_assistant.runner.control import Control
-from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.events import Override
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, Pause, Start, Stop
+from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Link
-from action_assistant.runner.runs import ENDED, State
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Pause, Quirks, Start, Stop
-from action_assistant.runner.steering import RestRequest, confirm_rest
-from action_assistant.umrf import codec
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.run import ENDED, State
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import Execution, script_from
-from runner.air import Air, Node, now, now_ms, run_of
-from runner.air_link import AirLink
-from runner.world import ANN, BEN, World, carousel, live_through, order, sequence, two_ends
+from runner.fake_link import FakeLink
+from runner.fake_network import FakeNetwork, Node, now, now_ms, run_of
+from runner.harness import (
+    ANN,
+    BEN,
+    Harness,
+    carousel,
+    order,
+    run_in_virtual_time,
+    sequence,
+    two_ends,
+)
 
 HISTORIES = int(os.environ.get("TEST_HISTORIES", "40"))
 #: A history that once went wrong: somebody played a start of ours again while the last answer of the
@@ -119,13 +128,17 @@ def opening(chance: random.Random) -> list[Step]:
 class Story:
     """One history: what is done, and what must hold all the while."""
 
-    def __init__(self, seed: int, link: Callable[[Air], Link] = lambda air: AirLink(air, NAME)):
+    def __init__(
+        self,
+        seed: int,
+        link: Callable[[FakeNetwork], Link] = lambda network: FakeLink(network, NAME),
+    ):
         self.chance = random.Random(seed)
         self.seed = seed
-        self.air = Air(self.chance)
+        self.network = FakeNetwork(self.chance)
         self.script = script_from({"behaviours": self.chance.choice(SCRIPTS)})
-        self.quirks = Quirks(loading_ms=self.chance.choice(LOADING_MS))
-        self.world = World({NAME: link(self.air)})
+        self.quirks = EngineTraits(loading_ms=self.chance.choice(LOADING_MS))
+        self.harness = Harness({NAME: link(self.network)})
         self.false: list[str] = []
         self.still: dict[str, float] = {}
         self.judged: set[str] = set()
@@ -137,41 +150,41 @@ class Story:
 
     def robot(self, name: str = NAME) -> Node:
         """One more engine comes up."""
-        robot = StandIn(
+        robot = EmulatedEngine(
             name,
             script=self.script,
             quirks=self.quirks,
             seed=self.chance.getrandbits(32),
             born_ms=now_ms(),
         )
-        return self.air.join(robot, lag_s=self.chance.choice([0.0, 0.005, 0.08]))
+        return self.network.join(robot, lag_s=self.chance.choice([0.0, 0.005, 0.08]))
 
     async def live(self) -> None:
         """All steps, then everything is well again and has to come to rest."""
         async with anyio.create_task_group() as wind:
             self.wind = wind
-            wind.start_soon(self.air.blow)
+            wind.start_soon(self.network.blow)
             wind.start_soon(self.watch_the_truth)
             self.robot()
             await anyio.sleep(0.2)
             rest = plot(self.chance)
             while rest:
-                async with self.world.runner() as control, anyio.create_task_group() as people:
+                async with self.harness.runner() as control, anyio.create_task_group() as people:
                     control.watch(self.judge)
                     while rest:
                         step, value = rest.pop(0)
                         if step == "crash":
                             break
                         await self.do(control, people, step, value)
-                    self.world.ledger.down = True  # a crash writes nothing any more
+                    self.harness.ledger.down = True  # a crash writes nothing any more
                     people.cancel_scope.cancel()
-                self.world.ledger.down = False
+                self.harness.ledger.down = False
             await self.come_to_rest()
             wind.cancel_scope.cancel()
 
-    async def do(self, control: Control, people: Any, step: str, value: Any) -> None:
+    async def do(self, control: ExecutionService, people: Any, step: str, value: Any) -> None:
         """One step."""
-        alive = [each for each in self.air.nodes if not each.robot.gone]
+        alive = [each for each in self.network.nodes if not each.robot.gone]
         node = self.chance.choice(alive) if alive else None
         match step:
             case "wait":
@@ -191,21 +204,21 @@ class Story:
                     with suppress(Refused):
                         await control.pause(run, ANN)
             case "loss":
-                self.air.loss[value[0]] = value[1]
+                self.network.loss[value[0]] = value[1]
             case "late":
-                self.air.late_s = value
+                self.network.late_s = value
                 self.rest_s = max(self.rest_s, value + 10)
             case "old":
-                self.air.old_s = value
+                self.network.old_s = value
             case "second engine":
                 if len(alive) < 2:
                     self.robot(value)
             case "reboot" if node is not None:
                 if value == "kill":
-                    self.air.kill(node)
+                    self.network.kill(node)
                 else:
                     node.robot.quit(now_ms())
-                    self.air.stir(node)
+                    self.network.stir(node)
                 self.wind.start_soon(self.come_up_later)
             case "freeze" if node is not None:
                 node.robot.freeze(now_ms())
@@ -214,11 +227,11 @@ class Story:
                 self.stranger(value)
             case "their start":
                 text = codec.write(GRAPHS[value])
-                self.air.carry(Start(graph_name=value, targets=(NAME,), graph_json=text), "cli")
+                self.network.carry(Start(graph_name=value, targets=(NAME,), graph_json=text), "cli")
             case "made up":
                 self.make_up(value)
             case "journal":
-                self.world.ledger.down = value
+                self.harness.ledger.down = value
             case "look":
                 self.look_at_robots(control)
             case "well":
@@ -232,9 +245,9 @@ class Story:
         await anyio.sleep(seconds)
         if not node.robot.gone:
             node.robot.thaw(now_ms())
-            self.air.stir(node)
+            self.network.stir(node)
 
-    def look_at_robots(self, control: Control) -> None:
+    def look_at_robots(self, control: ExecutionService) -> None:
         """Somebody goes there, and says so of what is at rest where the engine's word is none."""
         moving = self.moving()
         for run, opened in tuple(control.open.items()):
@@ -245,39 +258,39 @@ class Story:
 
     def stranger(self, what: str) -> None:
         """Somebody at a terminal."""
-        self.air.strangers = 1
+        self.network.strangers = 1
         name = self.chance.choice(list(GRAPHS))
-        ours = [each for _, each in self.air.sent if isinstance(each, Start)]
+        ours = [each for _, each in self.network.sent if isinstance(each, Start)]
         match what:
             case "start":
                 text = codec.write(GRAPHS[name])
-                self.air.carry(Start(graph_name=name, targets=(NAME,), graph_json=text), "cli")
+                self.network.carry(Start(graph_name=name, targets=(NAME,), graph_json=text), "cli")
             case "start ours" if ours:  # a recorded message of ours is played again
                 again = self.chance.choice(ours)
                 run = json.loads(again.graph_json).get("gui_attributes", {})
                 self.replayed.add(run.get("action_assistant", {}).get("run", ""))
-                self.air.carry(again, "bag")
+                self.network.carry(again, "bag")
             case "stop":
-                self.air.carry(Stop(graph_name=name, targets=(NAME,)), "cli")
+                self.network.carry(Stop(graph_name=name, targets=(NAME,)), "cli")
             case "pause":
-                self.air.carry(Pause(graph_name=name, targets=(NAME,)), "cli")
+                self.network.carry(Pause(graph_name=name, targets=(NAME,)), "cli")
 
     def make_up(self, state: str) -> None:
         """Feedback that nobody's engine sent, about the newest run."""
-        ours = [each for _, each in self.air.sent if isinstance(each, Start)]
+        ours = [each for _, each in self.network.sent if isinstance(each, Start)]
         if ours:
             graph = json.loads(ours[-1].graph_json) | {"graph_state": state}
             node = "FINISHED" if state != "RUNNING" else "RUNNING"
             graph["actions"] = [each | {"state": node} for each in graph["actions"]]
-            self.air.show(NAME, [json.dumps(graph)])
+            self.network.show(NAME, [json.dumps(graph)])
 
     def make_well(self) -> None:
         """Nothing is lost any more."""
-        self.air.loss.clear()
-        self.air.late_s = self.air.old_s = 0.0
-        self.world.ledger.down = False
+        self.network.loss.clear()
+        self.network.late_s = self.network.old_s = 0.0
+        self.harness.ledger.down = False
 
-    async def start(self, control: Control, name: str) -> None:
+    async def start(self, control: ExecutionService, name: str) -> None:
         """A start, which may be refused; some people override what can be."""
         override = {"override": EVERYTHING} if self.chance.random() < 0.7 else {}
         with suppress(Refused):
@@ -289,7 +302,7 @@ class Story:
         """Runs of ours of which the code of an action really goes on, and where. What the engine says
         of the action does not count."""
         found: dict[str, str] = {}
-        for node in self.air.nodes:
+        for node in self.network.nodes:
             for each in node.robot.executing:
                 if run := self.runs.setdefault(each, run_of(node.robot, each.graph)):
                     found[run] = f"{each.graph}/{each.node} on {node.process}"
@@ -297,7 +310,7 @@ class Story:
 
     def names(self) -> set[str]:
         """Graphs that move: one that goes on for ever keeps a run of ours of that name open, too."""
-        graphs = (graph for each in self.air.nodes for graph in each.robot.moving)
+        graphs = (graph for each in self.network.nodes for graph in each.robot.moving)
         return {graph.partition("__")[0] for graph in graphs}
 
     def judge(self, opened: OpenRun) -> None:
@@ -333,11 +346,11 @@ class Story:
     async def come_to_rest(self) -> None:
         """Everything works again, one engine is left, and somebody stops everything."""
         self.make_well()
-        async with self.world.runner() as control:
+        async with self.harness.runner() as control:
             control.watch(self.judge)
             await anyio.sleep(self.rest_s)  # what was late has come, what was frozen is awake
-            for node in [each for each in self.air.nodes if not each.robot.gone][:-1]:
-                self.air.kill(node)
+            for node in [each for each in self.network.nodes if not each.robot.gone][:-1]:
+                self.network.kill(node)
             control.stop_all(BEN)
             for _ in range(2):  # feedback that nobody can contradict opens one again for a moment
                 with anyio.move_on_after(60):
@@ -354,10 +367,12 @@ class Story:
 
     def blocked(self) -> bool:
         """Whether an engine will never answer again."""
-        return any(each.robot._engine.locked for each in self.air.nodes if not each.robot.gone)
+        return any(each.robot._engine.locked for each in self.network.nodes if not each.robot.gone)
 
 
-def lived(seed: int, link: Callable[[Air], Link] = lambda air: AirLink(air, NAME)) -> Story:
+def lived(
+    seed: int, link: Callable[[FakeNetwork], Link] = lambda network: FakeLink(network, NAME)
+) -> Story:
     """One history."""
     stories: list[Story] = []
 
@@ -368,7 +383,7 @@ def lived(seed: int, link: Callable[[Air], Link] = lambda air: AirLink(air, NAME
         loop.set_exception_handler(lambda _, told: story.false.append(f"a fault: {told}"))
         await story.live()
 
-    live_through(main)
+    run_in_virtual_time(main)
     return stories[0]
 
 

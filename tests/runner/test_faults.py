@@ -7,26 +7,26 @@ from typing import Any
 import anyio
 import pytest
 
+from action_assistant.runner.archives.archive_store import ArchiveStore
+from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.links.port import Answer, Order
-from action_assistant.runner.recordings import Recordings
-from action_assistant.runner.review.desk import Desk
-from action_assistant.runner.review.retention import Retention
-from action_assistant.runner.review.shelf import Shelf
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.settings import Keep
-from runner.fleet import Open
-from runner.test_robots import NEVER, fleet
-from runner.world import (
+from runner.harness import (
     ANN,
     BEN,
-    World,
+    Harness,
     at_once,
-    live_through,
+    clock_us,
     order,
+    run_in_virtual_time,
     sequence,
     until,
     virtual,
-    wall,
 )
+from runner.registered_robots import Open
+from runner.test_robots import NEVER, fleet
 
 
 class Faulty(Open):
@@ -53,7 +53,7 @@ async def test_a_link_that_breaks_while_it_stops_is_stopped_by_again_and_told_as
     None
 ):
     david = Faulty(NEVER)
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await until(lambda: control.open[run.id].run.state == "running")
         david.stops_fail, david.loss = True, 1.0
@@ -70,7 +70,7 @@ async def test_a_link_that_breaks_while_it_stops_is_stopped_by_again_and_told_as
 @virtual
 async def test_a_link_that_breaks_when_it_asks_leaves_the_run_unknown() -> None:
     david = Faulty(NEVER)
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await until(lambda: control.open[run.id].run.state == "running")
         david.gets_fail = True
@@ -88,17 +88,17 @@ def test_a_link_that_breaks_while_a_graph_of_somebody_else_is_stopped_ends_nothi
     @virtual
     async def lived() -> None:
         david, eve = Faulty(NEVER), Open(NEVER)
-        async with fleet(World(), David=david, Eve=eve) as control:
+        async with fleet(Harness(), David=david, Eve=eve) as control:
             run = (await control.start(order(sequence(), engine="Eve"), ANN)).run
             await david.engine.start(Order(run="theirs", graph=sequence("cleaning"), umrf=""))
             await anyio.sleep(15)
             setattr(david, fault, True)
             control.stop_robot("David", BEN)
             await anyio.sleep(10)
-            assert control.robots.silencing.trouble("David", "cleaning")
+            assert control.robots.foreign_stops.trouble("David", "cleaning")
             assert control.open[run.id].run.state == "running"
             setattr(david, fault, False)
-            await until(lambda: not control.robots.silencing.going("David"))
+            await until(lambda: not control.robots.foreign_stops.going("David"))
             assert not await david.moving("cleaning")
 
     lived()
@@ -122,7 +122,7 @@ def test_a_file_that_somebody_put_beside_recordings_ends_nothing(tmp_path: Path)
         assert len(await recordings.listed("David")) == 2
         assert (tmp_path / "David" / "2026-11-21T10 (copy).jsonl.gz").exists()
 
-    live_through(live)
+    run_in_virtual_time(live)
 
 
 def test_a_recording_that_cannot_be_looked_at_does_not_end_what_puts_old_ones_away(
@@ -133,12 +133,12 @@ def test_a_recording_that_cannot_be_looked_at_does_not_end_what_puts_old_ones_aw
 
     async def live() -> None:
         retention = Retention(
-            World().ledger,  # type: ignore[arg-type] - nothing of it is asked
+            Harness().ledger,  # type: ignore[arg-type] - nothing of it is asked
             Recordings(tmp_path / "recordings", at_once),
             Keep(folder=tmp_path, raw=1),
             is_open=lambda _: False,
-            wall=wall,
-            aside=at_once,
+            clock_us=clock_us,
+            run_in_worker=at_once,
         )
         retention._left_over = False
         with anyio.move_on_after(3 * 3_600) as waited:
@@ -146,27 +146,27 @@ def test_a_recording_that_cannot_be_looked_at_does_not_end_what_puts_old_ones_aw
         assert waited.cancelled_caught
         assert "nowhere" in caplog.text or "No such file" in caplog.text
 
-    live_through(live)
+    run_in_virtual_time(live)
 
 
 @virtual
 async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_not() -> None:
-    world = World()
-    async with world.runner() as control, anyio.create_task_group() as tasks:
-        shelf = Shelf(world.ledger, Path("nowhere"), at_once)  # type: ignore[arg-type]
-        desk = Desk(control, shelf, at_once, wall)
-        reel, failed = desk.reels.reel, []
+    harness = Harness()
+    async with harness.runner() as control, anyio.create_task_group() as tasks:
+        archive_store = ArchiveStore(harness.ledger, Path("nowhere"), at_once)  # type: ignore[arg-type]
+        review_service = ReviewService(control, archive_store, at_once, clock_us)
+        keyframes, failed = review_service.keyframe_store.keyframes, []
 
         async def fails_once(run: str) -> Any:
             if not failed:
                 failed.append(run)
                 raise ZeroDivisionError
-            return await reel(run)
+            return await keyframes(run)
 
-        desk.reels.reel = fails_once  # type: ignore[method-assign]
-        tasks.start_soon(desk.run)
+        review_service.keyframe_store.keyframes = fails_once  # type: ignore[method-assign]
+        tasks.start_soon(review_service.run)
         for _ in range(2):
             run = (await control.start(order(sequence(actions=1)), ANN)).run
             await until(lambda run=run: run.id not in control.open)
-        await until(lambda: len([each for each in world.ledger.streams if "about/" in each]) == 2)
+        await until(lambda: len([each for each in harness.ledger.streams if "about/" in each]) == 2)
         tasks.cancel_scope.cancel()

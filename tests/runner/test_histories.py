@@ -10,15 +10,25 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from action_assistant.errors import Refused
-from action_assistant.runner.control import Control
-from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.events import StopRequested
+from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.observations import ACTIVE, NodeState
 from action_assistant.runner.links.port import EngineRefused, NoAnswer, Order, Report, Transitions
 from action_assistant.runner.links.simulator import SimulatorLink
-from action_assistant.runner.runs import ENDED, State
-from action_assistant.runner.seen import ACTIVE, NodeState
-from action_assistant.runner.steering import RestRequest, confirm_rest
-from runner.world import ANN, BEN, Robot, World, engine, live_through, order, sequence, two_ends
+from action_assistant.runner.runs.events import StopRequested
+from action_assistant.runner.runs.run import ENDED, State
+from runner.harness import (
+    ANN,
+    BEN,
+    Harness,
+    Robot,
+    engine,
+    order,
+    run_in_virtual_time,
+    sequence,
+    two_ends,
+)
 
 GRAPHS = {"one": sequence("one"), "two": two_ends("two")}
 NAMES = tuple(GRAPHS)
@@ -57,7 +67,7 @@ class Story:
     def __init__(self, seed: int, script: dict[str, Any]) -> None:
         self.script = script
         self.robot = Robot(engine(script), random.Random(seed))
-        self.world = World({"David": self.robot})
+        self.harness = Harness({"David": self.robot})
         self.false: list[str] = []
         self.still: set[str] = set()
         self.defiant: set[str] = set()
@@ -71,20 +81,20 @@ class Story:
             engines.start_soon(self.follow, self.robot.engine)
             rest = list(steps)
             while rest:
-                async with self.world.runner() as control, anyio.create_task_group() as people:
+                async with self.harness.runner() as control, anyio.create_task_group() as people:
                     control.watch(self.judge)
                     while rest:
                         step, value = rest.pop(0)
                         if step == "crash":
                             break
                         await self.do(control, people, step, value)
-                    self.world.ledger.down = True  # a crash writes nothing any more
+                    self.harness.ledger.down = True  # a crash writes nothing any more
                     people.cancel_scope.cancel()
-                self.world.ledger.down = False
+                self.harness.ledger.down = False
             await self.come_to_rest()
             engines.cancel_scope.cancel()
 
-    async def do(self, control: Control, people: Any, step: str, value: Any) -> None:
+    async def do(self, control: ExecutionService, people: Any, step: str, value: Any) -> None:
         """One step."""
         match step:
             case "wait":
@@ -112,9 +122,9 @@ class Story:
             case "silent":
                 self.robot.silent = value
             case "journal":
-                self.world.ledger.down = value
+                self.harness.ledger.down = value
             case "slow journal":
-                self.world.ledger.slow = value
+                self.harness.ledger.slow = value
             case "well":
                 self.make_well()
             case "engine restarts":
@@ -128,10 +138,10 @@ class Story:
     def make_well(self) -> None:
         """Nothing is lost any more."""
         self.robot.start_delay, self.robot.old = 0.0, 0.01
-        self.robot.loss = self.robot.start_loss = self.world.ledger.slow = 0.0
-        self.robot.silent = self.world.ledger.down = False
+        self.robot.loss = self.robot.start_loss = self.harness.ledger.slow = 0.0
+        self.robot.silent = self.harness.ledger.down = False
 
-    async def start(self, control: Control, name: str, where: str) -> None:
+    async def start(self, control: ExecutionService, name: str, where: str) -> None:
         """A start, which may be refused."""
         script = {"script": self.script} if where == "simulator" else {}
         with suppress(Refused):
@@ -168,7 +178,7 @@ class Story:
     async def come_to_rest(self) -> None:
         """Everything works again, and somebody stops everything."""
         self.make_well()
-        async with self.world.runner() as control:
+        async with self.harness.runner() as control:
             control.watch(self.judge)
             await anyio.sleep(1)
             control.stop_all(BEN)
@@ -187,14 +197,14 @@ class Story:
         assert self.false == []
         runs = [each.run for each in self.robot.starts]
         assert len(runs) == len(set(runs))
-        last = {run.id: run for _, run in self.world.shown}
-        for stream in self.world.ledger.streams:
+        last = {run.id: run for _, run in self.harness.shown}
+        for stream in self.harness.ledger.streams:
             if not stream.startswith("run/"):
                 continue
-            told = self.world.ledger.history(stream.removeprefix("run/"))
+            told = self.harness.ledger.history(stream.removeprefix("run/"))
             assert told.state in ENDED or told.id in self.defiant
             assert told == last[told.id]
-            stops = [e for e in self.world.ledger.told(told.id) if isinstance(e, StopRequested)]
+            stops = [e for e in self.harness.ledger.told(told.id) if isinstance(e, StopRequested)]
             assert (told.desired == "stopped") == bool(stops)
 
 
@@ -213,4 +223,4 @@ def test_nothing_is_started_twice_and_nothing_is_called_stopped_that_moves(
         await story.live([("start", first), *steps])
         story.hold()
 
-    live_through(main)
+    run_in_virtual_time(main)

@@ -12,9 +12,9 @@ import anyio
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from action_assistant.runner.live import Hub, Outbox
+from action_assistant.runner.api.live import Hub, Outbox
+from runner.harness import ANN, Harness, carousel, clock_us, order, sequence, virtual
 from runner.process import RunnerProcess, over, started
-from runner.world import ANN, World, carousel, order, sequence, virtual, wall
 
 ENDLESS = {"*": [{"never": True}]}
 BUSY = {"*": [{"after_s": 0.0}]}
@@ -135,9 +135,9 @@ def test_ten_tabs_and_busy_runs_do_not_delay_a_stop(own_process: RunnerProcess) 
 
 @virtual
 async def test_a_page_that_does_not_read_is_owed_one_state_of_each_run() -> None:
-    world = World()
-    async with world.runner() as control:
-        hub = Hub(control, wall)
+    harness = Harness()
+    async with harness.runner() as control:
+        hub = Hub(control, clock_us)
         box = Outbox(hub, lambda: True)
         hub.boxes.add(box)
         run = (await control.start(order(carousel(), script=BUSY), ANN)).run
@@ -157,9 +157,9 @@ async def test_a_page_that_does_not_read_is_owed_one_state_of_each_run() -> None
 
 @virtual
 async def test_states_of_one_run_come_at_most_twenty_times_a_second() -> None:
-    world = World()
-    async with world.runner() as control:
-        hub = Hub(control, wall)
+    harness = Harness()
+    async with harness.runner() as control:
+        hub = Hub(control, clock_us)
         box = Outbox(hub, lambda: True)
         hub.boxes.add(box)
         await control.start(order(carousel(), script=BUSY), ANN)
@@ -176,9 +176,9 @@ async def test_states_of_one_run_come_at_most_twenty_times_a_second() -> None:
 
 @virtual
 async def test_the_answer_to_a_stop_goes_before_everything_that_waits() -> None:
-    world = World()
-    async with world.runner() as control:
-        hub = Hub(control, wall)
+    harness = Harness()
+    async with harness.runner() as control:
+        hub = Hub(control, clock_us)
         box = Outbox(hub, lambda: True)
         hub.boxes.add(box)
         for i in range(20):
@@ -198,9 +198,9 @@ async def test_the_answer_to_a_stop_goes_before_everything_that_waits() -> None:
 
 @virtual
 async def test_an_expired_session_is_shown_nothing_more_but_its_stop_is_followed() -> None:
-    world = World()
-    async with world.runner() as control:
-        hub = Hub(control, wall)
+    harness = Harness()
+    async with harness.runner() as control:
+        hub = Hub(control, clock_us)
         box = Outbox(hub, lambda: False)
         hub.boxes.add(box)
         run = (await control.start(order(sequence(), script=ENDLESS), ANN)).run

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from runner.harness import order, sequence
 from runner.process import RunnerProcess, over, started
-from runner.world import order, sequence
 
 FORBIDDEN = ("pycrdt", "action_assistant.editor")
 
@@ -21,7 +21,7 @@ def test_the_runner_loads_neither_the_editor_nor_a_crdt() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
     assert [name for name in loaded if name.startswith(FORBIDDEN)] == []
-    assert "action_assistant.runner.control" in loaded
+    assert "action_assistant.runner.execution.service" in loaded
 
 
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="needs /proc")

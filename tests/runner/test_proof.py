@@ -2,10 +2,11 @@
 
 import anyio
 
+from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer
-from action_assistant.runner.proof import Rest, strangers
-from action_assistant.runner.seen import Snapshot
-from runner.world import virtual
+from action_assistant.runner.robots.foreign_graphs import foreign_graphs
+from action_assistant.runner.stop.proof import RestProof
+from runner.harness import virtual
 
 
 def held(graph: str, state: str, work: str, run: str | None = None) -> Snapshot:
@@ -18,7 +19,7 @@ def answer(*graphs: Snapshot) -> Answer:
 
 def test_a_graph_of_others_that_may_go_on_by_itself_is_one_that_runs() -> None:
     between = held("theirs", "RUNNING", "FINISHED")
-    assert strangers(answer(between, held("over", "FINISHED", "FINISHED")), ()) == ["theirs"]
+    assert foreign_graphs(answer(between, held("over", "FINISHED", "FINISHED")), ()) == ["theirs"]
 
 
 def test_sub_graphs_are_named_by_their_graph_and_our_own_runs_not_at_all() -> None:
@@ -28,12 +29,12 @@ def test_sub_graphs_are_named_by_their_graph_and_our_own_runs_not_at_all() -> No
         held("ours", "RUNNING", "RUNNING", run="r1"),
         held("late", "STOPPED", "RUNNING", run="r2"),
     )
-    assert strangers(found, {"r1"}) == ["late", "theirs"]
+    assert foreign_graphs(found, {"r1"}) == ["late", "theirs"]
 
 
 @virtual
 async def test_a_graph_that_one_look_did_not_show_is_looked_for_again() -> None:
-    rest = Rest(exact=False)
+    rest = RestProof(exact=False)
     assert not rest.missing((), anyio.current_time())
     await anyio.sleep(0.2)
     assert not rest.missing((held("theirs__part", "RUNNING", "RUNNING"),), anyio.current_time())

@@ -7,16 +7,16 @@ import anyio
 import pytest
 
 from action_assistant.errors import Conflict
-from action_assistant.runner.control import Control
+from action_assistant.runner.emulator.messages import Start
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Link, NotSent, Order, Registration
-from action_assistant.runner.robots import Robots
-from action_assistant.runner.standin_wire import Start
-from action_assistant.umrf import codec
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.umrf.facts import EngineFacts
-from runner.fleet import Fleet, Open
-from runner.scene import PATROL, Scene, asked, shown
+from action_assistant.umrf.files import codec
+from runner.harness import ANN, BEN, Harness, at_once, clock_us, order, sequence, until, virtual
+from runner.registered_robots import Open, RegisteredRobots
+from runner.robots_in_network import PATROL, RobotsInNetwork, asked, shown
 from runner.test_robots import NEVER, fleet, group
-from runner.world import ANN, BEN, World, at_once, order, sequence, until, virtual, wall
 
 
 async def _cleaning(robot: Open, run: str) -> None:
@@ -30,14 +30,14 @@ async def _cleaning(robot: Open, run: str) -> None:
 @virtual
 async def test_a_graph_with_the_mark_of_a_run_on_another_robot_is_stopped_too() -> None:
     david, eve = Open(NEVER), Open(NEVER)
-    async with fleet(World(), David=david, Eve=eve) as control:
+    async with fleet(Harness(), David=david, Eve=eve) as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await _cleaning(eve, run.id)
         await anyio.sleep(15)
         (look,) = await control.look(group(sequence(), "Eve"))
         assert {each.code: each.verdict for each in look.items}["quiet"] == "blocked"
         assert control.stop_robot("Eve", BEN) == ([], ["Eve: cleaning"])
-        await until(lambda: not control.robots.silencing.going("Eve"))
+        await until(lambda: not control.robots.foreign_stops.going("Eve"))
         assert not await eve.moving("cleaning")
         assert control.open[run.id].run.desired == "running"
 
@@ -46,46 +46,46 @@ async def test_a_graph_with_the_mark_of_a_run_on_another_robot_is_stopped_too() 
 async def test_a_graph_with_the_mark_of_a_run_that_has_ended_is_stopped_before_that_is_recorded() -> (
     None
 ):
-    scene = Scene(4)
+    scene = RobotsInNetwork(4)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
-        scene.world.ledger.down = True
+        scene.harness.ledger.down = True
         await control.stop(run, BEN)
         await until(lambda: shown(control, run).state == "stopped")
-        scene.air.carry(scene.starts()[0], "bag")  # somebody plays our start again
+        scene.network.carry(scene.starts()[0], "bag")  # somebody plays our start again
         await until(lambda: scene.nodes["David"].robot.moving == ("patrol",))
         await anyio.sleep(15)
         assert shown(control, run).state == "stopped"
         control.stop_all(BEN)
         await until(lambda: scene.nodes["David"].robot.moving == ())
-        scene.world.ledger.down = False
+        scene.harness.ledger.down = False
 
 
 # --- graphs that were begun just now ----------------------------------------------------------
 
 
-def _their_start(scene: Scene) -> None:
+def _their_start(scene: RobotsInNetwork) -> None:
     text = codec.write(PATROL)
-    scene.air.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "terminal")
+    scene.network.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "terminal")
 
 
 @pytest.mark.parametrize("after_s", [0.1, 1.0, 5.0])
 @virtual
 async def test_a_graph_that_somebody_started_a_moment_ago_is_stopped(after_s: float) -> None:
-    scene = Scene(4)
+    scene = RobotsInNetwork(4)
     async with scene.played() as control:
         await anyio.sleep(45)
         _their_start(scene)
         await anyio.sleep(after_s)
         control.stop_all(BEN)
         await until(lambda: scene.nodes["David"].robot.moving == (), patience=5)
-        await until(lambda: not control.robots.silencing.going("David"))
+        await until(lambda: not control.robots.foreign_stops.going("David"))
 
 
 @virtual
 async def test_a_graph_that_somebody_started_is_shown_moving_a_second_later() -> None:
-    scene = Scene(4)
+    scene = RobotsInNetwork(4)
     async with scene.played() as control:
         await anyio.sleep(45)
         _their_start(scene)
@@ -96,7 +96,7 @@ async def test_a_graph_that_somebody_started_is_shown_moving_a_second_later() ->
 @virtual
 async def test_a_stop_of_it_that_is_pressed_again_goes_on_for_another_minute() -> None:
     david = Open(NEVER)
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         await _cleaning(david, "theirs")
         await anyio.sleep(15)
         david.loss = 1.0
@@ -105,7 +105,7 @@ async def test_a_stop_of_it_that_is_pressed_again_goes_on_for_another_minute() -
         control.stop_robot("David", BEN)
         await anyio.sleep(20)
         david.loss = 0.0
-        await until(lambda: not control.robots.silencing.going("David"))
+        await until(lambda: not control.robots.foreign_stops.going("David"))
         assert not await david.moving("cleaning")
 
 
@@ -133,7 +133,7 @@ class Lease:
         self._is_over = True
 
 
-class Leases(Fleet):
+class Leases(RegisteredRobots):
     """A reach that makes another link at each registration."""
 
     def link(self, registration: Registration, facts: EngineFacts) -> Link:
@@ -143,15 +143,17 @@ class Leases(Fleet):
 
 @virtual
 async def test_a_start_that_comes_while_its_robot_is_registered_anew_can_be_stopped() -> None:
-    world, david = World(), Open(NEVER)
+    harness, david = Harness(), Open(NEVER)
     robots = Robots(reach=Leases(David=david))
     async with (
-        Control.opened(world.ledger, robots, wall=wall, aside=at_once) as control,
+        ExecutionService.opened(
+            harness.ledger, robots, clock_us=clock_us, run_in_worker=at_once
+        ) as control,
         anyio.create_task_group() as tasks,
     ):
         await control.register(Registration(name="David"), ANN)
         await until(lambda: control.robots.robot("David").heard_at is not None)
-        world.ledger.slow = 1.0
+        harness.ledger.slow = 1.0
         tasks.start_soon(control.register, Registration(name="David", domain=3), BEN)
         await anyio.sleep(0.5)
         run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
@@ -165,7 +167,7 @@ async def test_a_start_that_comes_while_its_robot_is_registered_anew_can_be_stop
 @virtual
 async def test_a_robot_is_neither_changed_nor_forgotten_while_something_is_stopped_there() -> None:
     david = Open(NEVER)
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         await _cleaning(david, "theirs")
         await anyio.sleep(15)
         david.loss = 1.0
@@ -175,7 +177,7 @@ async def test_a_robot_is_neither_changed_nor_forgotten_while_something_is_stopp
         with pytest.raises(Conflict, match="being stopped"):
             await control.remove("David", BEN)
         david.loss = 0.0
-        await until(lambda: not control.robots.silencing.going("David"))
+        await until(lambda: not control.robots.foreign_stops.going("David"))
         await control.remove("David", BEN)
 
 
@@ -194,9 +196,9 @@ class Slow(Open):
 @virtual
 async def test_stopping_a_robot_catches_a_start_there_that_is_being_stored_and_no_other() -> None:
     david, eve = Open(NEVER), Open(NEVER)
-    world = World()
-    async with fleet(world, David=david, Eve=eve) as control, anyio.create_task_group() as tasks:
-        world.ledger.slow = 1.0
+    harness = Harness()
+    async with fleet(harness, David=david, Eve=eve) as control, anyio.create_task_group() as tasks:
+        harness.ledger.slow = 1.0
         for name in ("David", "Eve"):
             tasks.start_soon(control.start, order(sequence(), engine=name), ANN)
         await anyio.sleep(0.5)
@@ -211,8 +213,8 @@ async def test_stopping_a_robot_catches_a_start_there_that_is_being_stored_and_n
 @virtual
 async def test_stopping_a_group_catches_those_of_its_robots_that_are_still_to_start() -> None:
     david, eve = Slow(NEVER), Open(NEVER)
-    world = World()
-    async with fleet(world, David=david, Eve=eve) as control, anyio.create_task_group() as tasks:
+    harness = Harness()
+    async with fleet(harness, David=david, Eve=eve) as control, anyio.create_task_group() as tasks:
         tasks.start_soon(control.start_group, group(sequence(), "David", "Eve"), ANN)
         await until(lambda: bool(control.open))
         (first,) = control.open.values()
@@ -229,7 +231,7 @@ async def test_stopping_a_group_catches_those_of_its_robots_that_are_still_to_st
 @virtual
 async def test_a_start_that_is_being_handed_over_holds_up_no_stop() -> None:
     david = Slow(NEVER)
-    async with fleet(World(), David=david) as control, anyio.create_task_group() as tasks:
+    async with fleet(Harness(), David=david) as control, anyio.create_task_group() as tasks:
         tasks.start_soon(control.start, order(sequence(), engine="David"), ANN)
         await until(lambda: bool(control.open))
         (run,) = control.open

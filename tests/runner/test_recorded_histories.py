@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.runner.runs import ENDED, Run, key_of
+from action_assistant.runner.runs.fold import key_of
+from action_assistant.runner.runs.run import ENDED, Run
 from runner.recorded import Index, Told, history, index_of
 from support.recordings import facts, family
 

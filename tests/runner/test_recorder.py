@@ -2,9 +2,9 @@
 
 import anyio
 
-from action_assistant.runner.events import AlarmRaised
-from action_assistant.runner.recorder import Recorder, stream_of
-from runner.world import MemoryLedger, until, virtual
+from action_assistant.runner.runs.events import AlarmRaised
+from action_assistant.runner.runs.recorder import RunRecorder, stream_of
+from runner.harness import MemoryLedger, until, virtual
 
 
 def alarm(number: int) -> AlarmRaised:
@@ -18,7 +18,7 @@ def written(ledger: MemoryLedger) -> list[str]:
 @virtual
 async def test_events_are_stored_in_the_order_in_which_they_were_told() -> None:
     ledger = MemoryLedger()
-    pen = Recorder(ledger, "r", 0)
+    pen = RunRecorder(ledger, "r", 0)
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(pen.run)
         for number in range(1_200):
@@ -35,7 +35,7 @@ async def test_events_are_stored_in_the_order_in_which_they_were_told() -> None:
 async def test_a_journal_that_fails_loses_nothing_and_is_told() -> None:
     ledger = MemoryLedger()
     states: list[bool] = []
-    pen = Recorder(ledger, "r", 0, lambda: states.append(pen.recorded))
+    pen = RunRecorder(ledger, "r", 0, lambda: states.append(pen.recorded))
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(pen.run)
         ledger.down = True
@@ -54,7 +54,7 @@ async def test_a_journal_that_fails_loses_nothing_and_is_told() -> None:
 @virtual
 async def test_a_commit_whose_answer_got_lost_is_not_repeated() -> None:
     ledger = MemoryLedger()
-    pen = Recorder(ledger, "r", 0)
+    pen = RunRecorder(ledger, "r", 0)
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(pen.run)
         ledger.forgetful = True
@@ -73,7 +73,7 @@ async def test_a_commit_whose_answer_got_lost_is_not_repeated() -> None:
 async def test_telling_never_waits_for_a_slow_journal() -> None:
     ledger = MemoryLedger()
     ledger.slow = 5.0
-    pen = Recorder(ledger, "r", 0)
+    pen = RunRecorder(ledger, "r", 0)
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(pen.run)
         began = anyio.current_time()

@@ -8,10 +8,10 @@ import msgspec
 import pytest
 
 from action_assistant.errors import NotFound
+from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, Feedback
-from action_assistant.runner.recordings import FeedbackLine, GetLine, Recordings
-from action_assistant.runner.seen import Snapshot
-from runner.world import at_once, live_through
+from action_assistant.runner.robots.recordings import FeedbackLine, GetLine, Recordings
+from runner.harness import at_once, run_in_virtual_time
 
 HOUR = 3_600_000_000
 DAY = 24 * HOUR
@@ -37,7 +37,7 @@ def kept(folder: Path, *said: Answer | Feedback, **limits: int) -> Recordings:
                 await anyio.sleep(5)
             tasks.cancel_scope.cancel()
 
-    live_through(live)
+    run_in_virtual_time(live)
     return recordings
 
 
@@ -79,4 +79,4 @@ def test_only_recordings_are_given_out(tmp_path: Path) -> None:
         with pytest.raises(NotFound):
             await recordings.file("David", "../secret")
 
-    live_through(ask)
+    run_in_virtual_time(ask)

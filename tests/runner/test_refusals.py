@@ -7,37 +7,37 @@ import anyio
 import msgspec
 import pytest
 
-from action_assistant.runner.control import Control
-from action_assistant.runner.events import Override
-from action_assistant.runner.refusals import StartLog, why_refused
-from action_assistant.runner.runs import Run
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Index, Quirks, Start
-from action_assistant.umrf import codec
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EmulatedIndex, EngineTraits, Start
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.refusals import StartLog, why_refused
+from action_assistant.runner.runs.run import Run
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter, Signature
 from action_assistant.umrf.semantics import script_from
-from runner.air import Node, now, now_ms
-from runner.scene import PATHS, Scene
-from runner.world import ANN, BEN, ended, order, sequence, until, virtual
+from runner.fake_network import Node, now, now_ms
+from runner.harness import ANN, BEN, ended, order, sequence, until, virtual
+from runner.robots_in_network import PATHS, RobotsInNetwork
 
 CODES = ("quiet", "others", "actions", "actors", "H7", "unknown-action", "signature")
 PATROL = sequence("patrol")
 
 
-class Knowing(Scene):
+class Knowing(RobotsInNetwork):
     """Robots that know one action, and not that of patrols."""
 
     def robot(self, name: str) -> Node:
         """An engine comes up."""
-        stand_in = StandIn(
+        stand_in = EmulatedEngine(
             name,
-            index=Index(actions={"Wave": Signature()}),
+            index=EmulatedIndex(actions={"Wave": Signature()}),
             script=script_from({"behaviours": self.script}),
             quirks=self.quirks,
             seed=self.chance.getrandbits(32),
             born_ms=now_ms(),
         )
-        return self.air.join(stand_in, PATHS[name])
+        return self.network.join(stand_in, PATHS[name])
 
 
 def asked(graph: Graph = PATROL, engine: str = "David") -> Any:
@@ -61,12 +61,12 @@ def of_another(graph: Graph = PATROL) -> Graph:
     return msgspec.structs.replace(graph, actions=(carols, *others))
 
 
-async def told(scene: Scene, control: Control, request: Any) -> Run:
+async def told(scene: RobotsInNetwork, control: ExecutionService, request: Any) -> Run:
     """A start that the engine refuses, once it is over; it never begins anything."""
     run = (await control.start(request, ANN)).run
     assert await ended(control, run.id) == "refused", control.open.get(run.id)
     assert not any(node.robot.moving for node in scene.nodes.values())
-    return scene.world.ledger.history(run.id)
+    return scene.harness.ledger.history(run.id)
 
 
 @virtual
@@ -95,7 +95,7 @@ async def test_a_graph_that_is_held_and_was_never_begun_is_refused_although_nobo
     None
 ):
     """H7: no word anywhere; the answers show a graph that the engine holds and has not begun."""
-    scene = Scene(3)
+    scene = RobotsInNetwork(3)
     async with scene.played() as control:
         run = await told(scene, control, asked(lacking()))
     assert "speed" in run.detail
@@ -107,7 +107,7 @@ async def test_a_graph_that_is_held_and_was_never_begun_is_refused_although_nobo
 async def test_a_broken_graph_that_stays_in_the_engine_is_refused_with_the_words_of_the_log() -> (
     None
 ):
-    scene = Scene(4)
+    scene = RobotsInNetwork(4)
     async with scene.played() as control:
         run = await told(scene, control, asked(of_another()))
     assert "actor synchronizer not initialized" in run.detail
@@ -116,7 +116,7 @@ async def test_a_broken_graph_that_stays_in_the_engine_is_refused_with_the_words
 @virtual
 async def test_without_a_word_an_engine_that_does_not_show_the_run_has_refused_nothing() -> None:
     """The start may still be under way: unknown, and Stop stays."""
-    scene = Knowing(5, quirks=Quirks(narrates=False))
+    scene = Knowing(5, quirks=EngineTraits(narrates=False))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run
         await anyio.sleep(20)
@@ -137,16 +137,16 @@ async def test_where_two_engines_speak_nobodys_words_are_taken_for_a_refusal() -
 @virtual
 async def test_words_about_the_start_of_somebody_else_refuse_nothing_of_ours() -> None:
     """A stranger starts a running graph of that name: the engine refuses theirs."""
-    scene = Scene(7)
+    scene = RobotsInNetwork(7)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run
         await anyio.sleep(1)
         text = codec.write(PATROL)
-        scene.air.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "cli")
+        scene.network.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "cli")
         await ended(control, run.id)
-    codes = [each.code for each in scene.world.ledger.history(run.id).alarms]
+    codes = [each.code for each in scene.harness.ledger.history(run.id).alarms]
     assert codes == ["foreign_start"]
-    assert scene.world.ledger.history(run.id).end == "stopped"
+    assert scene.harness.ledger.history(run.id).end == "stopped"
 
 
 @virtual
@@ -165,14 +165,14 @@ async def test_the_words_of_a_refusal_outlive_the_runner() -> None:
     scene = Knowing(9)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run
-        scene.air.loss = {"get": 1.0}
+        scene.network.loss = {"get": 1.0}
         await anyio.sleep(0.5)
         assert control.open[run.id].run.alarms[0].code == "start_refused"
         await anyio.sleep(5)
-    scene.air.loss = {}
+    scene.network.loss = {}
     async with scene.played() as control:
         assert await ended(control, run.id) == "refused"
-    assert "Could not resolve" in scene.world.ledger.history(run.id).detail
+    assert "Could not resolve" in scene.harness.ledger.history(run.id).detail
 
 
 @virtual
@@ -183,13 +183,13 @@ async def test_words_that_somebody_else_may_have_caused_end_nothing_after_a_rest
     text = codec.write(sequence("other"))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run
-        scene.air.loss = {"get": 1.0}
+        scene.network.loss = {"get": 1.0}
         await anyio.sleep(0.5)
-        scene.air.carry(Start(graph_name="other", targets=("David",), graph_json=text), "cli")
+        scene.network.carry(Start(graph_name="other", targets=("David",), graph_json=text), "cli")
         await anyio.sleep(5)
         codes = [each.code for each in control.open[run.id].run.alarms]
         assert codes == ["start_refused", "foreign_other"]
-    scene.air.loss = {}
+    scene.network.loss = {}
     for _ in range(2):
         async with scene.played() as control:
             await anyio.sleep(15)

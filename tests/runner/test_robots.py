@@ -9,10 +9,8 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
-from action_assistant.runner import archive
-from action_assistant.runner.control import Control
-from action_assistant.runner.events import EngineSaid, Override
-from action_assistant.runner.flight import Commanded, EngineBecame, StopWasProven
+from action_assistant.runner.api.live import Hub
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import (
     Candidate,
     EngineRefused,
@@ -20,23 +18,27 @@ from action_assistant.runner.links.port import (
     Order,
     Registration,
 )
-from action_assistant.runner.live import Hub
-from action_assistant.runner.preflight import Preflight
-from action_assistant.runner.robots import Robots
-from action_assistant.runner.starting import GroupRequest
-from action_assistant.umrf import codec
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.robots.robot_events import Commanded, EngineBecame, StopWasProven
+from action_assistant.runner.runs import queries
+from action_assistant.runner.runs.events import EngineSaid, Override
+from action_assistant.runner.start.preflight import Preflight
+from action_assistant.runner.start.start_checks import GroupRequest
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
-from runner.fleet import Fleet, Open, given
-from runner.world import ANN, BEN, World, at_once, order, sequence, until, virtual, wall
+from runner.harness import ANN, BEN, Harness, at_once, clock_us, order, sequence, until, virtual
+from runner.registered_robots import Open, RegisteredRobots, given
 
 NEVER = {"*": [{"never": True}]}
 
 
 @asynccontextmanager
-async def fleet(world: World, **robots: Open) -> AsyncIterator[Control]:
+async def fleet(harness: Harness, **robots: Open) -> AsyncIterator[ExecutionService]:
     """A runner that knows these robots, after they have answered for the first time."""
-    reach = Robots(reach=Fleet(**robots))
-    async with Control.opened(world.ledger, reach, wall=wall, aside=at_once) as control:
+    reach = Robots(reach=RegisteredRobots(**robots))
+    async with ExecutionService.opened(
+        harness.ledger, reach, clock_us=clock_us, run_in_worker=at_once
+    ) as control:
         for name in robots:
             await control.register(Registration(name=name), ANN)
         await until(lambda: all(control.robots.robot(name).heard_at for name in robots))
@@ -60,7 +62,7 @@ def verdicts(look: Preflight) -> dict[str, str]:
 
 @virtual
 async def test_a_robot_that_answers_says_so_and_what_it_has() -> None:
-    async with fleet(World(), David=Open()) as control:
+    async with fleet(Harness(), David=Open()) as control:
         robot = control.robots.robot("David")
         assert (robot.state, robot.why, robot.actions, robot.servers) == ("answering", "", 1, 1)
         index = await control.robots.index("David")
@@ -69,8 +71,8 @@ async def test_a_robot_that_answers_says_so_and_what_it_has() -> None:
 
 @virtual
 async def test_each_beat_tells_when_an_idle_robot_answered_although_nothing_has_changed() -> None:
-    async with fleet(World(), David=Open()) as control:
-        hub = Hub(control, wall)
+    async with fleet(Harness(), David=Open()) as control:
+        hub = Hub(control, clock_us)
         changes: list[None] = []
         control.watch_robots(lambda: changes.append(None))
         first = msgspec.json.decode(hub.beat())["heard"]["David"]
@@ -82,7 +84,7 @@ async def test_each_beat_tells_when_an_idle_robot_answered_although_nothing_has_
 @virtual
 async def test_somebody_who_joins_the_domain_is_shown_without_a_word_of_the_engine() -> None:
     david = Open()
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         told: list[int] = []
         control.watch_robots(lambda: told.append(control.robots.robot("David").others))
         david.others = 1
@@ -92,7 +94,7 @@ async def test_somebody_who_joins_the_domain_is_shown_without_a_word_of_the_engi
 @virtual
 async def test_a_robot_that_falls_silent_is_busy_and_one_that_left_is_gone() -> None:
     david = Open()
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         david.silent = True
         await until(lambda: control.robots.robot("David").state == "busy")
         assert "does not answer" in control.robots.robot("David").why
@@ -101,7 +103,7 @@ async def test_a_robot_that_falls_silent_is_busy_and_one_that_left_is_gone() -> 
         david.silent = False
         david.become("answering", "")
         await until(lambda: control.robots.robot("David").state == "answering")
-        told = [event for _, event in await control.robots.flight.newest("David", 99)]
+        told = [event for _, event in await control.robots.robot_log.newest("David", 99)]
     states = [event.state for event in told if isinstance(event, EngineBecame)]
     assert states.index("busy") < states.index("gone")
     assert states[-1] == "answering"
@@ -110,7 +112,7 @@ async def test_a_robot_that_falls_silent_is_busy_and_one_that_left_is_gone() -> 
 @virtual
 async def test_an_engine_that_came_back_is_called_restarted() -> None:
     david = Open()
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         david.engine = Open().engine
         await until(lambda: control.robots.robot("David").state == "restarted")
         assert control.robots.robot("David").restarted_at is not None
@@ -118,9 +120,9 @@ async def test_an_engine_that_came_back_is_called_restarted() -> None:
 
 @virtual
 async def test_a_changed_profile_makes_another_link_and_a_removed_robot_is_unknown() -> None:
-    reach = Fleet(David=Open())
-    async with Control.opened(
-        World().ledger, Robots(reach=reach), wall=wall, aside=at_once
+    reach = RegisteredRobots(David=Open())
+    async with ExecutionService.opened(
+        Harness().ledger, Robots(reach=reach), clock_us=clock_us, run_in_worker=at_once
     ) as control:
         await control.register(Registration(name="David"), ANN)
         await control.register(Registration(name="David", profile={"pauses_safely": True}), ANN)
@@ -143,7 +145,7 @@ def test_what_cannot_be_registered_is_refused_with_its_place(
 ) -> None:
     @virtual
     async def asked() -> None:
-        async with fleet(World()) as control:
+        async with fleet(Harness()) as control:
             with pytest.raises(BadInput) as refused:
                 await control.register(registration, ANN)
             assert refused.value.where == {"path": path}
@@ -153,7 +155,7 @@ def test_what_cannot_be_registered_is_refused_with_its_place(
 
 @virtual
 async def test_a_robot_with_a_run_is_neither_changed_nor_forgotten() -> None:
-    async with fleet(World(), David=Open(NEVER)) as control:
+    async with fleet(Harness(), David=Open(NEVER)) as control:
         await control.start(order(sequence(), engine="David"), ANN)
         with pytest.raises(Conflict, match="stop it first"):
             await control.remove("David", ANN)
@@ -163,22 +165,24 @@ async def test_a_robot_with_a_run_is_neither_changed_nor_forgotten() -> None:
 
 @virtual
 async def test_registered_robots_are_known_after_a_restart_and_removed_ones_are_not() -> None:
-    world = World()
-    async with fleet(world, David=Open(), Eve=Open()) as control:
+    harness = Harness()
+    async with fleet(harness, David=Open(), Eve=Open()) as control:
         await control.remove("Eve", ANN)
-    again = Robots(reach=Fleet(David=Open()))
-    async with Control.opened(world.ledger, again, wall=wall, aside=at_once) as control:
+    again = Robots(reach=RegisteredRobots(David=Open()))
+    async with ExecutionService.opened(
+        harness.ledger, again, clock_us=clock_us, run_in_worker=at_once
+    ) as control:
         assert [robot.name for robot in control.robots.all()] == ["simulator", "David"]
 
 
 @virtual
 async def test_candidates_are_those_that_nobody_registered() -> None:
-    reach = Fleet(David=Open())
+    reach = RegisteredRobots(David=Open())
     seen = Candidate(domain=0, rmw="x", get_service="/umrf_graph_get")
     other = Candidate(domain=3, rmw="x", get_service="/eve/umrf_graph_get", actor="Eve")
     reach.sight = (seen, other)
-    async with Control.opened(
-        World().ledger, Robots(reach=reach), wall=wall, aside=at_once
+    async with ExecutionService.opened(
+        Harness().ledger, Robots(reach=reach), clock_us=clock_us, run_in_worker=at_once
     ) as control:
         assert await control.robots.candidates() == (seen, other)
         await control.register(Registration(name="David"), ANN)
@@ -191,7 +195,7 @@ async def test_candidates_are_those_that_nobody_registered() -> None:
 @virtual
 async def test_a_sound_robot_passes_every_item_and_the_look_sends_nothing() -> None:
     david = Open()
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         asked = group(sequence(), "David", digest="")
         (look,) = await control.look(asked)
         assert set(verdicts(look).values()) == {"passed"}
@@ -208,7 +212,7 @@ def test_what_stands_in_the_way_is_shown_and_refused_alike(code: str, *, overrid
     @virtual
     async def asked() -> None:
         david, graph = Open(), sequence()
-        async with fleet(World(), David=david) as control:
+        async with fleet(Harness(), David=david) as control:
             match code:
                 case "answers":
                     david.silent = True
@@ -243,16 +247,16 @@ def test_what_stands_in_the_way_is_shown_and_refused_alike(code: str, *, overrid
 @virtual
 async def test_a_graph_of_somebody_else_is_in_the_way_until_it_is_stopped() -> None:
     david = Open(NEVER)
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         await david.engine.start(Order(run="theirs", graph=sequence("cleaning"), umrf=""))
         (look,) = await control.look(group(sequence(), "David"))
         assert verdicts(look)["quiet"] == "blocked"
         (same,) = await control.look(group(sequence("cleaning"), "David"))
         assert same.never
         assert control.robots.silence(BEN, lambda _: ()) == ["David: cleaning"]
-        await until(lambda: not control.robots.silencing.going("David"))
+        await until(lambda: not control.robots.foreign_stops.going("David"))
         assert not await david.moving("cleaning")
-        told = [event for _, event in await control.robots.flight.newest("David", 9)]
+        told = [event for _, event in await control.robots.robot_log.newest("David", 9)]
         assert isinstance(told[-1], StopWasProven)
         (look,) = await control.look(group(sequence(), "David"))
         assert verdicts(look)["quiet"] == "passed"
@@ -262,7 +266,7 @@ async def test_a_graph_of_somebody_else_is_in_the_way_until_it_is_stopped() -> N
 async def test_a_graph_of_its_own_index_is_never_started_under_the_same_name() -> None:
     david = Open()
     david.known_graphs = (codec.write(sequence("patrol")),)
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         (look,) = await control.look(group(sequence("patrol"), "David"))
         assert look.never
         with pytest.raises(Conflict, match="its own index"):
@@ -278,7 +282,7 @@ async def test_the_simulator_that_plays_a_robot_refuses_what_the_robot_would() -
         for action, actor in ((first, "David"), (second, "Eve"))
     )
     graph = msgspec.structs.replace(graph, actions=both)
-    async with fleet(World(), David=Open()) as control:
+    async with fleet(Harness(), David=Open()) as control:
         with pytest.raises(Conflict, match="synchronise"):
             await control.start(order(graph, like="David"), ANN)
         await control.register(Registration(name="David", profile={"synchronises": True}), ANN)
@@ -295,22 +299,22 @@ def change(graph: Graph) -> bytes:
 
 @virtual
 async def test_a_running_graph_takes_another_version_where_pausing_is_safe() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         script = {"*": [{"after_s": 2}]}
         run = (await control.start(order(sequence(actions=2), script=script), ANN)).run
         await anyio.sleep(1)
         changed = await control.modify(run.id, change(sequence(actions=3)), BEN)
         assert (changed.version, changed.digest) == ("v2", order(sequence(actions=3)).digest)
         await until(lambda: not control.open)
-    told = world.ledger.history(run.id)
+    told = harness.ledger.history(run.id)
     assert (told.state, told.version) == ("finished", "v2")
     assert [a.state for a in told.actions.values()] == ["FINISHED"] * 3
 
 
 @virtual
 async def test_elsewhere_a_change_is_refused_before_anything_is_read_or_sent() -> None:
-    async with fleet(World(), David=Open(NEVER)) as control:
+    async with fleet(Harness(), David=Open(NEVER)) as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await until(lambda: control.open[run.id].run.state == "running")
         with pytest.raises(Conflict, match="not safe on David"):
@@ -330,8 +334,8 @@ def test_a_change_that_was_not_made_leaves_the_version_that_runs(why: Exception)
 
     @virtual
     async def asked() -> None:
-        david, world = Refuses(NEVER), World()
-        async with fleet(world, David=david) as control:
+        david, harness = Refuses(NEVER), Harness()
+        async with fleet(harness, David=david) as control:
             run = (await control.start(order(sequence(), engine="David"), ANN)).run
             david.texts = {run.graph_name: codec.write(sequence())}
             await until(lambda: control.open[run.id].run.state == "running")
@@ -347,7 +351,7 @@ def test_a_change_that_was_not_made_leaves_the_version_that_runs(why: Exception)
             assert now.alarms == ()
             control.stop_all(ANN)
             await until(lambda: not control.open)
-        assert world.ledger.history(run.id).version == "v1"
+        assert harness.ledger.history(run.id).version == "v1"
 
     asked()
 
@@ -359,8 +363,10 @@ async def test_a_change_that_was_read_while_the_run_was_stopped_is_not_sent() ->
         await anyio.sleep(1)
         return work(*args)
 
-    world = World()
-    async with Control.opened(world.ledger, Robots(), wall=wall, aside=slowly) as control:
+    harness = Harness()
+    async with ExecutionService.opened(
+        harness.ledger, Robots(), clock_us=clock_us, run_in_worker=slowly
+    ) as control:
         run = (await control.start(order(sequence(), script=NEVER), ANN)).run
         await anyio.sleep(1)
         async with anyio.create_task_group() as tasks:
@@ -373,13 +379,13 @@ async def test_a_change_that_was_read_while_the_run_was_stopped_is_not_sent() ->
             await anyio.sleep(0.5)
             await control.stop(run.id, BEN)
         await until(lambda: not control.open)
-    told = world.ledger.history(run.id)
+    told = harness.ledger.history(run.id)
     assert (told.state, told.version) == ("stopped", "v1")
 
 
 @virtual
 async def test_a_graph_of_another_name_cannot_take_the_place_of_a_run() -> None:
-    async with World().runner() as control:
+    async with Harness().runner() as control:
         run = (await control.start(order(sequence(), script=NEVER), ANN)).run
         await anyio.sleep(1)
         with pytest.raises(Conflict, match="cannot take its place"):
@@ -394,8 +400,8 @@ async def test_a_graph_of_another_name_cannot_take_the_place_of_a_run() -> None:
 @virtual
 async def test_a_group_starts_together_and_is_stopped_together() -> None:
     david, eve = Open(NEVER), Open(NEVER)
-    world = World()
-    async with fleet(world, David=david, Eve=eve) as control:
+    harness = Harness()
+    async with fleet(harness, David=david, Eve=eve) as control:
         started = await control.start_group(group(sequence(), "Eve", "David"), ANN)
         assert [run.engine for run in started.runs] == ["David", "Eve"]
         assert {run.group for run in started.runs} == {started.group}
@@ -406,19 +412,19 @@ async def test_a_group_starts_together_and_is_stopped_together() -> None:
         assert sorted(stopped) == sorted(run.id for run in started.runs)
         await until(lambda: not control.open)
     for run in started.runs:
-        told = world.ledger.history(run.id)
+        told = harness.ledger.history(run.id)
         assert (told.state, told.group) == ("stopped", started.group)
 
 
 @virtual
 async def test_a_start_that_is_under_way_says_so_until_its_runs_are_there() -> None:
-    world = World()
-    async with fleet(world, David=Open(NEVER), Eve=Open(NEVER)) as control:
+    harness = Harness()
+    async with fleet(harness, David=Open(NEVER), Eve=Open(NEVER)) as control:
         asked = group(sequence(), "David", "Eve")
-        world.ledger.slow = 1.0
+        harness.ledger.slow = 1.0
 
         async def found() -> list[str]:
-            rows = await control.history.rows(archive.of_start(asked.request_id))
+            rows = await control.history.rows(queries.of_start(asked.request_id))
             return sorted([(await control.find(row.id)).engine for row in rows])
 
         async with anyio.create_task_group() as tasks:
@@ -434,7 +440,7 @@ async def test_a_start_that_is_under_way_says_so_until_its_runs_are_there() -> N
 @virtual
 async def test_nothing_of_a_group_starts_when_one_robot_is_not_fit() -> None:
     david, eve = Open(), Open()
-    async with fleet(World(), David=david, Eve=eve) as control:
+    async with fleet(Harness(), David=david, Eve=eve) as control:
         eve.silent = True
         with pytest.raises(Conflict, match="Eve does not answer"):
             await control.start_group(group(sequence(), "David", "Eve"), ANN)
@@ -443,21 +449,21 @@ async def test_nothing_of_a_group_starts_when_one_robot_is_not_fit() -> None:
 
 @virtual
 async def test_a_group_that_starts_in_part_says_which_robot_was_left_out() -> None:
-    world, eve = World(), Open(NEVER)
+    harness, eve = Harness(), Open(NEVER)
 
     class Breaks(Open):
         async def start(self, order: Order) -> None:
             """The disk is full right after it."""
-            world.ledger.down = True
+            harness.ledger.down = True
             await super().start(order)
 
     david = Breaks(NEVER)
-    async with fleet(world, David=david, Eve=eve) as control:
+    async with fleet(harness, David=david, Eve=eve) as control:
         started = await control.start_group(group(sequence(), "David", "Eve"), ANN)
         assert [run.engine for run in started.runs] == ["David"]
         assert "could not be recorded" in started.failed["Eve"]
         assert eve.starts == []
-        world.ledger.down = False
+        harness.ledger.down = False
         control.stop_all(ANN)
         await until(lambda: not control.open)
 
@@ -468,7 +474,7 @@ async def test_a_group_that_starts_in_part_says_which_robot_was_left_out() -> No
 @virtual
 async def test_a_start_of_somebody_else_is_recorded_with_its_graph_and_the_run_it_stopped() -> None:
     david = Open(NEVER)
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         text = codec.write(sequence())
         david.command("start", run.graph_name, text)
@@ -476,19 +482,19 @@ async def test_a_start_of_somebody_else_is_recorded_with_its_graph_and_the_run_i
         await anyio.sleep(1)
         ((seq, told),) = [
             (seq, event)
-            for seq, event in await control.robots.flight.newest("David", 9)
+            for seq, event in await control.robots.robot_log.newest("David", 9)
             if isinstance(event, Commanded)
         ]
         assert (told.command, told.run, told.number) == ("start", run.id, run.number)
-        assert await control.robots.flight.graph("David", seq) == text
+        assert await control.robots.robot_log.graph("David", seq) == text
         control.stop_all(ANN)
         await until(lambda: not control.open)
 
 
 @virtual
 async def test_the_log_of_the_engine_is_kept_with_the_run_and_proves_nothing() -> None:
-    david, world = Open(NEVER), World()
-    async with fleet(world, David=david) as control:
+    david, harness = Open(NEVER), Harness()
+    async with fleet(harness, David=david) as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await anyio.sleep(2)
         david.log("UMRF graph 'sequence' stopped.", run.graph_name)
@@ -496,14 +502,14 @@ async def test_the_log_of_the_engine_is_kept_with_the_run_and_proves_nothing() -
         assert control.open[run.id].run.state == "running"
         control.stop_all(ANN)
         await until(lambda: not control.open)
-    said = [each.text for each in world.ledger.told(run.id) if isinstance(each, EngineSaid)]
+    said = [each.text for each in harness.ledger.told(run.id) if isinstance(each, EngineSaid)]
     assert said == ["UMRF graph 'sequence' stopped."]
 
 
 @virtual
 async def test_an_engine_that_shows_another_graph_raises_an_alarm_and_goes_on() -> None:
     david = Open(NEVER)
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         david.texts = {sequence().name: codec.write(sequence(actions=2))}
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await until(lambda: bool(control.open[run.id].run.alarms))
@@ -517,8 +523,8 @@ async def test_an_engine_that_shows_another_graph_raises_an_alarm_and_goes_on() 
 
 @virtual
 async def test_with_two_engines_on_one_path_nothing_is_called_stopped() -> None:
-    david, world = Open(NEVER), World()
-    async with fleet(world, David=david) as control:
+    david, harness = Open(NEVER), Harness()
+    async with fleet(harness, David=david) as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await anyio.sleep(2)
         david.servers = 2
@@ -529,4 +535,4 @@ async def test_with_two_engines_on_one_path_nothing_is_called_stopped() -> None:
         assert any("2 engines" in alarm.text for alarm in now.alarms)
         david.servers = 1
         await until(lambda: not control.open)
-    assert world.ledger.history(run.id).state == "stopped"
+    assert harness.ledger.history(run.id).state == "stopped"

@@ -5,7 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.runner.events import (
+from action_assistant.runner.links.observations import (
+    GraphResult,
+    GraphState,
+    Hazard,
+    NodeResult,
+    NodeState,
+    Seen,
+    Snapshot,
+)
+from action_assistant.runner.runs.events import (
     AlarmRaised,
     Answered,
     Author,
@@ -24,17 +33,9 @@ from action_assistant.runner.events import (
     decode,
     encode,
 )
-from action_assistant.runner.runs import Run, begin, follow, replay
-from action_assistant.runner.seen import (
-    GraphResult,
-    GraphState,
-    Hazard,
-    NodeResult,
-    NodeState,
-    Seen,
-    Snapshot,
-)
-from action_assistant.runner.visits import KEPT, MOMENT_US
+from action_assistant.runner.runs.fold import begin, follow, replay
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import KEPT, MOMENT_US
 from action_assistant.umrf.laps import Laps
 
 ANN = Author("ann", "Ann")

@@ -7,15 +7,15 @@ import anyio
 import msgspec
 import pytest
 
-from action_assistant.runner.control import Control
-from action_assistant.runner.events import Override
-from action_assistant.runner.review.cause import causes
-from action_assistant.runner.review.cause_words import words
-from action_assistant.runner.runs import Run
+from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.causes import causes
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.model import ENTRY, Conditions, Graph, Parameter, Relation
-from runner.scene import Scene
-from runner.test_parts import WithSub, named
-from runner.world import ANN, BEN, GO_ON, ended, order, sequence, two_ends, virtual
+from runner.harness import ANN, BEN, GO_ON, ended, order, sequence, two_ends, virtual
+from runner.robots_in_network import RobotsInNetwork
+from runner.test_sub_graphs import WithSub, named
 
 CODES = ("quiet", "others", "actions", "actors", "H2b", "H5", "H7", "unknown-action", "H8", "H12")
 QUICK: dict[str, Any] = {"*": [{"after_s": 0.5}]}
@@ -60,7 +60,7 @@ MAYBE = answering(sequence("patrol", 2), 0, 1, Conditions(on_true="run", on_fals
 HALTS = answering(sequence("Sub", 2), 0, 1, Conditions())
 
 
-async def stalled(control: Control, graph: Graph, seconds: float = 25.0) -> str:
+async def stalled(control: ExecutionService, graph: Graph, seconds: float = 25.0) -> str:
     run = (await control.start(asked(graph), ANN)).run.id
     await anyio.sleep(seconds)
     return run
@@ -78,7 +78,7 @@ async def stalled(control: Control, graph: Graph, seconds: float = 25.0) -> str:
 async def test_what_a_run_in_which_nothing_moves_waits_for_is_said_once_and_is_its_cause(
     graph: Graph, waits: str
 ) -> None:
-    scene = Scene(1, script=QUICK)
+    scene = RobotsInNetwork(1, script=QUICK)
     async with scene.played() as control:
         run = await stalled(control, graph)
         (alarm,) = control.open[run].run.alarms
@@ -87,7 +87,7 @@ async def test_what_a_run_in_which_nothing_moves_waits_for_is_said_once_and_is_i
         assert waits in alarm.text
         await control.stop(run, BEN)
         assert await ended(control, run) == "stopped"
-    found = scene.world.ledger.history(run)
+    found = scene.harness.ledger.history(run)
     named = causes(found, graph)
     assert [each.action for each in named] == ["Work_1"], named
     assert named[0].at == found.alarms[0].at
@@ -96,7 +96,7 @@ async def test_what_a_run_in_which_nothing_moves_waits_for_is_said_once_and_is_i
 
 @virtual
 async def test_an_arrow_that_may_have_answered_otherwise_is_told_as_a_possibility() -> None:
-    scene = Scene(2, script={"*": [{"after_s": 0.5, "result": "on_false"}]})
+    scene = RobotsInNetwork(2, script={"*": [{"after_s": 0.5, "result": "on_false"}]})
     async with scene.played() as control:
         run = await stalled(control, MAYBE)
         (alarm,) = control.open[run].run.alarms
@@ -105,27 +105,27 @@ async def test_an_arrow_that_may_have_answered_otherwise_is_told_as_a_possibilit
 
 @virtual
 async def test_a_run_in_which_something_moves_raises_no_such_alarm() -> None:
-    scene = Scene(3, script={"*": [{"after_s": 30}]})
+    scene = RobotsInNetwork(3, script={"*": [{"after_s": 30}]})
     async with scene.played() as control:
         run = await stalled(control, sequence("patrol", 2), 75)
         assert run not in control.open or not control.open[run].run.alarms
-    assert scene.world.ledger.history(run).alarms == ()
+    assert scene.harness.ledger.history(run).alarms == ()
 
 
 @virtual
 async def test_a_pause_between_two_actions_is_no_standstill() -> None:
-    from action_assistant.runner.standin_wire import Quirks
+    from action_assistant.runner.emulator.messages import EngineTraits
 
-    scene = Scene(4, quirks=Quirks(loading_ms=3_000.0), script=QUICK)
+    scene = RobotsInNetwork(4, quirks=EngineTraits(loading_ms=3_000.0), script=QUICK)
     async with scene.played() as control:
         run = (await control.start(asked(sequence("patrol", 3)), ANN)).run.id
         assert await ended(control, run) == "finished"
-    assert scene.world.ledger.history(run).alarms == ()
+    assert scene.harness.ledger.history(run).alarms == ()
 
 
 @virtual
 async def test_a_graph_that_has_finished_while_an_action_goes_on_is_no_standstill() -> None:
-    scene = Scene(5, script={"Work_0": [{"after_s": 0.5}], "*": [{"never": True}]})
+    scene = RobotsInNetwork(5, script={"Work_0": [{"after_s": 0.5}], "*": [{"never": True}]})
     async with scene.played() as control:
         run = await stalled(control, two_ends())
         assert not control.open[run].run.alarms
@@ -133,7 +133,7 @@ async def test_a_graph_that_has_finished_while_an_action_goes_on_is_no_standstil
 
 @virtual
 async def test_a_runner_that_takes_the_run_up_again_can_say_it_too() -> None:
-    scene = Scene(6, script=QUICK)
+    scene = RobotsInNetwork(6, script=QUICK)
     async with scene.played() as control:
         run = (await control.start(asked(LACKS), ANN)).run.id
         await anyio.sleep(2)
@@ -161,13 +161,13 @@ async def test_a_sub_graph_in_which_nothing_moves_is_named_and_stays_the_cause_a
         assert f"{told}: it is HALTED." in alarm.text
         await control.stop(run, BEN)
         assert await ended(control, run) == "stopped"
-    found = scene.world.ledger.history(run)
+    found = scene.harness.ledger.history(run)
     first, *_ = causes(found, graph)
     assert (first.action, words(first, found)) == ("Sub_0", f"{told}.")
 
 
 def test_an_entry_that_lacks_a_value_is_named_before_anything_ran() -> None:
-    from action_assistant.runner.stall import in_words, unbegun
+    from action_assistant.runner.runs.stall import in_words, unbegun
 
     (wait,) = unbegun(with_input(sequence("patrol", 2), 0))
     assert in_words(wait) == "Work_0 waits for its input “speed”, which has no value and gets none."

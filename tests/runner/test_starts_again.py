@@ -11,17 +11,17 @@ import msgspec
 import pytest
 
 from action_assistant.errors import Conflict, Refused
-from action_assistant.runner.events import Override
+from action_assistant.runner.emulator.messages import EngineTraits, Start, index_of
 from action_assistant.runner.links.port import Order
-from action_assistant.runner.standin_wire import Quirks, Start, index_of
-from action_assistant.umrf import codec
+from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph
-from runner.air import now_ms
-from runner.fleet import Open
-from runner.scene import PATHS, Scene, StandIn, script_from
+from runner.fake_network import now_ms
+from runner.harness import ANN, Harness, order, sequence, until, virtual
+from runner.registered_robots import Open
+from runner.robots_in_network import PATHS, EmulatedEngine, RobotsInNetwork, script_from
 from runner.test_robots import change, fleet, group, verdicts
-from runner.world import ANN, World, order, sequence, until, virtual
 
 WORK = codec.write_action(Action(key="work", name="Work"))
 INNER = sequence("Inner", 1)
@@ -35,23 +35,23 @@ def nested(name: str = "outer") -> Graph:
     return msgspec.structs.replace(graph, actions=actions)
 
 
-class Indexed(Scene):
+class Indexed(RobotsInNetwork):
     """Robots that have indexed an action and a graph."""
 
     def robot(self, name: str) -> Any:
         """An engine comes up, in a new life."""
-        stand_in = StandIn(
+        stand_in = EmulatedEngine(
             name,
             index=index_of([WORK], [codec.write(INNER)]),
             script=script_from({"behaviours": self.script}),
             quirks=self.quirks,
             born_ms=now_ms(),
         )
-        return self.air.join(stand_in, PATHS[name])
+        return self.network.join(stand_in, PATHS[name])
 
 
 def scene() -> Indexed:
-    return Indexed(1, quirks=Quirks(loss=0.0), script={"*": [{"after_s": 0.2}]})
+    return Indexed(1, quirks=EngineTraits(loss=0.0), script={"*": [{"after_s": 0.2}]})
 
 
 async def run(control: Any, graph: Graph) -> str:
@@ -64,8 +64,8 @@ async def run(control: Any, graph: Graph) -> str:
 
 @virtual
 async def test_a_graph_with_a_sub_graph_is_not_started_twice_in_one_life_of_its_engine() -> None:
-    air = scene()
-    async with air.played() as control:
+    network = scene()
+    async with network.played() as control:
         assert await run(control, nested()) == "finished"
         (look,) = await control.look(group(nested(), "David"))
         assert [each.code for each in look.items if each.verdict == "blocked"] == ["again"]
@@ -78,22 +78,22 @@ async def test_a_graph_with_a_sub_graph_is_not_started_twice_in_one_life_of_its_
         with pytest.raises(Conflict):
             await control.start(order(nested(), engine="David", override=override), ANN)
         await anyio.sleep(5)
-        assert not air.nodes["David"].robot.gone
-        assert len(air.starts()) == 1
+        assert not network.nodes["David"].robot.gone
+        assert len(network.starts()) == 1
 
 
 @virtual
 async def test_another_name_or_another_life_of_the_engine_is_the_way_out() -> None:
-    air = scene()
-    async with air.played() as control:
+    network = scene()
+    async with network.played() as control:
         assert await run(control, nested()) == "finished"
         assert await run(control, nested("other")) == "finished"
-        air.air.kill(air.nodes["David"])
+        network.network.kill(network.nodes["David"])
         await anyio.sleep(15)
-        air.nodes["David"] = air.robot("David")
+        network.nodes["David"] = network.robot("David")
         await anyio.sleep(5)
         assert await run(control, nested()) == "finished"
-        assert not air.nodes["David"].robot.gone
+        assert not network.nodes["David"].robot.gone
 
 
 @virtual
@@ -106,39 +106,43 @@ async def test_what_needs_no_looking_up_is_started_as_often_as_one_likes() -> No
 @virtual
 async def test_a_name_that_somebody_else_has_used_is_held_as_well() -> None:
     """Also a graph that the engine then has in its index no more, and one without sub-graphs."""
-    air = scene()
-    async with air.played() as control:
+    network = scene()
+    async with network.played() as control:
         text = codec.write(sequence("outer"))
-        air.air.carry(Start(graph_name="outer", targets=("David",), graph_json=text), "them")
+        network.network.carry(
+            Start(graph_name="outer", targets=("David",), graph_json=text), "them"
+        )
         await anyio.sleep(5)
         with pytest.raises(Conflict, match="does not look up Inner_0"):
             await run(control, nested())
         assert await run(control, sequence("outer")) == "finished"
-        assert not air.nodes["David"].robot.gone
+        assert not network.nodes["David"].robot.gone
 
 
 @virtual
 async def test_nothing_of_a_group_starts_when_one_of_its_engines_would_not_survive() -> None:
-    air = Indexed(1, "David", "Carol", quirks=Quirks(loss=0.0), script={"*": [{"after_s": 0.2}]})
-    async with air.played() as control:
+    network = Indexed(
+        1, "David", "Carol", quirks=EngineTraits(loss=0.0), script={"*": [{"after_s": 0.2}]}
+    )
+    async with network.played() as control:
         assert await run(control, nested()) == "finished"
         with pytest.raises(Conflict, match=r"David: .*does not look up Inner_0"):
             await control.start_group(group(nested(), "David", "Carol"), ANN)
-        assert len(air.starts()) == 1
+        assert len(network.starts()) == 1
 
 
 @virtual
 async def test_one_sub_graph_twice_is_refused_before_anything_is_sent() -> None:
-    air, graph = scene(), nested()
+    network, graph = scene(), nested()
     doubled = msgspec.structs.replace(graph.actions[2], name="Inner", instance_id=1)
     twice = msgspec.structs.replace(graph, actions=(*graph.actions[:2], doubled))
-    async with air.played() as control:
+    async with network.played() as control:
         (look,) = await control.look(group(twice, "David"))
         assert [each.code for each in look.items if each.verdict == "blocked"] == ["actions"]
         assert look.never
         with pytest.raises(Conflict, match="“Inner” comes a second time"):
             await run(control, twice)
-        assert air.starts() == []
+        assert network.starts() == []
 
 
 @virtual
@@ -147,7 +151,7 @@ async def test_an_action_that_nobody_knows_is_never_overridden_under_a_name_that
     david, graph = Open(), sequence("patrol", 2)
     stranger = msgspec.structs.replace(graph.actions[1], name="Nobody", instance_id=0)
     unknown = msgspec.structs.replace(graph, actions=(graph.actions[0], stranger))
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         (look,) = await control.look(group(unknown, "David"))
         assert (verdicts(look)["actions"], look.never) == ("blocked", False)
         assert await run(control, graph) == "finished"
@@ -161,7 +165,7 @@ async def test_an_engine_that_names_no_actions_is_judged_by_what_it_holds() -> N
     david.known_actions = ()
     inner = Order(run="theirs", graph=sequence("outer__Inner__0", 1), umrf="")
     outer = Order(run="theirs", graph=sequence("outer", 1), umrf="")
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         await david.engine.start(outer)
         await anyio.sleep(5)
         (look,) = await control.look(group(nested(), "David"))
@@ -175,7 +179,7 @@ async def test_an_engine_that_names_no_actions_is_judged_by_what_it_holds() -> N
 @virtual
 async def test_an_engine_that_looks_them_up_again_is_let_do_so() -> None:
     david = Open()
-    async with fleet(World(), David=david) as control:
+    async with fleet(Harness(), David=david) as control:
         robot = control.robots.reachable("David")
         assert await run(control, sequence("outer", 1)) == "finished"
         (look,) = await control.look(group(nested(), "David"))
@@ -199,7 +203,7 @@ def test_a_change_with_a_sub_graph_in_it_is_not_sent() -> None:
     @virtual
     async def asked() -> None:
         david = Pausing({"*": [{"never": True}]})
-        async with fleet(World(), David=david) as control:
+        async with fleet(Harness(), David=david) as control:
             started = (await control.start(order(sequence("outer"), engine="David"), ANN)).run
             await until(lambda: control.open[started.id].run.state == "running")
             with pytest.raises(Refused, match="does not look up Inner_0 in a change"):

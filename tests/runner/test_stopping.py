@@ -7,13 +7,13 @@ import msgspec
 import pytest
 
 from action_assistant.errors import NotFound
-from action_assistant.runner.events import Proof, StopSent
+from action_assistant.runner.runs.events import Proof, StopSent
 from action_assistant.umrf.model import Conditions
-from runner.world import (
+from runner.harness import (
     ANN,
     BEN,
+    Harness,
     Robot,
-    World,
     ended,
     engine,
     order,
@@ -26,15 +26,15 @@ from runner.world import (
 
 @virtual
 async def test_stop_is_proven_by_a_get_that_was_asked_after_it() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), script={"*": [{"never": True}]}), ANN)).run
         await anyio.sleep(1)
         assert await control.stop(run.id, BEN, "s1") == [run.id]
         assert await ended(control, run.id) == "stopped"
-    found = world.ledger.history(run.id)
+    found = harness.ledger.history(run.id)
     assert (found.stopped_by, found.desired, found.result) == (BEN, "stopped", "on_stopped")
-    kinds = [type(each) for each in world.ledger.told(run.id)]
+    kinds = [type(each) for each in harness.ledger.told(run.id)]
     assert kinds.index(StopSent) < kinds.index(Proof)
     assert found.proof_at is not None
     assert found.actions["Work_0"].visits[-1].result == "stopped"
@@ -43,27 +43,27 @@ async def test_stop_is_proven_by_a_get_that_was_asked_after_it() -> None:
 @virtual
 async def test_stop_does_not_wait_for_the_journal() -> None:
     robot = Robot(engine({"*": [{"never": True}]}))
-    world = World({"David": robot})
-    async with world.runner() as control:
+    harness = Harness({"David": robot})
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await anyio.sleep(1)
-        world.ledger.down = True
+        harness.ledger.down = True
         began = anyio.current_time()
         await control.stop(run.id, ANN)
         await until(lambda: bool(robot.stops))
         assert robot.stops[0][0] - began < 0.02
         await until(lambda: control.open[run.id].run.state == "stopped")
         assert not control.open[run.id].recorder.recorded
-        world.ledger.down = False
+        harness.ledger.down = False
         assert await ended(control, run.id) == "stopped"
-    assert world.ledger.history(run.id).state == "stopped"
+    assert harness.ledger.history(run.id).state == "stopped"
 
 
 @virtual
 async def test_stop_is_repeated_until_one_arrives() -> None:
     robot = Robot(engine({"*": [{"never": True}]}))
-    world = World({"David": robot})
-    async with world.runner() as control:
+    harness = Harness({"David": robot})
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await anyio.sleep(1)
         robot.loss = 0.8
@@ -77,8 +77,8 @@ async def test_stop_is_repeated_until_one_arrives() -> None:
 @virtual
 async def test_a_stop_without_proof_is_loud_and_goes_on() -> None:
     robot = Robot(engine({"*": [{"never": True}]}))
-    world = World({"David": robot})
-    async with world.runner() as control:
+    harness = Harness({"David": robot})
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await anyio.sleep(1)
         robot.silent = True
@@ -97,8 +97,8 @@ async def test_a_stop_without_proof_is_loud_and_goes_on() -> None:
 @virtual
 async def test_an_engine_that_holds_a_new_life_proves_nothing() -> None:
     robot = Robot(engine({"*": [{"never": True}]}))
-    world = World({"David": robot})
-    async with world.runner() as control:
+    harness = Harness({"David": robot})
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await anyio.sleep(1)
         robot.engine = engine()
@@ -115,23 +115,23 @@ async def test_a_start_that_got_lost_is_unknown_is_not_repeated_and_is_given_up_
 ):
     robot = Robot(engine())
     robot.start_loss = 1.0
-    world = World({"David": robot})
-    async with world.runner() as control:
+    harness = Harness({"David": robot})
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await anyio.sleep(120)
         assert control.open[run.id].run.state == "unknown"
         await control.stop(run.id, ANN)
         await until(lambda: control.open[run.id].run.state == "lost")
     assert len(robot.starts) == 1
-    assert world.ledger.history(run.id).proof_at is None
+    assert harness.ledger.history(run.id).proof_at is None
 
 
 @virtual
 async def test_stopping_everything_catches_a_start_that_is_being_stored() -> None:
     robot = Robot(engine())
-    world = World({"David": robot})
-    world.ledger.slow = 1.0
-    async with world.runner() as control, anyio.create_task_group() as tasks:
+    harness = Harness({"David": robot})
+    harness.ledger.slow = 1.0
+    async with harness.runner() as control, anyio.create_task_group() as tasks:
         answers = []
 
         async def ask() -> None:
@@ -148,40 +148,40 @@ async def test_stopping_everything_catches_a_start_that_is_being_stored() -> Non
 
 @virtual
 async def test_one_press_that_comes_by_two_ways_is_recorded_once() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), script={"*": [{"never": True}]}), ANN)).run
         await anyio.sleep(1)
         await control.stop(run.id, BEN, "press")
         await control.stop(run.id, BEN, "")
         await control.stop(run.id, BEN, "press")
         await ended(control, run.id)
-    kinds = [each.kind for each in world.ledger.told(run.id)]
+    kinds = [each.kind for each in harness.ledger.told(run.id)]
     assert kinds.count("run.stop_requested.v1") == 1
 
 
 @virtual
 async def test_stop_of_a_run_that_is_over_does_nothing_and_of_no_run_is_an_error() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(actions=1)), ANN)).run
         await ended(control, run.id)
         assert await control.stop(run.id, ANN) == []
         with pytest.raises(NotFound):
             await control.stop("nothing", ANN)
-    assert world.ledger.history(run.id).state == "finished"
+    assert harness.ledger.history(run.id).state == "finished"
 
 
 @virtual
 async def test_an_action_that_ignores_stop_ends_in_error_not_in_stopped() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         stubborn = {"*": [{"after_s": 100, "ignores_stop": True}]}
         run = (await control.start(order(sequence(), script=stubborn), ANN)).run
         await anyio.sleep(1)
         await control.stop(run.id, ANN)
         state = await ended(control, run.id)
-    found = world.ledger.history(run.id)
+    found = harness.ledger.history(run.id)
     assert state == "error"
     assert any(each.code == "stop_unconfirmed" for each in found.alarms)
 
@@ -190,10 +190,10 @@ async def test_an_action_that_ignores_stop_ends_in_error_not_in_stopped() -> Non
 async def test_a_robot_that_does_not_obey_any_more_is_never_called_stopped() -> None:
     """H12: the graph has finished, an action still runs, and the engine ignores every stop."""
     robot = Robot(engine({"Work_0": [{"after_s": 1}], "*": [{"never": True}]}))
-    world = World({"David": robot})
+    harness = Harness({"David": robot})
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(robot.engine.run)
-        async with world.runner() as control:
+        async with harness.runner() as control:
             run = (await control.start(order(two_ends(), engine="David"), ANN)).run
             await anyio.sleep(5)
             assert control.open[run.id].run.state == "running"
@@ -207,14 +207,14 @@ async def test_a_robot_that_does_not_obey_any_more_is_never_called_stopped() -> 
 
 @virtual
 async def test_a_simulated_engine_that_does_not_obey_is_switched_off_and_its_run_lost() -> None:
-    world = World()
+    harness = Harness()
     script = {"Work_0": [{"after_s": 1}], "*": [{"never": True}]}
-    async with world.runner() as control:
+    async with harness.runner() as control:
         run = (await control.start(order(two_ends(), script=script), ANN)).run
         await anyio.sleep(5)
         await control.stop(run.id, ANN)
         assert await ended(control, run.id) == "lost"
-    assert "switched off" in world.ledger.history(run.id).detail
+    assert "switched off" in harness.ledger.history(run.id).detail
 
 
 @virtual
@@ -227,8 +227,8 @@ async def test_a_graph_that_can_go_nowhere_says_so_and_can_be_stopped() -> None:
         else each
         for each in graph.relations
     )
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         asked = order(msgspec.structs.replace(graph, relations=stuck))
         run = (await control.start(asked, ANN)).run
         await anyio.sleep(10)

@@ -14,13 +14,13 @@ import anyio
 import pytest
 
 from action_assistant.errors import Refused
-from action_assistant.runner.driving import OpenRun
-from action_assistant.runner.events import Override
-from action_assistant.runner.standin_wire import Message, Quirks, Start, Stop
-from action_assistant.umrf import codec
-from runner.air import now, now_ms
-from runner.scene import OTHER, PATROL, Scene, asked, shown
-from runner.world import ANN, BEN, live_through, until, virtual
+from action_assistant.runner.emulator.messages import EngineTraits, Message, Start, Stop
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.runs.events import Override
+from action_assistant.umrf.files import codec
+from runner.fake_network import now, now_ms
+from runner.harness import ANN, BEN, run_in_virtual_time, until, virtual
+from runner.robots_in_network import OTHER, PATROL, RobotsInNetwork, asked, shown
 
 STOPS = int(os.environ.get("TEST_STOPS", "20"))
 RACES = int(os.environ.get("TEST_RACES", "20"))
@@ -33,15 +33,15 @@ KNOWINGLY = Override(codes=("others", "quiet"), reason="it is a test")
 async def stopped(seed: int) -> tuple[float, float]:
     """One stop through 30 % loss and commands of others that overwrite it: seconds until the engine
     took it up, and until it was proven."""
-    scene = Scene(seed)
+    scene = RobotsInNetwork(seed)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: control.open[run].run.state == "running")
-        scene.air.loss = {"stop": 0.3, "get": 0.3}
+        scene.network.loss = {"stop": 0.3, "get": 0.3}
         deaf = scene.chance.random() < 0.3
         if deaf:  # somebody stops a graph that does not obey: five seconds of silence
             other = Start(graph_name="other", targets=("David",), graph_json=codec.write(OTHER))
-            scene.air.carry(other, "terminal")
+            scene.network.carry(other, "terminal")
             await anyio.sleep(0.3)
             scene.nodes["David"].robot.hear(Stop(graph_name="other", targets=("David",)), now_ms())
         _talk_over(scene)
@@ -59,16 +59,16 @@ async def stopped(seed: int) -> tuple[float, float]:
         return taken - clicked, proven
 
 
-def _talk_over(scene: Scene) -> None:
+def _talk_over(scene: RobotsInNetwork) -> None:
     """Somebody else stops another graph on the same robot, often at the very moment when we do."""
-    carry = scene.air.carry
+    carry = scene.network.carry
 
     def both(message: Message, stranger: str = "") -> None:
         carry(message, stranger)
         if not stranger and isinstance(message, Stop) and scene.chance.random() < 0.5:
             carry(Stop(graph_name="nothing", targets=("David",)), "terminal")
 
-    scene.air.carry = both  # type: ignore[method-assign]
+    scene.network.carry = both  # type: ignore[method-assign]
 
 
 @pytest.mark.timeout(0 if STOPS > 200 else 120)
@@ -79,7 +79,7 @@ def test_no_stop_stays_undelivered_whatever_gets_lost_or_overwritten() -> None:
         async def main(seed: int = seed) -> None:
             told.append(await stopped(seed))
 
-        live_through(main)
+        run_in_virtual_time(main)
     assert len(told) == STOPS
     for what, times in (("taken up", [a for a, _ in told]), ("proven", [b for _, b in told])):
         times.sort()
@@ -95,7 +95,7 @@ def test_no_stop_stays_undelivered_whatever_gets_lost_or_overwritten() -> None:
 
 async def raced(seed: int) -> None:
     """Up to twenty people start at once, some of them twice."""
-    scene = Scene(seed)
+    scene = RobotsInNetwork(seed)
     fresh: list[str] = []
     async with scene.played() as control:
 
@@ -122,12 +122,12 @@ def test_of_many_starts_at_once_exactly_one_leaves() -> None:
         async def main(seed: int = seed) -> None:
             await raced(seed)
 
-        live_through(main)
+        run_in_virtual_time(main)
 
 
 @virtual
 async def test_a_silent_engine_is_shown_as_unknown_and_as_running_when_it_speaks_again() -> None:
-    scene = Scene(1)
+    scene = RobotsInNetwork(1)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -136,18 +136,18 @@ async def test_a_silent_engine_is_shown_as_unknown_and_as_running_when_it_speaks
         assert shown(control, run).unknown_since is not None
         assert len(scene.starts()) == 1
         scene.nodes["David"].robot.thaw(now_ms())
-        scene.air.stir(scene.nodes["David"])
+        scene.network.stir(scene.nodes["David"])
         await until(lambda: shown(control, run).state == "running")
         assert shown(control, run).unknown_since is None
 
 
 @virtual
 async def test_a_killed_engine_is_shown_as_unknown_and_its_stop_as_unconfirmed() -> None:
-    scene = Scene(2)
+    scene = RobotsInNetwork(2)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
-        scene.air.kill(scene.nodes["David"])
+        scene.network.kill(scene.nodes["David"])
         await until(lambda: shown(control, run).state == "unknown")
         await control.stop(run, BEN)
         await anyio.sleep(30)
@@ -160,7 +160,7 @@ async def test_a_killed_engine_is_shown_as_unknown_and_its_stop_as_unconfirmed()
 async def test_an_action_that_begins_after_the_stop_keeps_the_run_from_being_called_stopped() -> (
     None
 ):
-    scene = Scene(7, quirks=Quirks(loading_ms=700.0))
+    scene = RobotsInNetwork(7, quirks=EngineTraits(loading_ms=700.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await anyio.sleep(0.3)
@@ -173,11 +173,11 @@ async def test_an_action_that_begins_after_the_stop_keeps_the_run_from_being_cal
 
 @virtual
 async def test_with_a_restarted_engine_the_run_is_lost_and_it_says_look_at_the_robot() -> None:
-    scene = Scene(3)
+    scene = RobotsInNetwork(3)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
-        scene.air.kill(scene.nodes["David"])
+        scene.network.kill(scene.nodes["David"])
         await anyio.sleep(1)
         scene.robot("David")
         await until(lambda: shown(control, run).state == "lost")
@@ -191,9 +191,9 @@ async def test_with_a_restarted_engine_the_run_is_lost_and_it_says_look_at_the_r
 async def test_a_start_that_comes_a_minute_late_is_unknown_until_then_and_is_not_sent_again() -> (
     None
 ):
-    scene = Scene(4)
+    scene = RobotsInNetwork(4)
     async with scene.played() as control:
-        scene.air.late_s = 60.0
+        scene.network.late_s = 60.0
         run = (await control.start(asked(), ANN)).run.id
         assert shown(control, run).state == "published"
         await until(lambda: shown(control, run).state == "unknown")
@@ -205,7 +205,7 @@ async def test_a_start_that_comes_a_minute_late_is_unknown_until_then_and_is_not
 
 @virtual
 async def test_of_two_robots_with_one_graph_name_only_the_meant_one_stops() -> None:
-    scene = Scene(5, "David", "Carol")
+    scene = RobotsInNetwork(5, "David", "Carol")
     async with scene.played() as control:
         david = (await control.start(asked("David"), ANN)).run.id
         carol = (await control.start(asked("Carol"), ANN)).run.id
@@ -221,20 +221,20 @@ async def test_of_two_robots_with_one_graph_name_only_the_meant_one_stops() -> N
 
 @virtual
 async def test_an_engine_of_another_generation_is_refused_in_a_sentence_and_sent_nothing() -> None:
-    scene = Scene(6)
+    scene = RobotsInNetwork(6)
     scene.nodes["David"].type_hash = "RIHS01_older"
     async with scene.played() as control:
         with pytest.raises(Refused) as refused:
             await control.start(asked(), ANN)
         assert "older generation" in refused.value.detail
-        assert scene.air.sent == []
+        assert scene.network.sent == []
         assert control.open == {}
 
 
 async def replayed_after(wait_s: float) -> list[float]:
     """Somebody plays a start of ours again so long after our Stop, while answers are on their way
     for up to half a second. When it was called stopped although it moves."""
-    scene = Scene(8)
+    scene = RobotsInNetwork(8)
     false: list[float] = []
     async with scene.played() as control:
         robot = scene.nodes["David"].robot
@@ -245,11 +245,11 @@ async def replayed_after(wait_s: float) -> list[float]:
 
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
-        scene.air.old_s = 0.5
+        scene.network.old_s = 0.5
         control.watch(judge)
         await control.stop(run, BEN)
         await anyio.sleep(wait_s)
-        scene.air.carry(scene.starts()[0], "bag")
+        scene.network.carry(scene.starts()[0], "bag")
         await until(lambda: run not in control.open)
     return false
 
@@ -263,18 +263,18 @@ async def test_an_answer_from_before_a_start_of_somebody_else_proves_nothing() -
 async def begun_anew_after(wait_s: float) -> bool:
     """We stop a graph of somebody else, who starts it anew so long after, while answers are on their
     way for up to half a second. Whether it was called stopped although it moves."""
-    scene = Scene(8)
+    scene = RobotsInNetwork(8)
     async with scene.played() as control:
         robot = scene.nodes["David"].robot
         theirs = Start(graph_name="patrol", targets=("David",), graph_json=codec.write(PATROL))
-        scene.air.carry(theirs, "terminal")
+        scene.network.carry(theirs, "terminal")
         await until(lambda: "patrol" in robot.moving)
         await until(lambda: control.robots.silence(BEN, lambda _: ()) != [])
-        scene.air.old_s = 0.5
+        scene.network.old_s = 0.5
         again = now() + wait_s
-        while control.robots.silencing.going("David"):
+        while control.robots.foreign_stops.going("David"):
             if now() >= again:
-                scene.air.carry(theirs, "terminal")
+                scene.network.carry(theirs, "terminal")
                 again = float("inf")
             await anyio.sleep(0.01)
         return "patrol" in robot.moving

@@ -7,8 +7,9 @@ import msgspec
 import pytest
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.events import Observed, decode
-from action_assistant.runner.runs import ENDED, replay, thin
+from action_assistant.runner.runs.events import Observed, decode
+from action_assistant.runner.runs.fold import replay, thin
+from action_assistant.runner.runs.run import ENDED
 from runner.record_streams import Line, as_told, expected, recorded
 
 FOLDERS = sorted(path for path in (Path(__file__).parents[1] / "data" / "streams").iterdir())

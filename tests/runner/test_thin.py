@@ -7,10 +7,11 @@ import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.runner import shapes
-from action_assistant.runner.events import Observed, encode
-from action_assistant.runner.runs import Run, follow, replay, thin
-from action_assistant.runner.seen import NodeState, Seen, Snapshot
+from action_assistant.runner.links.observations import NodeState, Seen, Snapshot
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import Observed, encode
+from action_assistant.runner.runs.fold import follow, replay, thin
+from action_assistant.runner.runs.run import Run
 from runner.test_runs import REQUESTED, STARTED, run_of
 
 STATES = ("UNINITIALIZED", "RUNNING", "STOPPING", "FINISHED", "ERROR", "PAUSED")
@@ -62,7 +63,7 @@ def test_a_thinned_history_is_the_same_history(items: list[Any], together: int) 
         some = tuple(seen[first : first + together])
         thinned = follow(thinned, Observed(0, thin(thinned, some)))
         full = follow(full, Observed(0, some))
-        assert shapes.shown(thinned) == shapes.shown(full)
+        assert views.shown(thinned) == views.shown(full)
 
 
 def test_what_a_run_of_a_large_graph_stores_grows_with_what_happens_in_it() -> None:

@@ -6,16 +6,17 @@ import anyio
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from action_assistant.runner import shapes
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import EngineTraits, index_of
+from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import Feedback, Report
-from action_assistant.runner.runs import ENDED, replay
-from action_assistant.runner.seen import ACTIVE, Snapshot
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Quirks, index_of
-from runner import world
-from runner.air import now_ms
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.run import ENDED
+from runner import harness
+from runner.fake_network import now_ms
+from runner.harness import BEN, run_in_virtual_time, sequence
 from runner.record_streams import Place
-from runner.world import BEN, live_through, sequence
 
 RESULTS = ("on_true", "on_false", "on_error")
 CALLS = st.fixed_dictionaries(
@@ -33,7 +34,7 @@ class Witness:
     def __init__(self, place: Place) -> None:
         self.active: set[str] = set()
         self.place = place
-        link: Any = place.world.links["Robin"]
+        link: Any = place.harness.links["Robin"]
         asked = link.get
 
         async def get() -> Any:
@@ -59,19 +60,19 @@ async def lived(calls: list[dict[str, Any]], loss: float, seed: int, stop: float
     place = Place(script)
     witness = Witness(place)
     async with anyio.create_task_group() as tasks:
-        tasks.start_soon(place.air.blow)
-        robot = StandIn(
+        tasks.start_soon(place.network.blow)
+        robot = EmulatedEngine(
             "Robin",
             script=place.script,
             index=index_of([], []),
-            quirks=Quirks(loss=loss),
+            quirks=EngineTraits(loss=loss),
             seed=seed,
             born_ms=now_ms(),
-            epoch_ms=world.EPOCH // 1000,
+            epoch_ms=harness.EPOCH // 1000,
         )
-        place.air.join(robot, "/Robin")
+        place.network.join(robot, "/Robin")
         await anyio.sleep(0.5)
-        async with place.world.runner() as place.control:
+        async with place.harness.runner() as place.control:
             await anyio.sleep(1.5)
             with witness.listening:
                 run = await place.start(sequence("told", len(calls)))
@@ -93,8 +94,8 @@ async def lived(calls: list[dict[str, Any]], loss: float, seed: int, stop: float
 def test_nothing_is_shown_that_was_not_seen_and_live_is_as_it_is_told_later(
     calls: list[dict[str, Any]], loss: float, seed: int, stop: float | None
 ) -> None:
-    witness: Witness = live_through(lambda: lived(calls, loss, seed, stop))
-    ledger = witness.place.world.ledger
+    witness: Witness = run_in_virtual_time(lambda: lived(calls, loss, seed, stop))
+    ledger = witness.place.harness.ledger
     (stream,) = [each for each in ledger.streams if each.startswith("run/")]
     events = ledger.told(stream.removeprefix("run/"))
     run = replay(events)
@@ -108,12 +109,10 @@ def test_nothing_is_shown_that_was_not_seen_and_live_is_as_it_is_told_later(
             assert visit.inputs is None or f"Work_{number}" in witness.active
             failed = call["result"] == "on_error"
             assert visit.result in {None, "stopped", *(["error"] if failed else [])}
-    live = [shapes.shown(shown) for _, shown in witness.place.world.shown]
-    later = [
-        shapes.shown(found) for n in range(1, len(events) + 1) if (found := replay(events[:n]))
-    ]
+    live = [views.shown(shown) for _, shown in witness.place.harness.shown]
+    later = [views.shown(found) for n in range(1, len(events) + 1) if (found := replay(events[:n]))]
     assert list(_changes(live)) == list(_changes(later))
 
 
-def _changes(shown: list[shapes.RunShown]) -> list[shapes.RunShown]:
+def _changes(shown: list[views.RunShown]) -> list[views.RunShown]:
     return [each for n, each in enumerate(shown) if n == 0 or each != shown[n - 1]]

@@ -4,13 +4,13 @@ that it concerns. In virtual time."""
 import anyio
 import msgspec
 
+from action_assistant.runner.emulator.messages import EngineTraits, Start
 from action_assistant.runner.links.port import Answer, Feedback, Order
-from action_assistant.runner.standin_wire import Quirks, Start
-from action_assistant.umrf import codec
-from runner.fleet import Open
-from runner.scene import OTHER, PATROL, Scene, asked, shown
+from action_assistant.umrf.files import codec
+from runner.harness import ANN, BEN, Harness, order, sequence, until, virtual
+from runner.registered_robots import Open
+from runner.robots_in_network import OTHER, PATROL, RobotsInNetwork, asked, shown
 from runner.test_robots import NEVER, fleet
-from runner.world import ANN, BEN, World, order, sequence, until, virtual
 
 
 class Overtaken(Open):
@@ -41,7 +41,7 @@ class Overtaken(Open):
 @virtual
 async def test_an_answer_from_before_the_start_ends_no_run_that_was_shown_meanwhile() -> None:
     david = Overtaken(NEVER)
-    async with fleet(World(), David=david) as control, anyio.create_task_group() as tasks:
+    async with fleet(Harness(), David=david) as control, anyio.create_task_group() as tasks:
         david.tasks, david.start_delay = tasks, 0.05
         run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
         await anyio.sleep(0.3)
@@ -55,9 +55,9 @@ async def test_an_answer_from_before_the_start_ends_no_run_that_was_shown_meanwh
 
 @virtual
 async def test_each_run_that_is_open_on_a_robot_hears_what_others_start_there() -> None:
-    scene = Scene(
+    scene = RobotsInNetwork(
         11,
-        quirks=Quirks(loading_ms=3_000.0),
+        quirks=EngineTraits(loading_ms=3_000.0),
         script={"*": [{"after_s": 20.0, "ignores_stop": True}]},
     )
     async with scene.played() as control:
@@ -69,10 +69,10 @@ async def test_each_run_that_is_open_on_a_robot_hears_what_others_start_there() 
         await until(lambda: first in control.open)  # an action of it begins after the proof
         assert list(control.open) == [second, first]
         text = codec.write(PATROL)
-        scene.air.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "cli")
+        scene.network.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "cli")
         await anyio.sleep(0.1)
         told = {run: {each.code for each in shown(control, run).alarms} for run in control.open}
         assert "foreign_start" in told[first]
         assert "foreign_other" in told[second]
-        heard = [each for _, each in await control.robots.flight.newest("David", 9)]
+        heard = [each for _, each in await control.robots.robot_log.newest("David", 9)]
         assert [each.run for each in heard if each.kind == "robot.commanded.v1"] == [first]

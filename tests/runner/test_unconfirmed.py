@@ -11,33 +11,33 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound
-from action_assistant.runner.control import Control
-from action_assistant.runner.doubts import Doubts
-from action_assistant.runner.engine_process import EngineProcess, has_ended, process
-from action_assistant.runner.engines import KnownEngine
-from action_assistant.runner.events import Override
+from action_assistant.runner.emulator.messages import EngineTraits, Start, Stop
+from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.engine_process import EngineProcess, has_ended, process
 from action_assistant.runner.links.engine_text import snapshot
-from action_assistant.runner.robots import Robots
-from action_assistant.runner.seen import Snapshot
-from action_assistant.runner.standin_wire import Quirks, Start, Stop
-from action_assistant.runner.steering import RestRequest
-from action_assistant.umrf import codec
+from action_assistant.runner.links.observations import Snapshot
+from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Conditions
-from runner.scene import Scene, asked, shown
-from runner.world import (
+from runner.harness import (
     ANN,
     BEN,
+    Harness,
     Robot,
-    World,
     at_once,
+    clock_us,
     engine,
     order,
     sequence,
     two_ends,
     until,
     virtual,
-    wall,
 )
+from runner.robots_in_network import RobotsInNetwork, asked, shown
 
 LOOKED = RestRequest("I stand beside it; nothing moves.")
 STUBBORN: dict[str, Any] = {"*": [{"never": True, "ignores_stop": True}]}
@@ -46,9 +46,11 @@ THROWS: dict[str, Any] = {"*": [{"after_s": 60, "ignores_stop": True, "stop_erro
 
 
 @asynccontextmanager
-async def stopped(script: dict[str, Any]) -> AsyncIterator[tuple[Scene, Control, str]]:
+async def stopped(
+    script: dict[str, Any],
+) -> AsyncIterator[tuple[RobotsInNetwork, ExecutionService, str]]:
     """A run that somebody wants stopped, 8 seconds later."""
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(5, script=script, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -76,13 +78,13 @@ async def test_nothing_is_started_beside_it_and_stop_stays_pressable() -> None:
     async with stopped(STUBBORN) as (scene, control, run):
         with pytest.raises(Conflict, match="did not obey"):
             await control.start(asked(), ANN)
-        sent = len([each for _, each in scene.air.sent if isinstance(each, Stop)])
+        sent = len([each for _, each in scene.network.sent if isinstance(each, Stop)])
         await anyio.sleep(300)
-        vain = len([each for _, each in scene.air.sent if isinstance(each, Stop)])
+        vain = len([each for _, each in scene.network.sent if isinstance(each, Stop)])
         assert vain - sent < 30  # they can bring nothing more, and are all recorded
         assert await control.stop(run, ANN) == [run]
         await anyio.sleep(0.1)
-        now = len([each for _, each in scene.air.sent if isinstance(each, Stop)])
+        now = len([each for _, each in scene.network.sent if isinstance(each, Stop)])
         assert now == vain + 1
 
 
@@ -102,14 +104,14 @@ async def test_a_person_who_has_seen_it_at_rest_ends_it_and_that_is_no_proof() -
 
 
 def _listed() -> Any:
-    from action_assistant.runner import archive
+    from action_assistant.runner.runs import queries
 
-    return archive.listed(archive.Filter(), 100)
+    return queries.listed(queries.Filter(), 100)
 
 
 @virtual
 async def test_the_block_outlives_the_runner_the_engine_and_what_strangers_start() -> None:
-    scene = Scene(5, script=STUBBORN, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(5, script=STUBBORN, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -120,9 +122,11 @@ async def test_the_block_outlives_the_runner_the_engine_and_what_strangers_start
         with pytest.raises(Conflict, match="did not obey"):
             await control.start(asked(), ANN)
         text = codec.write(sequence("other"))
-        scene.air.carry(Start(graph_name="other", targets=("David",), graph_json=text), "terminal")
+        scene.network.carry(
+            Start(graph_name="other", targets=("David",), graph_json=text), "terminal"
+        )
         await anyio.sleep(2)
-        scene.air.kill(scene.nodes["David"])
+        scene.network.kill(scene.nodes["David"])
         await anyio.sleep(1)
         scene.script = {}
         scene.robot("David")
@@ -153,7 +157,9 @@ async def test_after_that_the_engine_s_own_error_of_this_run_stands_in_nobody_s_
 async def test_an_action_that_had_thrown_by_itself_does_not_keep_a_confirmed_run_in_doubt() -> None:
     thrower = {"patrol/Work_0": [{"after_s": 1, "result": "on_error"}]}
     stubborn = {"patrol/Work_1": [{"never": True, "ignores_stop": True}]}
-    scene = Scene(5, script=thrower | stubborn | {"*": [{"after_s": 1}]}, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(
+        5, script=thrower | stubborn | {"*": [{"after_s": 1}]}, quirks=EngineTraits(loss=0.0)
+    )
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: "Work_1" in control.open[run].run.active)
@@ -167,14 +173,18 @@ async def test_an_action_that_had_thrown_by_itself_does_not_keep_a_confirmed_run
 
 @virtual
 async def test_what_a_stranger_s_graph_left_blocks_a_start_until_somebody_answers_for_it() -> None:
-    scene = Scene(5, script=STUBBORN | {"patrol/Work_0": [{"after_s": 1}]}, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(
+        5, script=STUBBORN | {"patrol/Work_0": [{"after_s": 1}]}, quirks=EngineTraits(loss=0.0)
+    )
     async with scene.played() as control:
         text = codec.write(sequence("other"))
-        scene.air.carry(Start(graph_name="other", targets=("David",), graph_json=text), "terminal")
+        scene.network.carry(
+            Start(graph_name="other", targets=("David",), graph_json=text), "terminal"
+        )
         await anyio.sleep(2)
         control.stop_robot("David", BEN)
         await anyio.sleep(70)
-        assert not control.robots.silencing.going("David")  # given up, without a proof
+        assert not control.robots.foreign_stops.going("David")  # given up, without a proof
         with pytest.raises(Conflict, match="other on David did not obey"):
             await control.start(asked(), ANN)
         over = Override(codes=("rest",), reason="I stand beside it.")
@@ -183,11 +193,11 @@ async def test_what_a_stranger_s_graph_left_blocks_a_start_until_somebody_answer
 
 @virtual
 async def test_a_stranger_s_stop_that_is_not_obeyed_leaves_the_run_unknown() -> None:
-    scene = Scene(5, script=STUBBORN, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(5, script=STUBBORN, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
-        scene.air.carry(Stop(graph_name="patrol", targets=("David",)), "terminal")
+        scene.network.carry(Stop(graph_name="patrol", targets=("David",)), "terminal")
         await until(lambda: bool(shown(control, run).unconfirmed))
         await anyio.sleep(30)
         now = shown(control, run)
@@ -209,7 +219,7 @@ async def test_a_stop_inside_the_graph_that_is_not_obeyed_is_no_end_either() -> 
     )
     graph = msgspec.structs.replace(graph, relations=(*graph.relations, arrow))
     script = {"Work_0": [{"after_s": 2}], "Work_1": [{"after_s": 30, "ignores_stop": True}]}
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(5, script=script, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         over = Override(codes=("H3", "H4", "H8", "H12"), reason="practice")
         run = (await control.start(order(graph, engine="David", override=over), ANN)).run.id
@@ -222,7 +232,7 @@ async def test_a_stop_inside_the_graph_that_is_not_obeyed_is_no_end_either() -> 
 @virtual
 async def test_an_action_that_threw_by_itself_is_over() -> None:
     script = {"Work_0": [{"after_s": 1, "result": "on_error"}], "*": [{"after_s": 2}]}
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(5, script=script, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: run not in control.open)
@@ -233,7 +243,7 @@ async def test_an_action_that_threw_by_itself_is_over() -> None:
 
 @virtual
 async def test_what_answers_show_moving_cannot_be_confirmed_away() -> None:
-    scene = Scene(5)
+    scene = RobotsInNetwork(5)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -248,7 +258,7 @@ async def test_what_answers_show_moving_cannot_be_confirmed_away() -> None:
 
 @virtual
 async def test_a_run_that_was_confirmed_and_moves_again_is_open_again() -> None:
-    scene = Scene(5)
+    scene = RobotsInNetwork(5)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -258,15 +268,15 @@ async def test_a_run_that_was_confirmed_and_moves_again_is_open_again() -> None:
         assert (await control.confirm_rest(run, LOOKED, BEN)).state == "error"
         await anyio.sleep(3)
         robot.thaw(anyio.current_time() * 1000)
-        scene.air.stir(scene.nodes["David"])
+        scene.network.stir(scene.nodes["David"])
         await until(lambda: run in control.open and shown(control, run).moves_again_at is not None)
         assert shown(control, run).at_rest is None
 
 
 @virtual
 async def test_a_simulated_action_that_does_not_obey_is_switched_off_with_its_engine() -> None:
-    world = World()
-    async with world.runner() as control:
+    harness = Harness()
+    async with harness.runner() as control:
         run = (await control.start(order(sequence(), script=STUBBORN), ANN)).run
         await anyio.sleep(1)
         await control.stop(run.id, ANN)
@@ -309,10 +319,10 @@ def test_a_process_of_this_computer_is_seen_to_end_and_no_other(
 @virtual
 async def test_a_run_ends_with_the_process_of_its_engine(child: subprocess.Popen[bytes]) -> None:
     robot = WithProcess(engine(STUBBORN), process(child.pid))
-    world = World({"David": robot})
+    harness = Harness({"David": robot})
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(robot.engine.run)
-        async with world.runner() as control:
+        async with harness.runner() as control:
             run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
             await control.stop(run, ANN)
             await until(lambda: bool(control.open[run].run.unconfirmed))
@@ -347,7 +357,7 @@ def _shown(state: str, **nodes: str) -> Snapshot:
 
 
 def test_an_error_from_before_any_stop_stays_the_action_s_own() -> None:
-    doubts = Doubts(reached=False)
+    doubts = DoubtfulErrors(reached=False)
     assert doubts.look([_shown("RUNNING", A_0="ERROR", B_0="RUNNING")]) == ""
     doubts.reach()
     assert doubts.look([_shown("STOPPED", A_0="ERROR", B_0="FINISHED")]) == ""
@@ -355,7 +365,7 @@ def test_an_error_from_before_any_stop_stays_the_action_s_own() -> None:
 
 
 def test_an_action_that_began_again_since_is_looked_at_anew() -> None:
-    doubts = Doubts(reached=False)
+    doubts = DoubtfulErrors(reached=False)
     doubts.look([_shown("RUNNING", A_0="ERROR")])
     doubts.look([_shown("RUNNING", A_0="RUNNING")])
     doubts.reach()
@@ -363,11 +373,11 @@ def test_an_action_that_began_again_since_is_looked_at_anew() -> None:
 
 
 def test_a_graph_in_error_names_somebody_even_when_no_action_is() -> None:
-    assert "g did not obey" in Doubts(reached=False).look([_shown("ERROR", A_0="FINISHED")])
+    assert "g did not obey" in DoubtfulErrors(reached=False).look([_shown("ERROR", A_0="FINISHED")])
 
 
 def test_a_sub_graph_in_error_counts_and_a_doubt_stays() -> None:
-    doubts = Doubts(reached=False)
+    doubts = DoubtfulErrors(reached=False)
     part = Snapshot(at=1, graph="g__Sub__0", state="ERROR", nodes={"C_0": "ERROR"})
     assert "C_0 did not obey" in doubts.look([_shown("STOPPED", Sub_0="FINISHED"), part])
     assert "C_0 did not obey" in doubts.look([_shown("STOPPED", Sub_0="FINISHED")])
@@ -402,7 +412,7 @@ async def test_who_saw_rest_while_the_engine_was_silent_did_not_see_the_error_th
     None
 ):
     script = {"patrol/Work_0": [{"never": True, "ignores_stop": True}], "*": [{"after_s": 1}]}
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(5, script=script, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
@@ -415,7 +425,7 @@ async def test_who_saw_rest_while_the_engine_was_silent_did_not_see_the_error_th
         await control.confirm_rest(run, LOOKED, BEN)
         await anyio.sleep(3)
         robot.thaw(anyio.current_time() * 1000)
-        scene.air.stir(scene.nodes["David"])
+        scene.network.stir(scene.nodes["David"])
         await anyio.sleep(30)
         assert robot.moving == ("patrol",)
         with pytest.raises(Conflict, match="patrol on David did not obey"):
@@ -428,10 +438,10 @@ async def test_a_start_that_was_played_again_while_nobody_listened_is_not_what_s
 ):
     late, stubborn = {"never": True, "stop_s": 40.0}, {"never": True, "ignores_stop": True}
     script = {"patrol/Work_0": [late, stubborn], "*": [{"after_s": 1}]}
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(5, script=script, quirks=EngineTraits(loss=0.0))
     async with anyio.create_task_group() as wind:
-        wind.start_soon(scene.air.blow)
-        async with scene.world.runner() as control:
+        wind.start_soon(scene.network.blow)
+        async with scene.harness.runner() as control:
             await anyio.sleep(0.5)
             run = (await control.start(asked(), ANN)).run.id
             await until(lambda: shown(control, run).state == "running")
@@ -439,11 +449,11 @@ async def test_a_start_that_was_played_again_while_nobody_listened_is_not_what_s
             await anyio.sleep(45)
             await control.confirm_rest(run, LOOKED, BEN)
             await until(lambda: run not in control.open)
-        scene.air.carry(scene.starts()[0], "bag")
+        scene.network.carry(scene.starts()[0], "bag")
         await anyio.sleep(3)
-        scene.air.carry(Stop(graph_name="patrol", targets=("David",)), "terminal")
+        scene.network.carry(Stop(graph_name="patrol", targets=("David",)), "terminal")
         await anyio.sleep(10)
-        async with scene.world.runner() as control:
+        async with scene.harness.runner() as control:
             await anyio.sleep(5)
             assert scene.nodes["David"].robot.moving == ("patrol",)
             with pytest.raises(Conflict, match="patrol on David did not obey"):
@@ -454,34 +464,36 @@ async def test_a_start_that_was_played_again_while_nobody_listened_is_not_what_s
 @virtual
 async def test_a_run_that_moves_again_is_stopped_at_once_however_vain_stops_had_become() -> None:
     script = {"patrol/Work_0": [{"never": True, "stop_s": 110.0}, {"never": True}]}
-    scene = Scene(5, script=script, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(5, script=script, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
         await control.stop(run, BEN)
         await anyio.sleep(150)
         assert scene.nodes["David"].robot.moving == ()
-        scene.air.carry(scene.starts()[0], "bag")
+        scene.network.carry(scene.starts()[0], "bag")
         await until(lambda: bool(control.open[run].run.active), 20)
         began = anyio.current_time()
-        await until(lambda: [t for t, each in scene.air.sent if isinstance(each, Stop)][-1] > began)
+        await until(
+            lambda: [t for t, each in scene.network.sent if isinstance(each, Stop)][-1] > began
+        )
         assert anyio.current_time() - began < 1
 
 
 @virtual
 async def test_a_run_of_which_an_event_cannot_be_read_still_holds_its_robot() -> None:
-    scene = Scene(5, script=STUBBORN, quirks=Quirks(loss=0.0))
+    scene = RobotsInNetwork(5, script=STUBBORN, quirks=EngineTraits(loss=0.0))
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
         await control.stop(run, BEN)
         await until(lambda: bool(shown(control, run).unconfirmed))
         await until(lambda: control.open[run].recorder.idle)
-    stored = scene.world.ledger.streams[f"run/{run}"]
+    stored = scene.harness.ledger.streams[f"run/{run}"]
     body = b'{"at":1,"seen":[{"kind":"of a later version"}]}'
     stored.append(msgspec.structs.replace(stored[-1], seq=len(stored) + 1, body=body,
                                           kind="run.observed.v1"))  # fmt: skip
-    scene.air.kill(scene.nodes["David"])
+    scene.network.kill(scene.nodes["David"])
     async with scene.played() as control:
         assert shown(control, run).state == "lost"
         assert await control.stop(run, BEN) == [run]
@@ -496,14 +508,14 @@ async def test_a_run_that_moves_again_while_a_start_is_looked_at_stands_in_its_w
     """The index of the robot is read in a worker meanwhile."""
     real = KnownEngine.index
 
-    async def index(self: KnownEngine, aside: Any) -> Any:
+    async def index(self: KnownEngine, run_in_worker: Any) -> Any:
         await anyio.sleep(0.1)
-        return await real(self, aside)
+        return await real(self, run_in_worker)
 
     monkeypatch.setattr(KnownEngine, "index", index)
     for wait in range(0, 30, 3):
-        quirks = Quirks(loading_ms=3_000.0, loss=0.0)
-        scene = Scene(11, quirks=quirks, script={"*": [{"after_s": 20.0}]})
+        quirks = EngineTraits(loading_ms=3_000.0, loss=0.0)
+        scene = RobotsInNetwork(11, quirks=quirks, script={"*": [{"after_s": 20.0}]})
         async with scene.played() as control:
             run = (await control.start(asked(), ANN)).run.id
             await anyio.sleep(0.3)
@@ -518,7 +530,7 @@ async def test_a_run_that_moves_again_while_a_start_is_looked_at_stands_in_its_w
 
 @virtual
 async def test_a_mark_of_a_run_that_is_not_here_is_asked_for_once() -> None:
-    scene = Scene(11, quirks=Quirks(loss=0.0), script={"*": [{"never": True}]})
+    scene = RobotsInNetwork(11, quirks=EngineTraits(loss=0.0), script={"*": [{"never": True}]})
     asked_for: list[str] = []
 
     async def past(run: str, _: bool) -> Any:
@@ -530,12 +542,16 @@ async def test_a_mark_of_a_run_that_is_not_here_is_asked_for_once() -> None:
         action["gui_attributes"] = {"action_assistant": {"run": "AAAAAAAAAAAA"}}
     text = msgspec.json.encode(graph).decode()
     async with anyio.create_task_group() as wind:
-        wind.start_soon(scene.air.blow)
-        ledger, robots = scene.world.ledger, Robots(scene.world.links)
+        wind.start_soon(scene.network.blow)
+        ledger, robots = scene.harness.ledger, Robots(scene.harness.links)
         await anyio.sleep(0.5)
-        scene.air.carry(Start(graph_name="theirs", targets=("David",), graph_json=text), "other")
+        scene.network.carry(
+            Start(graph_name="theirs", targets=("David",), graph_json=text), "other"
+        )
         await anyio.sleep(1)
-        async with Control.opened(ledger, robots, wall=wall, aside=at_once, past=past):
+        async with ExecutionService.opened(
+            ledger, robots, clock_us=clock_us, run_in_worker=at_once, past=past
+        ):
             await anyio.sleep(60)
         wind.cancel_scope.cancel()
     assert asked_for == ["AAAAAAAAAAAA"]

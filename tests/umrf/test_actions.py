@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from action_assistant.umrf.check import STRUCTURAL, check_action
-from action_assistant.umrf.codec import Unreadable, read_action, write_action
+from action_assistant.umrf.files.codec import Unreadable, read_action, write_action
 from action_assistant.umrf.model import Action, Signature
 from action_assistant.umrf.signatures import signature_of
 from strategies import actions

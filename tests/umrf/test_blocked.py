@@ -11,10 +11,10 @@ import msgspec
 import pytest
 
 from action_assistant.umrf.check import blocking, check_reading, refused_by_parser
-from action_assistant.umrf.codec import read
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import Signature
-from action_assistant.umrf.semantics import GraphState, Hazard, simulate
+from action_assistant.umrf.semantics import GraphStateEvent, HazardEvent, simulate
 from support.recordings import CORPUS, NO_CORPUS, engine_runs, lines, runs_of
 
 KNOWN: dict[str, Any] = json.loads((Path(__file__).parent / "blocked.json").read_text())
@@ -39,13 +39,13 @@ def behaviour(path: Path) -> str:
     states: list[str] = []
     for trace in simulate(reading.graph, facts=PINNED, states=reading.states, max_events=3_000):
         match trace:
-            case Hazard(code="refused"):
+            case HazardEvent(code="refused"):
                 return "refuses"
-            case Hazard(effect="crash"):
+            case HazardEvent(effect="crash"):
                 return "aborts"
-            case Hazard(effect="hang"):
+            case HazardEvent(effect="hang"):
                 return "hangs"
-            case GraphState(graph=name, state=state) if name == reading.graph.name:
+            case GraphStateEvent(graph=name, state=state) if name == reading.graph.name:
                 states.append(state)
             case _:
                 pass

@@ -6,9 +6,9 @@ import time
 import pytest
 
 from action_assistant.umrf.check import check_reading
-from action_assistant.umrf.codec import read, write
 from action_assistant.umrf.echo import echo
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import read, write
 from action_assistant.umrf.semantics import simulate
 from umrf.shapes import SHAPES
 

@@ -17,10 +17,10 @@ from action_assistant.umrf.check import (
     check_reading,
     refused_by_parser,
 )
-from action_assistant.umrf.codec import Unreadable, read
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import Unreadable, read
 from action_assistant.umrf.model import Graph, Problem, Signature
-from action_assistant.umrf.semantics import Hazard, NodeState, simulate
+from action_assistant.umrf.semantics import HazardEvent, NodeStateEvent, simulate
 from strategies import graphs
 from support.recordings import CORPUS, NO_CORPUS, engine_runs, facts, family, lines
 
@@ -237,7 +237,7 @@ def test_renamings_that_hide_outputs_from_the_engine_are_errors(renamings: dict[
     first = action("A", children=[{"name": "B", "remap": remap}], output_parameters=outputs)
     graph = file(first, B)
     trace = list(simulate(read(json.dumps(graph)).graph))
-    crashed = any(isinstance(t, Hazard) and t.effect == "crash" for t in trace)
+    crashed = any(isinstance(t, HazardEvent) and t.effect == "crash" for t in trace)
     assert ("H2" in found(graph)) == crashed
 
 
@@ -305,9 +305,9 @@ def test_what_check_says_can_never_run_does_not_run(graph: Graph) -> None:
     }
     names = {action.full_name for action in graph.actions if action.key in never}
     for trace in simulate(graph, max_events=500):
-        if isinstance(trace, Hazard) and trace.effect == "crash":
+        if isinstance(trace, HazardEvent) and trace.effect == "crash":
             return
-        assert not (isinstance(trace, NodeState) and trace.node in names)
+        assert not (isinstance(trace, NodeStateEvent) and trace.node in names)
 
 
 def test_ten_thousand_actions_are_checked_in_seconds() -> None:

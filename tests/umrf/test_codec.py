@@ -10,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from action_assistant.umrf import codec
-from action_assistant.umrf.codec import Stamp, Unreadable, read, write
-from action_assistant.umrf.jsontext import MAX_BYTES, dump, parse
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.files.codec import Stamp, Unreadable, read, write
+from action_assistant.umrf.json.text import MAX_BYTES, dump, parse
 from action_assistant.umrf.model import ENTRY, EXIT, Graph
 from strategies import graphs, normal
 from support.recordings import CORPUS, NO_CORPUS, family

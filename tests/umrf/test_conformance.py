@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import msgspec
 import pytest
 
-from action_assistant.umrf import codec
 from action_assistant.umrf.check import refused_by_parser
 from action_assistant.umrf.facts import facts_for
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Signature
-from action_assistant.umrf.semantics import Behaviour, Engine, EngineRefused, Script, Trace
+from action_assistant.umrf.semantics import Behaviour, Engine, GraphRefused, Script, Trace
 from support.recordings import calls_of, engine_runs, facts, runs_of
 
 FACTS = facts("engine")
@@ -102,7 +102,7 @@ def driven(name: str, lines: list[dict[str, Any]], script: Script, until_ms: flo
             continue
         verb, *names = line["op"].split()
         traces += engine.advance(line["t_ms"])
-        with suppress(EngineRefused):
+        with suppress(GraphRefused):
             match verb:
                 case "startGraphA" | "startGraph":
                     reading = reading_of(folder, names[0] if ".json" in names[0] else name)

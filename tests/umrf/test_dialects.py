@@ -9,8 +9,8 @@ import pytest
 
 from action_assistant.umrf import semantics
 from action_assistant.umrf.check import STRUCTURAL, check, check_reading
-from action_assistant.umrf.codec import Reading, read, write
 from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.files.codec import Reading, read, write
 from action_assistant.umrf.model import ENTRY, EXIT
 from support.recordings import CORPUS, NO_CORPUS, lines
 
@@ -173,7 +173,7 @@ def ends(text: str, work_s: float) -> str:
     behaviours = {name: [{"after_s": after}] for name, after in times.items()}
     script = semantics.script_from({"behaviours": behaviours})
     trace = semantics.simulate(graph, script=script, facts=SIMULATED, until_ms=3_600_000)
-    return [event.state for event in trace if isinstance(event, semantics.GraphState)][-1]
+    return [event.state for event in trace if isinstance(event, semantics.GraphStateEvent)][-1]
 
 
 @pytest.mark.parametrize(

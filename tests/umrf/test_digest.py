@@ -3,8 +3,8 @@
 import msgspec
 from hypothesis import given, settings
 
-from action_assistant.umrf.codec import Stamp, read, write
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files.codec import Stamp, read, write
 from action_assistant.umrf.model import Graph
 from strategies import graphs
 

@@ -4,10 +4,10 @@ import json
 
 from hypothesis import given, settings
 
-from action_assistant.umrf.codec import read, write
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.echo import echo
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import read, write
 from action_assistant.umrf.model import Graph
 from strategies import graphs
 from support.recordings import family, lines

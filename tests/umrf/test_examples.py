@@ -5,11 +5,11 @@ from importlib import resources
 import pytest
 
 from action_assistant.umrf.check import check
-from action_assistant.umrf.codec import read, write
+from action_assistant.umrf.files.codec import read, write
 from action_assistant.umrf.semantics import (
-    GraphResult,
-    Hazard,
-    NodeState,
+    GraphResultEvent,
+    HazardEvent,
+    NodeStateEvent,
     Script,
     Trace,
     script_from,
@@ -26,12 +26,12 @@ EXAMPLES = {
 
 def results_of(name: str, script: Script | None = None) -> list[str]:
     traces = list(simulate(read(EXAMPLES[name]).graph, script=script))
-    assert not [trace for trace in traces if isinstance(trace, Hazard)]
-    return [trace.value for trace in traces if isinstance(trace, GraphResult)]
+    assert not [trace for trace in traces if isinstance(trace, HazardEvent)]
+    return [trace.value for trace in traces if isinstance(trace, GraphResultEvent)]
 
 
 def started(traces: list[Trace]) -> list[str]:
-    return [t.node for t in traces if isinstance(t, NodeState) and t.state == "RUNNING"]
+    return [t.node for t in traces if isinstance(t, NodeStateEvent) and t.state == "RUNNING"]
 
 
 def test_there_are_some() -> None:

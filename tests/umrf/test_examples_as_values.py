@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from action_assistant.umrf.check import check
-from action_assistant.umrf.codec import Unreadable, read, write
+from action_assistant.umrf.files.codec import Unreadable, read, write
 from action_assistant.umrf.fixes import fix, with_examples
-from action_assistant.umrf.jsontext import parse_small
+from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.parameters import example_of
 from support.recordings import CORPUS, NO_CORPUS

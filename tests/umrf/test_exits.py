@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from action_assistant.umrf import codec
 from action_assistant.umrf.check import blocking, check
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.fixes import fix
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import Behaviour, Engine, Script

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from action_assistant.umrf.check import check
-from action_assistant.umrf.codec import read
+from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.fixes import fix
 from action_assistant.umrf.model import Graph
 from strategies import graphs

@@ -18,7 +18,7 @@ from action_assistant.umrf.model import (
     Graph,
     Relation,
 )
-from action_assistant.umrf.semantics import NodeState, script_from, simulate
+from action_assistant.umrf.semantics import NodeStateEvent, script_from, simulate
 
 ANSWERS = st.sampled_from(["run", "run", "run", "ignore", "bypass", *RESPONSES])
 CONDITIONS = st.builds(
@@ -76,7 +76,7 @@ def test_an_action_that_is_said_to_run_once_runs_once(
         until_ms=20_000,
         max_events=2_000,
     ):
-        if isinstance(trace, NodeState):
+        if isinstance(trace, NodeStateEvent):
             failed = failed or trace.state == "ERROR"
             begun[trace.node] += trace.state == "RUNNING"
     sure = set(told.once) - (set(told.barring_errors) if failed else set())

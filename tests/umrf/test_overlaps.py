@@ -7,17 +7,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from action_assistant.umrf.check import check
-from action_assistant.umrf.checks.flow import Reach
+from action_assistant.umrf.checks.flow import Reachable
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.together import Together
-from action_assistant.umrf.codec import read
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import Graph, Problem
 from action_assistant.umrf.semantics import (
     Behaviour,
-    Hazard,
-    NodeResult,
-    NodeState,
+    HazardEvent,
+    NodeResultEvent,
+    NodeStateEvent,
     Script,
     simulate,
 )
@@ -48,19 +48,19 @@ def test_what_runs_at_once_in_any_simulation_was_said_to_be_able_to(
     graph: Graph, calls: Calls
 ) -> None:
     subject = Subject(graph, PINNED)
-    reach = Reach(subject)
+    reach = Reachable(subject)
     together = Together(subject, reach.runs, reach.reports)
     keys = {action.full_name: action.key for action in graph.actions}
     now: set[str] = set()
     for trace in simulate(graph, script=scripted(graph, calls), max_events=400, until_ms=60_000):
         match trace:
-            case NodeState(node=node, state="RUNNING" | "PAUSED" | "STOPPING"):
+            case NodeStateEvent(node=node, state="RUNNING" | "PAUSED" | "STOPPING"):
                 now.add(node)
                 for other in now - {node}:
                     assert together.may_run(keys[node], keys[other])
                     assert together.may_run(keys[other], keys[node])
             case (
-                NodeResult(node=node) | NodeState(node=node)
+                NodeResultEvent(node=node) | NodeStateEvent(node=node)
             ):  # it informs its children after its end
                 now.discard(node)
             case _:
@@ -72,7 +72,7 @@ def test_what_runs_at_once_in_any_simulation_was_said_to_be_able_to(
 def test_a_hazard_of_any_simulation_is_one_that_check_told(graph: Graph, calls: Calls) -> None:
     told = {problem.code for problem in check(graph)}
     for trace in simulate(graph, script=scripted(graph, calls), max_events=400, until_ms=60_000):
-        if isinstance(trace, Hazard) and trace.code in ("H3", "H4", "H12"):
+        if isinstance(trace, HazardEvent) and trace.code in ("H3", "H4", "H12"):
             assert trace.code in told, trace
 
 

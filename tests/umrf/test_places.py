@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from action_assistant.umrf.check import check_action, check_reading, check_written
-from action_assistant.umrf.codec import Reading, Unreadable, read, read_action, write
-from action_assistant.umrf.jsonplaces import places_of, pointer
+from action_assistant.umrf.files.codec import Reading, Unreadable, read, read_action, write
+from action_assistant.umrf.json.places import places_of, pointer
 from action_assistant.umrf.model import Graph, Where
 from strategies import graphs
 from support.recordings import CORPUS, NO_CORPUS

@@ -11,17 +11,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from action_assistant.umrf.codec import read
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import ENTRY, EXIT, RESPONSES, Action, Conditions, Graph, Relation
 from action_assistant.umrf.semantics import (
     Behaviour,
     Engine,
-    EngineRefused,
-    GraphResult,
-    GraphState,
-    Hazard,
-    NodeState,
+    GraphRefused,
+    GraphResultEvent,
+    GraphStateEvent,
+    HazardEvent,
+    NodeStateEvent,
     Script,
     Trace,
     script_from,
@@ -63,19 +63,19 @@ def optional(graph: Graph, *arrows: str) -> Graph:
 
 
 def states(traces: list[Trace], node: str) -> list[str]:
-    return [t.state for t in traces if isinstance(t, NodeState) and t.node == f"{node}_0"]
+    return [t.state for t in traces if isinstance(t, NodeStateEvent) and t.node == f"{node}_0"]
 
 
 def graph_states(traces: list[Trace], graph: str = "g") -> list[str]:
-    return [t.state for t in traces if isinstance(t, GraphState) and t.graph == graph]
+    return [t.state for t in traces if isinstance(t, GraphStateEvent) and t.graph == graph]
 
 
 def hazards(traces: list[Trace]) -> list[str]:
-    return [t.code for t in traces if isinstance(t, Hazard)]
+    return [t.code for t in traces if isinstance(t, HazardEvent)]
 
 
 def results(traces: list[Trace]) -> list[str]:
-    return [t.value for t in traces if isinstance(t, GraphResult)]
+    return [t.value for t in traces if isinstance(t, GraphResultEvent)]
 
 
 def script(**calls: list[Behaviour]) -> Script:
@@ -87,7 +87,7 @@ def test_a_sequence_runs_one_after_the_other_and_finishes() -> None:
     assert states(traces, "A") == states(traces, "B") == ["INITIALIZED", "RUNNING", "FINISHED"]
     assert graph_states(traces) == ["UNINITIALIZED", "RUNNING", "FINISHED"]
     assert results(traces) == ["on_true"]
-    assert traces[-1] == NodeState(2000.0, "g", "B_0", "FINISHED")
+    assert traces[-1] == NodeStateEvent(2000.0, "g", "B_0", "FINISHED")
 
 
 def test_a_join_waits_for_all_required_parents_and_the_last_one_decides() -> None:
@@ -155,7 +155,7 @@ def test_a_graph_that_nothing_can_move_any_more_is_said_to_be_stuck() -> None:
 def test_children_of_an_error_start_after_the_error_is_known() -> None:
     graph = graph_of("entry>A", "A>B", "B>exit", AB=Conditions("ignore", "ignore", "run"))
     traces = list(simulate(graph, script=script(A=[Behaviour(result="on_error")])))
-    kinds = [(t.node, t.state) for t in traces if isinstance(t, NodeState)]
+    kinds = [(t.node, t.state) for t in traces if isinstance(t, NodeStateEvent)]
     assert kinds.index(("A_0", "ERROR")) < kinds.index(("B_0", "RUNNING"))
     assert results(traces) == ["on_true"]
 
@@ -215,14 +215,14 @@ def test_two_stops_over_ros_wait_for_each_other_and_two_calls_kill() -> None:
     commands = [(100.0, "stop", None), (105.0, "stop", None)]
     traces = list(simulate(graph, commands=commands))
     assert hazards(traces) == ["H4"]
-    assert isinstance(traces[-1], Hazard)
+    assert isinstance(traces[-1], HazardEvent)
 
 
 def test_a_start_of_a_running_graph_is_refused_and_stops_it() -> None:
     engine = Engine()
     graph = graph_of("entry>A", "A>exit")
     engine.start(graph, 0)
-    with pytest.raises(EngineRefused, match="already active"):
+    with pytest.raises(GraphRefused, match="already active"):
         engine.start(graph, 100)
     assert graph_states(engine.advance(1000))[-1] == "STOPPED"
 
@@ -278,7 +278,7 @@ def test_a_bypass_in_circles_locks_the_engine_and_ends_the_trace() -> None:
     round_ = Conditions("run", "run", "bypass")
     graph = optional(graph_of("entry>A", "A>B", "B>A", AB=round_, BA=round_), "B>A")
     traces = list(simulate(graph, script=script(B=[Behaviour(result="on_error")])))
-    assert isinstance(traces[-1], Hazard)
+    assert isinstance(traces[-1], HazardEvent)
     assert (traces[-1].code, traces[-1].effect) == ("H3", "hang")
 
 
@@ -324,7 +324,7 @@ def test_a_graph_of_several_actors_is_refused_where_engines_do_not_synchronise()
     graph = graph_of("entry>A", "A>B", "B>exit")
     actions = tuple(msgspec.structs.replace(a, actor=a.name) for a in graph.actions)
     graph = msgspec.structs.replace(graph, actions=actions)
-    with pytest.raises(EngineRefused, match="synchronizer"):
+    with pytest.raises(GraphRefused, match="synchronizer"):
         Engine(facts=PINNED).start(graph, 0)
     assert hazards(list(simulate(graph))) == ["refused"]
 
@@ -340,7 +340,7 @@ def test_an_action_with_the_name_of_an_end_is_none() -> None:
     )
     traces = list(simulate(msgspec.structs.replace(graph, actions=third)))
     assert graph_states(traces) == ["UNINITIALIZED", "RUNNING"]
-    assert [t.node for t in traces if isinstance(t, NodeState)] == []
+    assert [t.node for t in traces if isinstance(t, NodeStateEvent)] == []
     assert hazards(traces) == ["H8"]
 
 
@@ -460,7 +460,10 @@ def test_any_graph_gives_one_trace_that_ends(graph: Graph, response: str, error:
     assert traces == run()
     times = [trace.t_ms for trace in traces]
     assert times == sorted(times)
-    assert [t for t in traces if isinstance(t, Hazard) and t.effect == "crash"] in ([], traces[-1:])
+    assert [t for t in traces if isinstance(t, HazardEvent) and t.effect == "crash"] in (
+        [],
+        traces[-1:],
+    )
 
 
 def test_a_day_of_work_is_simulated_in_a_moment() -> None:

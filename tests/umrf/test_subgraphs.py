@@ -8,9 +8,9 @@ import msgspec
 import pytest
 
 from action_assistant.umrf.check import blocking, check, check_reading
-from action_assistant.umrf.codec import read
+from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import Graph, Signature
-from action_assistant.umrf.semantics import Engine, EngineRefused
+from action_assistant.umrf.semantics import Engine, GraphRefused
 from support.recordings import family
 
 SAFE = ["on_error -> ignore"]
@@ -124,7 +124,7 @@ def test_a_sub_graph_is_used_up_for_what_the_engine_resolves_after_it(
         engine.start(outer, 0.0)
         return
     assert problems[0].where.path == f"/actions/{len(names) - 1}/name"
-    with pytest.raises(EngineRefused, match="Could not resolve graph 'outer'"):
+    with pytest.raises(GraphRefused, match="Could not resolve graph 'outer'"):
         engine.start(outer, 0.0)
 
 

@@ -10,7 +10,11 @@ from hypothesis import strategies as st
 
 from action_assistant.umrf.check import check
 from action_assistant.umrf.checks.trials import Trials
-from action_assistant.umrf.codec import read
+from action_assistant.umrf.courses.course import Course, Outcome
+from action_assistant.umrf.courses.deviations import Deviations, Tied
+from action_assistant.umrf.courses.network import Network
+from action_assistant.umrf.courses.whole import whole
+from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
@@ -20,10 +24,6 @@ from action_assistant.umrf.model import (
     Graph,
     Relation,
 )
-from action_assistant.umrf.semantics.course import Course, Outcome
-from action_assistant.umrf.semantics.deviations import Deviations, Tied
-from action_assistant.umrf.semantics.network import Network
-from action_assistant.umrf.semantics.whole import whole
 from umrf.drawn import busy_graphs
 from umrf.shapes import GROWING
 

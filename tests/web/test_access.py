@@ -18,15 +18,15 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from action_assistant.errors import Unauthenticated
-from action_assistant.web.access import Needs, person_of
-from action_assistant.web.addresses import Addresses
-from action_assistant.web.asgi import application
-from action_assistant.web.keys import Author, Keys, Person, Session
-from action_assistant.web.listen import bound
-from action_assistant.web.revoked import Revoked
-from action_assistant.web.roles import Role
-from action_assistant.web.sessions import Invited, session_routes
-from action_assistant.web.signed_in import SignedInBrowsers
+from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.keys import Keys, Person, PersonRef, Session
+from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.roles import Role
+from action_assistant.web.auth.session_files import SessionFiles
+from action_assistant.web.auth.sessions import Invited, session_routes
+from action_assistant.web.network.addresses import Addresses
+from action_assistant.web.server.application import application
+from action_assistant.web.server.listen import bound
 
 KEYS = Keys("k" * 43)
 BEARER = {"authorization": f"Bearer {KEYS.token}"}
@@ -76,7 +76,7 @@ class Nobody:
     def look(self, proof: str) -> Invited:
         raise Unauthenticated(f"{proof} is not known.")
 
-    async def welcome(self, invitation: str, person: Author) -> None:
+    async def welcome(self, invitation: str, person: PersonRef) -> None:
         raise AssertionError(f"{person} came by {invitation}")
 
 
@@ -87,8 +87,8 @@ def served(folder: Path) -> Iterator[int]:
     for other in others:  # on another free port of the other family
         other.close()
     port: int = listener.getsockname()[1]
-    revoked = Revoked(folder)
-    browsers = SignedInBrowsers(folder, revoked)
+    revoked = Revocations(folder)
+    browsers = SessionFiles(folder, revoked)
     sessions = session_routes(KEYS, port, reception=Nobody, revoked=revoked, browsers=browsers)
     app = application(
         [me, stop, start, novelty, broken, live, *sessions],

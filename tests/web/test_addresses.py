@@ -2,7 +2,7 @@
 
 import pytest
 
-from action_assistant.web.addresses import Addresses, host_name, lan_names
+from action_assistant.web.network.addresses import Addresses, host_name, lan_names
 
 LOCAL = Addresses(host="127.0.0.1", page_port=8000)
 NAMED = Addresses(host="0.0.0.0", page_port=8000, hosts=("lab.example",))

@@ -13,7 +13,7 @@ import pytest
 from cryptography import x509
 from websockets.sync.client import connect
 
-from action_assistant.web.certificate import Certificate
+from action_assistant.web.network.certificate import Certificate
 from support.product import TOKEN, running
 
 NAMES = ("localhost", "127.0.0.1", "::1", "lab.local", "10.1.2.3")
@@ -88,7 +88,7 @@ def test_what_is_damaged_is_made_again(tmp_path: Path, damaged: str) -> None:
 def test_processes_that_start_at_once_agree_on_one_authority(tmp_path: Path) -> None:
     ask = (
         "import sys; from pathlib import Path;"
-        "from action_assistant.web.certificate import Certificate;"
+        "from action_assistant.web.network.certificate import Certificate;"
         "sys.stdin.read(1); c = Certificate(Path(sys.argv[1])); c.renew(['localhost']);"
         "print(c.fingerprint())"
     )

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.web.cookies import values
-from action_assistant.web.keys import Keys, Person, Session
+from action_assistant.web.auth.keys import Keys, Person, Session
+from action_assistant.web.http.cookies import values
 from web.test_access import KEYS, served
 
 

@@ -10,9 +10,9 @@ import httpx
 import pytest
 
 from action_assistant.errors import NotFound, Unavailable
-from action_assistant.web.keys import Keys, Session
-from action_assistant.web.revoked import Revoked
-from action_assistant.web.signed_in import SignedInBrowsers
+from action_assistant.web.auth.keys import Keys, Session
+from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.session_files import SessionFiles
 from editor.process import running as editor_running
 from journal import servers
 from support.product import TOKEN, Product, running
@@ -115,7 +115,7 @@ def test_a_link_is_revoked_without_postgres(tmp_path: Path) -> None:
         assert guest.get("/api/session").json()["type"] == "withdrawn"
         listed = owner.get("/api/invitations").json()["invitations"]
         assert [each["guests"][0]["person"]["name"] for each in listed] == ["Mari"]
-        assert Revoked(editor.data).every() == {made["id"]}
+        assert Revocations(editor.data).every() == {made["id"]}
 
 
 def test_signing_out_ends_the_session_everywhere_at_once(product: Product, arrive: Arrive) -> None:
@@ -203,7 +203,7 @@ def test_an_owner_sees_who_is_signed_in_and_signs_one_out(product: Product, arri
 
 
 def test_a_mark_that_cannot_be_written_holds_here_and_says_so(tmp_path: Path) -> None:
-    revoked = Revoked(tmp_path)
+    revoked = Revocations(tmp_path)
     (tmp_path / "revoked").rmdir()
     (tmp_path / "revoked").write_text("no folder")
     session = KEYS.new_session("Ada", invitation="abc")
@@ -214,15 +214,15 @@ def test_a_mark_that_cannot_be_written_holds_here_and_says_so(tmp_path: Path) ->
     with pytest.raises(Unavailable):
         revoked.end(session.id)
     assert revoked.ended(session)
-    assert not Revoked(tmp_path).ends(session)
+    assert not Revocations(tmp_path).ends(session)
     (tmp_path / "revoked").unlink()
     revoked.write_again()
-    assert Revoked(tmp_path).ends(session)
-    assert Revoked(tmp_path).every() == {"abc"}
+    assert Revocations(tmp_path).ends(session)
+    assert Revocations(tmp_path).every() == {"abc"}
 
 
 def test_nobody_is_put_out_when_the_disk_is_gone(tmp_path: Path) -> None:
-    revoked = Revoked(tmp_path)
+    revoked = Revocations(tmp_path)
     one, other = KEYS.new_session("Ada"), KEYS.new_session("Mari")
     revoked.end(one.id)
     (tmp_path / "revoked").rename(tmp_path / "gone")
@@ -232,8 +232,8 @@ def test_nobody_is_put_out_when_the_disk_is_gone(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_noted_fails_nothing_and_what_is_over_is_forgotten(tmp_path: Path) -> None:
-    revoked = Revoked(tmp_path)
-    browsers = SignedInBrowsers(tmp_path, revoked)
+    revoked = Revocations(tmp_path)
+    browsers = SessionFiles(tmp_path, revoked)
     lasting, over = KEYS.new_session("Ada"), Session("s" * 16, KEYS.new_session("Eve").person, 1.0)
     (tmp_path / "sessions").write_text("no folder")
     browsers.note(lasting)

@@ -18,10 +18,10 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from action_assistant.sharing import invitations_as_text
-from action_assistant.web.crowd import Pace
-from action_assistant.web.keys import Keys
-from action_assistant.web.revoked import Revoked
+from action_assistant.share_links import invitations_as_text
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.network.connection_limits import RateLimit
 from editor.process import Editor
 from editor.process import running as editor_running
 from support.product import COMMAND, TOKEN, Product, running
@@ -302,7 +302,7 @@ def test_the_runner_needs_no_editor_to_put_somebody_out(tmp_path: Path, arrive: 
         with guest.socket(f"{product.runner_url}/api/live") as live:
             product.process("editor").suspend()
             try:
-                Revoked(product.data).add(invitation["id"])
+                Revocations(product.data).add(invitation["id"])
                 assert closed(live) == 4401
                 assert guest.runner("POST", "/api/stop").status_code == 401
             finally:
@@ -329,7 +329,7 @@ def test_log_and_folder_agree_again_whatever_was_lost(tmp_path: Path) -> None:
     answer = subprocess.run(revoke, env=environment, capture_output=True, text=True, check=True)
     assert "No server answers" in answer.stdout
     editor.start()
-    assert Revoked(editor.data).every() == {said, marked}
+    assert Revocations(editor.data).every() == {said, marked}
     with editor.client() as http:
         found = http.get("/api/invitations").json()["invitations"]
     assert all(each["revoked_at"] for each in found)
@@ -380,7 +380,7 @@ def test_guessing_is_slowed_down_for_the_one_who_guesses(tmp_path: Path) -> None
 
 def test_an_address_is_forgiven_with_time_and_others_do_not_pay() -> None:
     now = 0.0
-    pace = Pace(3, 60, lambda: now)
+    pace = RateLimit(3, 60, lambda: now)
     assert [pace.takes("a") for _ in range(4)] == [True, True, True, False]
     assert pace.takes("b")
     now = 1.0
@@ -390,6 +390,6 @@ def test_an_address_is_forgiven_with_time_and_others_do_not_pay() -> None:
 @pytest.mark.parametrize("name", ["../token", "a/b", "", "x" * 41, "ü", "."])
 def test_what_is_no_id_marks_nothing(tmp_path: Path, name: str) -> None:
     with pytest.raises(ValueError, match="no id"):
-        Revoked(tmp_path).add(name)
-    assert Revoked(tmp_path).holds(name)
+        Revocations(tmp_path).add(name)
+    assert Revocations(tmp_path).holds(name)
     assert [path.name for path in tmp_path.rglob("*")] == ["revoked"]

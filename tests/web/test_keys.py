@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from action_assistant.errors import CannotStart
-from action_assistant.web.keys import Keys, Person, Session
-from action_assistant.web.roles import Role
+from action_assistant.web.auth.keys import Keys, Person, Session
+from action_assistant.web.auth.roles import Role
 
 KEYS = Keys("k" * 43)
 
@@ -79,7 +79,7 @@ def test_the_token_is_made_once_and_only_its_owner_may_read_it(tmp_path: Path) -
 
 def test_processes_that_start_at_once_agree_on_one_token(tmp_path: Path) -> None:
     ask = (
-        "import sys; from pathlib import Path; from action_assistant.web.keys import Keys;"
+        "import sys; from pathlib import Path; from action_assistant.web.auth.keys import Keys;"
         "sys.stdin.read(1); print(Keys.of(Path(sys.argv[1])).token)"
     )
     processes = [

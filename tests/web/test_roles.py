@@ -13,10 +13,10 @@ from pycrdt import Doc, Map
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from action_assistant.editor import wire
-from action_assistant.web.crowd import OF_A_PERSON, OF_AN_ADDRESS
-from action_assistant.web.keys import Keys
-from action_assistant.web.roles import Deed, Role, allowed, may
+from action_assistant.editor.crdt import messages
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.roles import Deed, Role, allowed, may
+from action_assistant.web.network.connection_limits import OF_A_PERSON, OF_AN_ADDRESS
 from support.product import TOKEN, Product, running
 
 KEYS = Keys(TOKEN)
@@ -163,16 +163,18 @@ def test_a_viewer_hears_everything_and_changes_nothing(product: Product, graph: 
         socket_to(room, browser(product, "viewer")) as viewer,
         socket_to(room, browser(product, "owner")) as owner,
     ):
-        assert heard(owner, wire.Question)  # step 1: what do you have?
-        viewer.send(wire.question(Doc().get_state()))
-        first = wire.parse(bytes(viewer.recv(5)))
-        assert isinstance(first, wire.Edit)  # its own answer, and no step 1 before it
-        viewer.send(wire.answer(wire.NOTHING_NEW))
-        viewer.send(wire.presence([wire.Entry(77, 1, b'{"user":{"name":"Somebody else"}}')]))
-        said = heard(owner, wire.Presence)
+        assert heard(owner, messages.Question)  # step 1: what do you have?
+        viewer.send(messages.question(Doc().get_state()))
+        first = messages.parse(bytes(viewer.recv(5)))
+        assert isinstance(first, messages.Edit)  # its own answer, and no step 1 before it
+        viewer.send(messages.answer(messages.NOTHING_NEW))
+        viewer.send(
+            messages.presence([messages.PresenceEntry(77, 1, b'{"user":{"name":"Somebody else"}}')])
+        )
+        said = heard(owner, messages.Presence)
         assert json.loads(said.entries[0].state)["user"]["name"] == "Viewer"
-        viewer.send(wire.change(ours.get_update()))
-        assert closed(viewer) == wire.FORBIDDEN
+        viewer.send(messages.change(ours.get_update()))
+        assert closed(viewer) == messages.FORBIDDEN
     with product.editor() as editor:
         assert editor.get(f"/api/graphs/{graph}").json()["name"] == "task"
 
@@ -214,8 +216,8 @@ def socket_to(url: str, headers: dict[str, str]) -> Iterator[ClientConnection]:
 def heard(socket: ClientConnection, kind: type[Any]) -> Any:
     """The next message of a kind that says something."""
     while True:
-        message = wire.parse(bytes(socket.recv(5)))
-        if isinstance(message, kind) and message != wire.Presence(()):
+        message = messages.parse(bytes(socket.recv(5)))
+        if isinstance(message, kind) and message != messages.Presence(()):
             return message
 
 

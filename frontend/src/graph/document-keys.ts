@@ -1,7 +1,7 @@
 /**
  * The keys of the shared document: root maps with flat string keys and nothing nested.
  *
- * This module and `editor/document.py` are the only places that know them. Flat keys let two people
+ * This module and `editor/documents/document.py` are the only places that know them. Flat keys let two people
  * fill in different things of one action without replacing each other's container, and let an
  * undone delete bring back what a colleague changed meanwhile.
  */

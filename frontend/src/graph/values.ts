@@ -2,7 +2,7 @@
  * What the values of the document mean: total functions from anything to a value or nothing.
  *
  * The document can hold whatever some client wrote. A value that does not fit is left where it is
- * and read as if it were absent, here and in `editor/document_read.py` alike.
+ * and read as if it were absent, here and in `editor/documents/reading.py` alike.
  */
 
 import { type Position, RESPONSES, type Response } from "./model";

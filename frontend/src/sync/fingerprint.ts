@@ -3,7 +3,7 @@
  *
  * Equal state vectors do not prove equal documents. So of all entries of the shared maps the CRC-32
  * of root, key and value is summed up, which needs no order and no secure context. The server's
- * twin is `editor/sameness.py`; a shared vector in the tests of both holds them together.
+ * twin is `editor/documents/fingerprint.py`; a shared vector in the tests of both holds them together.
  */
 
 import * as decoding from "lib0/decoding";

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from action_assistant import places, settings
+from action_assistant import paths, settings
 from action_assistant.commands.client import No, Server, command, refused, running
 from action_assistant.errors import CannotStart, Refused
 
@@ -23,7 +23,7 @@ def add_to(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     archive.add_argument(
         "--check", action="store_true", help="only prove every archive of the folder; no server"
     )
-    archive.set_defaults(deed=_archive)
+    archive.set_defaults(handler=_archive)
 
     restore = runs.add_parser(
         "restore",
@@ -32,9 +32,9 @@ def add_to(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     )
     restore.add_argument("files", type=Path, nargs="+", metavar="FILE")
     restore.add_argument(
-        "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
+        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
     )
-    restore.set_defaults(deed=_restore)
+    restore.set_defaults(handler=_restore)
 
 
 def _days(text: str) -> float:
@@ -73,13 +73,13 @@ def _sweep(server: Server, ages: dict[str, float | None]) -> int:
 
 
 def _check(folder: Path) -> int:
-    from action_assistant.runner.review import bundle
+    from action_assistant.runner.archives import archive_file
 
     found = sorted(folder.glob("runs/**/*.jsonl.gz"))
     damaged = 0
     for path in found:
         try:
-            for _ in bundle.read(path):
+            for _ in archive_file.read(path):
                 pass
         except (Refused, OSError) as error:
             damaged += 1
@@ -89,15 +89,15 @@ def _check(folder: Path) -> int:
 
 
 def _restore(options: argparse.Namespace) -> int:
-    from action_assistant.runner.review import bundle
+    from action_assistant.runner.archives import archive_file
 
     folder = settings.keep(options.data.resolve()).folder
     code = 0
     for path in options.files:
         try:
-            place = bundle.title_of(path).place
-            events = sum(1 for _ in bundle.read(path))
-            bundle.put(path, folder / place)
+            place = archive_file.title_of(path).place
+            events = sum(1 for _ in archive_file.read(path))
+            archive_file.put(path, folder / place)
         except (Refused, OSError) as error:
             text = error.detail if isinstance(error, Refused) else f"{path}: {error.strerror}"
             code = refused(No(text))

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from action_assistant import places
+from action_assistant import paths
 from action_assistant.errors import CannotStart
-from action_assistant.web.certificate import Certificate
-from action_assistant.web.keys import Keys
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.network.certificate import Certificate
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     import httpx
@@ -40,7 +40,7 @@ def command(
         help="of the editor, or the public address of a server (default: port 8000 here)",
     )
     parser.add_argument(
-        "--data", type=Path, default=places.data(), metavar="DIR", help="that holds the token"
+        "--data", type=Path, default=paths.data(), metavar="DIR", help="that holds the token"
     )
     return parser
 
@@ -109,7 +109,7 @@ def running(options: argparse.Namespace) -> Iterator[Server]:
     """The server that a command speaks to, with the token. Raises CannotStart, No."""
     import httpx
 
-    from action_assistant.commands.proven import AfterProof
+    from action_assistant.commands.token_proof import AfterProof
 
     data = options.data.resolve()
     trust = Certificate(data).trusting_too()

@@ -19,24 +19,26 @@ import msgspec
 from sqlalchemy import create_engine
 from sqlalchemy.exc import DBAPIError
 
-from action_assistant import places, settings
+from action_assistant import paths as places
+from action_assistant import settings
 from action_assistant.commands.processes import port_number
-from action_assistant.editor import location
+from action_assistant.editor.log import database_location
 from action_assistant.errors import CannotStart
 from action_assistant.interpreter import for_runner
-from action_assistant.journal.database import cause_of, database_of
+from action_assistant.journal.database import cause_of
+from action_assistant.journal.databases import database_of
 from action_assistant.journal.migrate import recognize
-from action_assistant.plain import one_line
-from action_assistant.private import holds_nothing_else, open_to_others, prove_writable
-from action_assistant.runner import archive
-from action_assistant.runner.links.findings import Finding, Verdict
+from action_assistant.private_files import holds_nothing_else, open_to_others, prove_writable
+from action_assistant.runner.links.diagnostics import Diagnostic, Verdict
 from action_assistant.runner.links.port import Registration
-from action_assistant.runner.links.ros2_checkup import look
+from action_assistant.runner.links.ros2.checkup import look
+from action_assistant.runner.runs import queries
+from action_assistant.safe_text import one_line
 from action_assistant.settings import reached
 from action_assistant.version import VERSION
-from action_assistant.web.access import REFUSED_SOCKET
-from action_assistant.web.certificate import Certificate
-from action_assistant.web.listen import bound
+from action_assistant.web.auth.access import REFUSED_SOCKET
+from action_assistant.web.network.certificate import Certificate
+from action_assistant.web.server.listen import bound
 
 _SIGNS: Final[dict[Verdict, str]] = {"fine": "✓", "note": "·", "wrong": "✗"}
 _SOUND_SQLITE: Final = (3, 51, 3)
@@ -75,11 +77,11 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     doctor.add_argument("--json", action="store_true", help="print the findings as JSON")
     doctor.add_argument("--here", action="store_true", help=argparse.SUPPRESS)  # with this Python
-    doctor.set_defaults(deed=_doctor)
+    doctor.set_defaults(handler=_doctor)
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    found: list[Finding] = []
+    found: list[Diagnostic] = []
     if options.only != "ros":
         found += _machine(options)
     if options.only != "machine":
@@ -94,7 +96,7 @@ def _doctor(options: argparse.Namespace) -> int:
     return 1 if any(each.verdict == "wrong" for each in found) else 0
 
 
-def _machine(options: argparse.Namespace) -> Iterator[Finding]:
+def _machine(options: argparse.Namespace) -> Iterator[Diagnostic]:
     python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     yield _fine("program", f"Version {VERSION} on Python {python}.")
     yield _page()
@@ -108,15 +110,15 @@ def _machine(options: argparse.Namespace) -> Iterator[Finding]:
     yield _clock()
 
 
-def _fine(topic: str, what: str) -> Finding:
-    return Finding(topic=topic, verdict="fine", what=what)
+def _fine(topic: str, what: str) -> Diagnostic:
+    return Diagnostic(topic=topic, verdict="fine", what=what)
 
 
-def _wrong(topic: str, what: str, advice: str = "") -> Finding:
-    return Finding(topic=topic, verdict="wrong", what=what, advice=advice)
+def _wrong(topic: str, what: str, advice: str = "") -> Diagnostic:
+    return Diagnostic(topic=topic, verdict="wrong", what=what, advice=advice)
 
 
-def _page() -> Finding:
+def _page() -> Diagnostic:
     if (places.page() / "index.html").is_file():
         return _fine("page", "The page is built.")
     advice = "Run `make setup` in the checkout."
@@ -125,9 +127,9 @@ def _page() -> Finding:
     return _wrong("page", f"The page is not built: {places.page()} has no index.html.", advice)
 
 
-def _folder(path: Path) -> Finding:
+def _folder(path: Path) -> Diagnostic:
     if not path.exists():
-        return Finding(
+        return Diagnostic(
             topic="data folder", verdict="note", what=f"{path} is not there yet; serve makes it."
         )
     try:
@@ -155,18 +157,18 @@ def _listed(data: Path, paths: list[Path]) -> str:
     return ", ".join(names[:5]) + more
 
 
-def _graphs(options: argparse.Namespace) -> Finding:
+def _graphs(options: argparse.Namespace) -> Diagnostic:
     try:
-        return _database("database", options.database or location.of(options.data))
+        return _database("database", options.database or database_location.of(options.data))
     except CannotStart as error:
         return _wrong("database", str(error))
 
 
-def _database(topic: str, url: str) -> Finding:
+def _database(topic: str, url: str) -> Diagnostic:
     """Whether a database can be read, without changing anything of it."""
     path = Path(url.removeprefix("sqlite:///"))
     if url.startswith("sqlite:") and not path.exists():
-        return Finding(
+        return Diagnostic(
             topic=topic, verdict="note", what=f"{path} is not there yet; serve makes it."
         )
     name = topic
@@ -204,9 +206,9 @@ def _read_only(path: Path) -> sqlite3.Connection:
     return connection
 
 
-def _sqlite() -> Iterator[Finding]:
+def _sqlite() -> Iterator[Diagnostic]:
     if sqlite3.sqlite_version_info < _SOUND_SQLITE:
-        yield Finding(
+        yield Diagnostic(
             topic="database",
             verdict="note",
             what=f"SQLite {sqlite3.sqlite_version} is older than 3.51.3, which mended a rare damage "
@@ -214,7 +216,7 @@ def _sqlite() -> Iterator[Finding]:
         )
 
 
-def _port(name: str, host: str, port: int) -> Finding:
+def _port(name: str, host: str, port: int) -> Diagnostic:
     try:
         for probe in bound(host, port):
             probe.close()
@@ -235,7 +237,7 @@ def _ours(host: str, port: int) -> bool:
     return False
 
 
-def _public(options: argparse.Namespace) -> Iterator[Finding]:
+def _public(options: argparse.Namespace) -> Iterator[Diagnostic]:
     """Whether the proxy leads to both processes, and passes sockets on. Nothing secret is sent."""
     try:
         public = reached(options.public_url, None).public
@@ -249,7 +251,7 @@ def _public(options: argparse.Namespace) -> Iterator[Finding]:
             yield _shown(client, "runner", public.runner)
 
 
-def _shown(client: httpx.Client, name: str, url: str) -> Finding:
+def _shown(client: httpx.Client, name: str, url: str) -> Diagnostic:
     topic = f"{name} in public"
     advice = "docs/proxy has the files for nginx and Caddy."
     try:
@@ -266,7 +268,7 @@ def _shown(client: httpx.Client, name: str, url: str) -> Finding:
     return _fine(topic, f"{url} leads to the {name}, and passes WebSockets on.")
 
 
-def _clock() -> Finding:
+def _clock() -> Diagnostic:
     """A clock cannot be compared with anything here but the files of this program."""
     newest = max(each.stat().st_mtime for each in Path(__file__).parent.glob("*.py"))
     if time.time() < newest - 86_400:
@@ -278,13 +280,13 @@ def _clock() -> Finding:
     return _fine("clock", f"It is {time.strftime('%Y-%m-%d %H:%M:%S %Z')} by the clock.")
 
 
-def _ros(options: argparse.Namespace) -> list[Finding]:
+def _ros(options: argparse.Namespace) -> list[Diagnostic]:
     """The side of the robots, looked at by the Python that the runner would have."""
     if options.here:
         return anyio.run(look, _registered(options.data), lambda: time.time_ns() // 1000)
     interpreter = for_runner()
     notes = [
-        Finding(topic="rclpy", verdict="note", what=interpreter.remark)
+        Diagnostic(topic="rclpy", verdict="note", what=interpreter.remark)
         for _ in range(bool(interpreter.remark))
     ]
     command = [
@@ -300,7 +302,7 @@ def _ros(options: argparse.Namespace) -> list[Finding]:
             timeout=_ROS_S,
             check=False,
         )
-        return notes + msgspec.json.decode(answer.stdout, type=list[Finding])
+        return notes + msgspec.json.decode(answer.stdout, type=list[Diagnostic])
     except subprocess.TimeoutExpired:
         return [*notes, _wrong("rclpy", f"{interpreter.path} did not answer in {_ROS_S:g} s.")]
     except msgspec.DecodeError:
@@ -318,7 +320,7 @@ def _registered(data: Path) -> list[Registration]:
     engine = create_engine("sqlite://", creator=reader)
     try:
         with engine.connect() as connection:
-            rows = connection.execute(archive.all_robots()).all()
+            rows = connection.execute(queries.all_robots()).all()
     except (sqlite3.Error, DBAPIError):
         return []  # what is wrong with the file is said elsewhere
     finally:

@@ -11,10 +11,11 @@ import msgspec
 
 from action_assistant.errors import CannotStart
 from action_assistant.umrf import check as checks
-from action_assistant.umrf import codec, semantics
-from action_assistant.umrf.action_files import ACTION_DIALECTS
+from action_assistant.umrf import semantics
 from action_assistant.umrf.codes import rank
 from action_assistant.umrf.facts import PINNED, SIMULATED, EngineFacts, facts_for
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.files.action_files import ACTION_DIALECTS
 from action_assistant.umrf.fixes import with_examples
 from action_assistant.umrf.model import Graph, Note, Problem, Signature, Where
 from action_assistant.umrf.signatures import signature_of
@@ -24,7 +25,7 @@ _EVENTS: Final = 100_000
 _COMMANDS: Final = frozenset({"stop", "pause", "resume"})
 
 
-class Verdict(msgspec.Struct, frozen=True):
+class CheckVerdict(msgspec.Struct, frozen=True):
     """What `check` found in one file, with places there. `notes`: what reading it translated or left
     out."""
 
@@ -48,7 +49,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "--actions", type=Path, metavar="DIR", help="of action packages: their *umrf.json"
     )
     check.add_argument("--graphs", type=Path, metavar="DIR", help="of sub-graphs: *graph.json")
-    check.set_defaults(deed=_check)
+    check.set_defaults(handler=_check)
 
     convert = commands.add_parser(
         "convert",
@@ -66,7 +67,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         action="store_true",
         help="give inputs that lack a value the example that old files have for them",
     )
-    convert.set_defaults(deed=_convert)
+    convert.set_defaults(handler=_convert)
 
     simulate = commands.add_parser(
         "simulate",
@@ -88,15 +89,15 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "--for", type=float, default=_DAY, dest="seconds", metavar="SECONDS", help="default: a day"
     )
     simulate.add_argument("--trace", action="store_true", help="as JSON lines, for programs")
-    simulate.set_defaults(deed=_simulate)
+    simulate.set_defaults(handler=_simulate)
 
 
 def _command(text: str) -> tuple[float, str, str | None]:
     moment, _, rest = text.partition(":")
-    deed, _, graph = rest.partition(":")
-    if deed not in _COMMANDS:
+    handler, _, graph = rest.partition(":")
+    if handler not in _COMMANDS:
         raise ValueError
-    return float(moment), deed, graph or None
+    return float(moment), handler, graph or None
 
 
 def _text(path: Path) -> bytes:
@@ -139,23 +140,23 @@ def _verdict(
     actions: Mapping[str, Signature] | None,
     graphs: Mapping[str, Graph] | None,
     used: Collection[str],
-) -> Verdict:
+) -> CheckVerdict:
     text = _text(path)
     try:
         reading = codec.read(text)
         if reading.dialect in ACTION_DIALECTS:
             action = codec.read_action(text)
             found = checks.check_action(action)
-            return Verdict(str(path), action.dialect, tuple(found), action.remarks)
+            return CheckVerdict(str(path), action.dialect, tuple(found), action.remarks)
     except codec.Unreadable as error:
         where = Where(path=error.path, line=error.line, column=error.column)
         problem = Problem(code=error.code, severity="error", where=where, message=error.message)
-        return Verdict(str(path), None, (problem,))
+        return CheckVerdict(str(path), None, (problem,))
     inside = reading.graph.name in used
     found = checks.check_reading(reading, actions, facts, graphs)
     found = [_as_sub_graph(problem) for problem in found if not (inside and problem.code == "H7")]
     found.sort(key=rank)
-    return Verdict(str(path), reading.dialect, tuple(dict.fromkeys(found)), reading.remarks)
+    return CheckVerdict(str(path), reading.dialect, tuple(dict.fromkeys(found)), reading.remarks)
 
 
 def _as_sub_graph(problem: Problem) -> Problem:
@@ -181,7 +182,7 @@ def _given(paths: Sequence[Path]) -> dict[str, Graph]:
     return found
 
 
-def _print(verdict: Verdict) -> None:
+def _print(verdict: CheckVerdict) -> None:
     errors = sum(problem.severity == "error" for problem in verdict.problems)
     warnings = len(verdict.problems) - errors
     print(
@@ -224,7 +225,7 @@ def _with_examples(path: Path, graph: Graph) -> Graph:
 def _through_document(graph: Graph) -> Graph:
     from pycrdt import Doc
 
-    from action_assistant.editor import document
+    from action_assistant.editor.documents import document
 
     first: Doc[Any] = Doc()
     document.fill(first, graph)
@@ -253,7 +254,7 @@ def _simulate(options: argparse.Namespace) -> int:
         cut_off = None
         for event in trace:
             _report(event, as_json=options.trace)
-            if isinstance(event, semantics.Hazard) and event.code == semantics.CUT_OFF:
+            if isinstance(event, semantics.HazardEvent) and event.code == semantics.CUT_OFF:
                 cut_off = event
     except codec.Unreadable as error:
         print(_refusal(options.file, error), file=sys.stderr)
@@ -307,19 +308,19 @@ def _actions(folder: Path) -> Mapping[str, Signature]:
 
 
 def _report(event: semantics.Trace, *, as_json: bool) -> None:
-    if isinstance(event, semantics.NodeResult):
+    if isinstance(event, semantics.NodeResultEvent):
         return  # what an action answered is ours to know; the engine sends no such thing
     if as_json:
         print(msgspec.json.encode(event).decode())
         return
     match event:
-        case semantics.NodeState(t_ms=at, graph=graph, node=node, state=state):
+        case semantics.NodeStateEvent(t_ms=at, graph=graph, node=node, state=state):
             print(f"{at / 1000:10.3f} s  {graph}  {node}: {state}")
-        case semantics.GraphState(t_ms=at, graph=graph, state=state):
+        case semantics.GraphStateEvent(t_ms=at, graph=graph, state=state):
             print(f"{at / 1000:10.3f} s  {graph}: {state}")
-        case semantics.GraphResult(t_ms=at, graph=graph, value=value):
+        case semantics.GraphResultEvent(t_ms=at, graph=graph, value=value):
             print(f"{at / 1000:10.3f} s  {graph} ends with {value}")
-        case semantics.Hazard(t_ms=at, graph=graph, code=code, node=node, message=message):
+        case semantics.HazardEvent(t_ms=at, graph=graph, code=code, node=node, message=message):
             who = f"  {node}" if node else ""
             print(f"{at / 1000:10.3f} s  {graph}{who}: hazard {code}: {message}")
         case _:

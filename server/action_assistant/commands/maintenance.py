@@ -5,7 +5,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
-from action_assistant import places, settings
+from action_assistant import paths, settings
 from action_assistant.errors import CannotStart, Unavailable
 from action_assistant.journal.chain import Damage
 from action_assistant.journal.database import Branch
@@ -22,7 +22,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         epilog="example: action-assistant verify --data ./data",
     )
     _where(verify)
-    verify.set_defaults(deed=_verify)
+    verify.set_defaults(handler=_verify)
 
     rebuild = commands.add_parser(
         "rebuild",
@@ -30,12 +30,12 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         epilog="example: action-assistant rebuild --data ./data",
     )
     _where(rebuild)
-    rebuild.set_defaults(deed=_rebuild)
+    rebuild.set_defaults(handler=_rebuild)
 
 
 def _where(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
+        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
     )
     parser.add_argument(
         "--database",
@@ -67,17 +67,17 @@ def _rebuild(options: argparse.Namespace) -> int:
 
 
 def _for_each(
-    options: argparse.Namespace, deed: Callable[[Branch, Journal], Awaitable[bool]]
+    options: argparse.Namespace, handler: Callable[[Branch, Journal], Awaitable[bool]]
 ) -> int:
     """Do it to every journal that there is; 1 unless all went well. Raises CannotStart."""
-    from action_assistant.editor import location
-    from action_assistant.editor.happenings import fold as editor_fold
-    from action_assistant.runner.archive import fold as runner_fold
+    from action_assistant.editor.log import database_location
+    from action_assistant.editor.log.graph_events import fold as editor_fold
+    from action_assistant.runner.projection import fold as runner_fold
 
     data = options.data.resolve()
     settled(data)
     found: list[tuple[Branch, str, Fold]] = []
-    url = location.journal_of(data, options.database)
+    url = database_location.journal_of(data, options.database)
     if url is not None:
         found.append(("editor", url, editor_fold))
     if (data / "runner.db").is_file():
@@ -88,7 +88,7 @@ def _for_each(
     async def one(branch: Branch, url: str, fold: Fold) -> bool:
         journal = await Journal.open(url, branch=branch, fold=fold)
         try:
-            return await deed(branch, journal)
+            return await handler(branch, journal)
         except Unavailable as error:
             print(f"{branch}: {error.detail}")
             return False

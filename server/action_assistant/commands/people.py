@@ -5,9 +5,9 @@ from typing import Any
 
 from action_assistant.commands.client import No, Server, command, print_json, refused, running
 from action_assistant.errors import CannotStart, Refused
-from action_assistant.plain import one_line
-from action_assistant.private import own_folder
-from action_assistant.web.revoked import Revoked
+from action_assistant.private_files import own_folder
+from action_assistant.safe_text import one_line
+from action_assistant.web.auth.revocations import Revocations
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -22,12 +22,12 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
 
     listed = command(words, "list", "the links, and who came in by them", "", of="people")
     listed.add_argument("--json", action="store_true", help="as JSON, for programs")
-    listed.set_defaults(deed=_list)
+    listed.set_defaults(handler=_list)
 
     invite = command(words, "invite", "make a link", "operator --label 'lab tablet'", of="people")
     invite.add_argument("role", choices=["viewer", "editor", "operator"])
     invite.add_argument("--label", default="", help="whom it is for")
-    invite.set_defaults(deed=_invite)
+    invite.set_defaults(handler=_invite)
 
     revoke = command(
         words,
@@ -37,7 +37,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         of="people",
     )
     revoke.add_argument("id", metavar="ID", help="as `people list` shows it")
-    revoke.set_defaults(deed=_revoke)
+    revoke.set_defaults(handler=_revoke)
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -87,7 +87,7 @@ def _revoke(options: argparse.Namespace) -> int:
         if options.url or not data.is_dir():
             raise
         try:
-            Revoked(own_folder(data)).add(options.id)
+            Revocations(own_folder(data)).add(options.id)
         except (ValueError, Refused) as error:
             raise CannotStart(f"{silent} {error}") from error
         print("No server answers; the link is marked as revoked in the data folder.")

@@ -6,12 +6,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from action_assistant import places, settings
+from action_assistant import paths, settings
 from action_assistant.errors import CannotStart
-from action_assistant.plain import PlainLog
+from action_assistant.safe_text import PrintableLog
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
-    from action_assistant.web.listen import Identity
+    from action_assistant.web.server.listen import TlsIdentity
 
 
 def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -25,7 +25,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     _database(both, switch=True)
     _sharing(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
-    both.set_defaults(deed=_serve)
+    both.set_defaults(handler=_serve)
 
     editor = commands.add_parser(
         "editor",
@@ -38,7 +38,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     editor.add_argument(
         "--runner-port", type=port_number, metavar="N", help="default: the next port"
     )
-    editor.set_defaults(deed=_editor)
+    editor.set_defaults(handler=_editor)
 
     runner = commands.add_parser(
         "runner",
@@ -50,16 +50,16 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     runner.add_argument(
         "--page-port", type=port_number, metavar="N", help="default: the port before"
     )
-    runner.set_defaults(deed=_runner)
+    runner.set_defaults(handler=_runner)
 
     migrate = commands.add_parser(
         "migrate",
         help="bring the databases of a data folder to this version",
         epilog="example: action-assistant migrate --data ./data",
     )
-    migrate.add_argument("--data", type=Path, default=places.data(), metavar="DIR")
+    migrate.add_argument("--data", type=Path, default=paths.data(), metavar="DIR")
     _database(migrate)
-    migrate.set_defaults(deed=_migrate)
+    migrate.set_defaults(handler=_migrate)
 
 
 def port_number(text: str) -> int:
@@ -71,7 +71,7 @@ def port_number(text: str) -> int:
 
 def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
     parser.add_argument(
-        "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
+        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
     )
     parser.add_argument(
         "--host",
@@ -119,7 +119,7 @@ def _sharing(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _reached(options: argparse.Namespace) -> settings.Reached:
+def _reached(options: argparse.Namespace) -> settings.Reachability:
     return settings.reached(options.public_url, options.trusted_proxies)
 
 
@@ -135,25 +135,25 @@ def _host(options: argparse.Namespace) -> str:
 
 def _identity(
     chosen: settings.EditorSettings | settings.RunnerSettings, page_port: int
-) -> "Identity | None":
+) -> "TlsIdentity | None":
     """The certificate of a process, with --tls."""
-    from action_assistant.web.addresses import addresses_of
-    from action_assistant.web.certificate import Certificate
-    from action_assistant.web.listen import Identity
+    from action_assistant.web.network.addresses import addresses_of
+    from action_assistant.web.network.certificate import Certificate
+    from action_assistant.web.server.listen import TlsIdentity
 
     if not chosen.tls:
         return None
     addresses = addresses_of(
         host=chosen.host, page_port=page_port, hosts=chosen.hosts, share=chosen.share, secure=True
     )
-    return Identity(Certificate(chosen.data), addresses.certified)
+    return TlsIdentity(Certificate(chosen.data), addresses.certified)
 
 
 def _log(data: Path) -> None:
-    from action_assistant.web.keys import Keys
+    from action_assistant.web.auth.keys import Keys
 
     handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(PlainLog(Keys.of(data).token))
+    handler.setFormatter(PrintableLog(Keys.of(data).token))
     logging.basicConfig(level=logging.INFO, handlers=[handler])
     logging.getLogger("uvicorn.error").setLevel(logging.WARNING)
     logging.getLogger("httpx").setLevel(logging.WARNING)
@@ -176,14 +176,14 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
 
 
 def _serve(options: argparse.Namespace) -> int:
-    from action_assistant.serve import Plan, serve
+    from action_assistant.supervisor import ServePlan, serve
 
     if options.port == 65535:
         raise CannotStart("The runner needs the port after --port; 65535 has none.")
     host = _host(options)
     data = settings.data_folder(options.data.resolve())
     return serve(
-        Plan(
+        ServePlan(
             data=data,
             database=options.database,
             switch_database=options.switch_database,
@@ -199,7 +199,7 @@ def _serve(options: argparse.Namespace) -> int:
 
 def _editor(options: argparse.Namespace) -> int:
     from action_assistant.editor.app import create_app
-    from action_assistant.web.listen import serve as listen
+    from action_assistant.web.server.listen import serve as listen
 
     data = settings.data_folder(options.data.resolve())
     _log(data)
@@ -216,7 +216,7 @@ def _editor(options: argparse.Namespace) -> int:
 
 def _runner(options: argparse.Namespace) -> int:
     from action_assistant.runner.app import create_app
-    from action_assistant.web.listen import serve as listen
+    from action_assistant.web.server.listen import serve as listen
 
     data = settings.data_folder(options.data.resolve())
     _log(data)
@@ -243,12 +243,12 @@ def _runner(options: argparse.Namespace) -> int:
 
 
 def _migrate(options: argparse.Namespace) -> int:
-    from action_assistant.editor import location
-    from action_assistant.journal.database import database_of
-    from action_assistant.journal.migrate import Branch, migrate
+    from action_assistant.editor.log import database_location
+    from action_assistant.journal.databases import database_of, migrate
+    from action_assistant.journal.migrate import Branch
 
     data = settings.data_folder(options.data.resolve())
-    database = options.database or location.of(data)
+    database = options.database or database_location.of(data)
     urls: dict[Branch, str] = {"editor": database, "runner": f"sqlite:///{data / 'runner.db'}"}
     for branch, url in urls.items():
         revision = migrate(url, branch)

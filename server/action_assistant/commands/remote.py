@@ -12,7 +12,7 @@ import msgspec
 from action_assistant.commands import archives
 from action_assistant.commands.client import No, Server, command, print_json, refused, running
 from action_assistant.errors import CannotStart
-from action_assistant.plain import one_line
+from action_assistant.safe_text import one_line
 
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _POLL: Final = 0.2  # seconds
@@ -25,21 +25,21 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     """Add the commands of this module."""
     bring = command(commands, "import", "bring UMRF files in as graphs", "patrol.umrf.graph.json")
     bring.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    bring.set_defaults(deed=_import)
+    bring.set_defaults(handler=_import)
 
     export = command(commands, "export", "print a graph as UMRF", "patrol --at 120 > patrol.json")
     export.add_argument("graph", metavar="GRAPH", help="id or name")
     export.add_argument("--at", type=int, metavar="SEQ", help="as it was then")
-    export.set_defaults(deed=_export)
+    export.set_defaults(handler=_export)
 
     graphs = command(commands, "graphs", "list the graphs", "--json")
     graphs.add_argument("--json", action="store_true", help="as JSON, for programs")
-    graphs.set_defaults(deed=_graphs)
+    graphs.set_defaults(handler=_graphs)
 
     runs = command(commands, "runs", "list the runs, newest first", "--graph patrol")
     runs.add_argument("--graph", metavar="GRAPH", help="id or name")
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
-    runs.set_defaults(deed=_runs)
+    runs.set_defaults(handler=_runs)
     more = runs.add_subparsers(metavar="at-rest | verify | archive | restore | examples")
     rests = command(
         more,
@@ -50,7 +50,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     rests.add_argument("run", metavar="RUN", help="id of the run")
     rests.add_argument("--how", required=True, help="how you have seen that nothing moves")
-    rests.set_defaults(deed=_at_rest)
+    rests.set_defaults(handler=_at_rest)
     archives.add_to(more)
     brought = command(
         more,
@@ -59,7 +59,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "",
         of="runs",
     )
-    brought.set_defaults(deed=_examples)
+    brought.set_defaults(handler=_examples)
     again = command(
         more,
         "verify",
@@ -70,7 +70,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     again.add_argument("--graph", metavar="GRAPH", help="id or name; only what is expected of it")
     again.add_argument("--json", action="store_true", help="as JSON, for programs")
-    again.set_defaults(deed=_verify)
+    again.set_defaults(handler=_verify)
 
     run = command(
         commands,
@@ -84,7 +84,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     run.add_argument("--script", type=Path, metavar="S.json", help="what simulated actions do")
     run.add_argument("--label", default="", help="of the version")
     run.add_argument("--no-wait", action="store_true", help="print the run's id and return")
-    run.set_defaults(deed=_run)
+    run.set_defaults(handler=_run)
 
     stop = command(
         commands, "stop", "stop a run, or all of them; exit 1 unless it is proven", "--all"
@@ -93,7 +93,7 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     which.add_argument("run", nargs="?", metavar="RUN", help="id of the run")
     which.add_argument("--all", action="store_true", help="every run of every robot")
     stop.add_argument("--wait", type=float, default=30.0, metavar="SECONDS", help="for proof")
-    stop.set_defaults(deed=_stop)
+    stop.set_defaults(handler=_stop)
 
 
 def _import(options: argparse.Namespace) -> int:
@@ -140,7 +140,7 @@ def _graphs(options: argparse.Namespace) -> int:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    from action_assistant.commands.expected import verify  # slow to load
+    from action_assistant.commands.verify_runs import verify
 
     return verify(options)
 

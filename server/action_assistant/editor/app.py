@@ -10,23 +10,23 @@ import anyio
 from litestar import Litestar
 from litestar.types import ASGIApp
 
-from action_assistant import places
-from action_assistant.editor import epochs, location
-from action_assistant.editor import happenings as h
-from action_assistant.editor.api import about, drawing, graphs, invitations, room, versions
-from action_assistant.editor.house import Door, House
-from action_assistant.editor.people import People
-from action_assistant.editor.workers import Workers
+from action_assistant import paths
+from action_assistant.editor.api import drawing, editor, graphs, invitations, room, versions
+from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.log import database_location, epochs
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.services import EditorServices, EditorState
+from action_assistant.editor.workers import EditorWorkers
 from action_assistant.errors import BadInput
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
-from action_assistant.web.addresses import addresses_of
-from action_assistant.web.asgi import Readiness, application
-from action_assistant.web.keys import Keys
-from action_assistant.web.revoked import Revoked
-from action_assistant.web.sessions import session_routes
-from action_assistant.web.signed_in import SignedInBrowsers
-from action_assistant.web.workers import here
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.session_files import SessionFiles
+from action_assistant.web.auth.sessions import session_routes
+from action_assistant.web.network.addresses import addresses_of
+from action_assistant.web.server.application import Readiness, application
+from action_assistant.web.workers.lanes import run_here
 
 log: Final = logging.getLogger(__name__)
 
@@ -35,40 +35,40 @@ SMALL: Final = 100_000
 
 
 @asynccontextmanager
-async def open_house(
-    settings: EditorSettings, revoked: Revoked | None = None
-) -> AsyncIterator[House]:
+async def open_services(
+    settings: EditorSettings, revoked: Revocations | None = None
+) -> AsyncIterator[EditorServices]:
     """The editor without its HTTP side. Raises CannotStart."""
-    revoked = revoked or Revoked(settings.data)
+    revoked = revoked or Revocations(settings.data)
     journal = await Journal.open(settings.database, branch="editor", fold=h.fold)
     try:
         new = await journal.position() == 0
         async with (
-            Workers.opened() as workers,
+            EditorWorkers.opened() as workers,
             epochs.living_in(journal, settings.data) as epoch,
         ):
             people = await People.known(journal)
-            house = House(settings, journal, people, epoch, revoked, workers)
+            services = EditorServices(settings, journal, people, epoch, revoked, workers)
             try:
-                async with house.invitations.opened():
+                async with services.invitations.opened():
                     if new:
-                        await _greet(house, places.examples())
-                    yield house
+                        await _greet(services, paths.examples())
+                    yield services
             finally:
-                await house.rooms.close()
+                await services.rooms.close()
     finally:
         await journal.close()
 
 
 def create_app(settings: EditorSettings) -> ASGIApp:
     """The whole editor process. Raises CannotStart."""
-    location.check(settings.data, settings.database, switch=settings.switch_database)
+    database_location.check(settings.data, settings.database, switch=settings.switch_database)
     Journal.prepare(settings.database, "editor")
-    location.remember(settings.data, settings.database)
+    database_location.remember(settings.data, settings.database)
     keys = Keys.of(settings.data)
-    door = Door()
-    revoked = Revoked(settings.data)
-    browsers = SignedInBrowsers(settings.data, revoked)
+    app_state = EditorState()
+    revoked = Revocations(settings.data)
+    browsers = SessionFiles(settings.data, revoked)
     browsers.every()  # forgets those that are over
     addresses = addresses_of(
         host=settings.host,
@@ -81,12 +81,12 @@ def create_app(settings: EditorSettings) -> ASGIApp:
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_house(settings, revoked) as house:
-            door.open(house)
+        async with open_services(settings, revoked) as services:
+            app_state.open(services)
             yield
 
     async def ready() -> Readiness:
-        return await _readiness(door.house)
+        return await _readiness(app_state.services)
 
     return application(
         [
@@ -95,16 +95,16 @@ def create_app(settings: EditorSettings) -> ASGIApp:
                 settings.port,
                 addresses=addresses,
                 limits=settings.limits,
-                reception=lambda: door.house.invitations,
+                reception=lambda: app_state.services.invitations,
                 revoked=revoked,
                 browsers=browsers,
             ),
-            *invitations.routes(door, addresses, browsers),
-            *about.routes(door, addresses),
-            *graphs.routes(door),
-            *versions.routes(door),
-            *drawing.routes(door),
-            *room.routes(door),
+            *invitations.routes(app_state, addresses, browsers),
+            *editor.routes(app_state, addresses),
+            *graphs.routes(app_state),
+            *versions.routes(app_state),
+            *drawing.routes(app_state),
+            *room.routes(app_state),
         ],
         title="TeMoto Action Assistant: editor",
         keys=keys,
@@ -113,34 +113,36 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         page_port=settings.port,
         lifespan=[lifespan],
         ready=ready,
-        measures=lambda: _measures(door.house),
-        page=places.page(),
+        measures=lambda: _measures(app_state.services),
+        page=paths.page(),
         runner_port=settings.runner_port,
         mount=settings.reached.public.path if settings.reached.public is not None else "",
         body_limit=SMALL,
     )
 
 
-async def _greet(house: House, folder: Path) -> None:
+async def _greet(services: EditorServices, folder: Path) -> None:
     """Fill an empty catalogue with the graphs that come with the program."""
     files = [path async for path in anyio.Path(folder).glob("*.umrf.graph.json")]
     for path in sorted(files, reverse=True):  # the last one made stands first in the list
         try:
             # At once: they are small, ours, and nobody is here whom that could hold up.
-            await house.catalogue.bring(await path.read_bytes(), h.EXAMPLES, aside=here)
+            await services.catalogue.bring(
+                await path.read_bytes(), h.EXAMPLES, run_in_worker=run_here
+            )
         except BadInput as error:
             log.error("the example %s cannot be read: %s", path.name, error.detail)
 
 
-async def _readiness(house: House) -> Readiness:
-    problem = await house.journal.health()
+async def _readiness(services: EditorServices) -> Readiness:
+    problem = await services.journal.health()
     return Readiness(problem is None, () if problem is None else (problem,))
 
 
-def _measures(house: House) -> dict[str, float]:
-    rooms = house.rooms.open_rooms()
+def _measures(services: EditorServices) -> dict[str, float]:
+    rooms = services.rooms.open_rooms()
     return {
         "action_assistant_rooms": len(rooms),
-        "action_assistant_divergences": house.rooms.divergences,
+        "action_assistant_divergences": services.rooms.divergences,
         "action_assistant_sockets": sum(len(room.members) for room in rooms),
     }

@@ -8,22 +8,22 @@ from typing import Any, Final
 import msgspec
 from anyio import CapacityLimiter
 
-from action_assistant.web.workers import Lane, kept_warm
+from action_assistant.web.workers.lanes import Lane, kept_warm
 
 #: What the server process has imported before it forks anybody.
 _PRELOADED: Final = (
-    "action_assistant.web.hands",
-    "action_assistant.editor.folding",
-    "action_assistant.editor.importing",
-    "action_assistant.editor.rehearsal",
-    "action_assistant.editor.rewriting",
-    "action_assistant.editor.trial",
-    "action_assistant.editor.uses",
+    "action_assistant.web.workers.child_process",
+    "action_assistant.editor.crdt.folding",
+    "action_assistant.editor.interchange.importing",
+    "action_assistant.editor.interchange.rehearsal",
+    "action_assistant.editor.interchange.edited_text",
+    "action_assistant.editor.crdt.trial",
+    "action_assistant.editor.interchange.action_uses",
 )
 _NICE: Final = 5
 
 
-class Workers:
+class EditorWorkers:
     """The lanes of an editor. `files`: what people bring, and what is played for them. `graphs`: what
     is read of stored graphs. `edits`: large updates before a room takes them."""
 
@@ -35,7 +35,7 @@ class Workers:
 
     @classmethod
     @asynccontextmanager
-    async def opened(cls) -> "AsyncIterator[Workers]":
+    async def opened(cls) -> "AsyncIterator[EditorWorkers]":
         """Workers, as long as you are inside. The first ones are made meanwhile."""
         lanes = cls()
         async with kept_warm(lanes.files, lanes.graphs, lanes.edits):

@@ -12,7 +12,7 @@ from action_assistant.journal.database import Branch, Database, cause_of
 from action_assistant.journal.events import Event, Fold
 from action_assistant.journal.migrate import recognize
 from action_assistant.journal.removal import taken_out
-from action_assistant.journal.tables import editor_event, editor_head, editor_snapshot
+from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
 
 _AT_ONCE: Final = 64  # rows in memory: an event has up to a MiB, a snapshot several
 

@@ -4,10 +4,9 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, Protocol, TypeAlias, TypeVar
 
-from sqlalchemy import Connection, make_url
-from sqlalchemy.exc import ArgumentError, DBAPIError
+from sqlalchemy import Connection
+from sqlalchemy.exc import DBAPIError
 
-from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Head
 from action_assistant.journal.events import Event
 
@@ -16,7 +15,7 @@ T = TypeVar("T")
 Branch: TypeAlias = Literal["editor", "runner"]
 
 
-class Session(Protocol):
+class WriterSession(Protocol):
     """The connection that writes. Used by one thread at a time; everything only inside `run`."""
 
     connection: Connection
@@ -55,7 +54,7 @@ class Database(Protocol):
     def faults(self) -> tuple[type[Exception], ...]:
         """Everything that its driver raises."""
 
-    def open(self, branch: Branch) -> Session:
+    def open(self, branch: Branch) -> WriterSession:
         """Become the only writer, migrate, connect. Raises CannotStart."""
 
     def look(self, question: Callable[[Connection], object]) -> None:
@@ -64,7 +63,7 @@ class Database(Protocol):
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
         """Run a change of the schema in one transaction. Raises CannotStart."""
 
-    def connect(self) -> Session:
+    def connect(self) -> WriterSession:
         """Connect again after a failure; whatever the last session left unfinished is over then."""
 
     def lost(self, error: Exception) -> bool:
@@ -88,24 +87,6 @@ class Database(Protocol):
 
     def disown(self) -> None:
         """Let others write."""
-
-
-def database_of(url: str) -> Database:
-    """The database that a URL names. Raises CannotStart for what we cannot open."""
-    try:
-        parsed = make_url(url)
-    except ArgumentError as error:
-        # Not quoted: a password may be what is wrong with it.
-        raise CannotStart("--database is not a URL such as sqlite:////data/editor.db.") from error
-    if parsed.drivername in {"postgresql", "postgres"} and parsed.database:
-        from action_assistant.journal.postgres import Postgres
-
-        return Postgres(parsed)
-    if parsed.get_backend_name() == "sqlite" and parsed.database:
-        from action_assistant.journal.sqlite import Sqlite
-
-        return Sqlite(parsed.database)
-    raise CannotStart(f"Databases of the kind {parsed.drivername!r} are not supported.")
 
 
 def cause_of(error: Exception) -> str:

@@ -42,7 +42,7 @@ class Addition(msgspec.Struct, frozen=True):
     expected: int | None = None
 
 
-class Snapshot(msgspec.Struct, frozen=True):
+class StreamSnapshot(msgspec.Struct, frozen=True):
     """What a stream added up to at `seq`. A cache: it may vanish at any time."""
 
     stream: str

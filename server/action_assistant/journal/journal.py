@@ -12,14 +12,16 @@ from sqlalchemy import Connection, delete, insert, select
 
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.chain import Damage, Head, Inspector
-from action_assistant.journal.database import Branch, Database, Session, cause_of, database_of
+from action_assistant.journal.database import Branch, Database, WriterSession, cause_of
+from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.follower import Follower
 from action_assistant.journal.migrate import BRANCHES
-from action_assistant.journal.reader import Reader, body_of, following, seal_of
-from action_assistant.journal.removal import STREAM, Removed, delete_some, taken_out
-from action_assistant.journal.tables import LOG, editor_head, editor_snapshot
-from action_assistant.journal.writer import Job, Outcome, Pen, Writer
+from action_assistant.journal.reader import JournalReader, body_of, following, seal_of
+from action_assistant.journal.removal import STREAM, StreamRemoved, delete_some, taken_out
+from action_assistant.journal.writer import Job, Outcome, Transaction, Writer
+from action_assistant.schema.editor_tables import editor_head, editor_snapshot
+from action_assistant.schema.log_tables import LOG
 
 T = TypeVar("T")
 
@@ -29,10 +31,12 @@ _PAGE: Final = 500  # events that a follower reads at once
 _head, _snapshot = editor_head.c, editor_snapshot.c
 
 
-class Journal(Reader):
+class Journal(JournalReader):
     """The log of one process. The only writer of its database; readers never wait for it."""
 
-    def __init__(self, database: Database, session: Session, branch: Branch, fold: Fold) -> None:
+    def __init__(
+        self, database: Database, session: WriterSession, branch: Branch, fold: Fold
+    ) -> None:
         self._branch: Final = branch
         self._loop = asyncio.get_running_loop()
         self._database = database
@@ -79,7 +83,9 @@ class Journal(Reader):
 
     async def append_all(self, additions: Sequence[Addition]) -> list[int]:
         """Add events to several streams at once, all or none; the newest seq of each."""
-        return await self._write(lambda pen: [pen.add(addition) for addition in additions])
+        return await self._write(
+            lambda transaction: [transaction.add(addition) for addition in additions]
+        )
 
     def follow(self) -> AbstractAsyncContextManager[AsyncIterator[Event]]:
         """What is committed from now on, in order. Memory is bounded: who is slow reads later."""
@@ -88,25 +94,27 @@ class Journal(Reader):
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
         """Cache what a stream adds up to at `seq`. Raises Unavailable."""
 
-        def keep(pen: Pen) -> None:
-            seal = seal_of(body_of(pen.connection, stream, seq), state)
+        def keep(transaction: Transaction) -> None:
+            seal = seal_of(body_of(transaction.connection, stream, seq), state)
             row = {"stream": stream, "seq": seq, "proof": seal, "state": state}
-            pen.connection.execute(delete(editor_snapshot).where(_snapshot.stream == stream))
-            pen.connection.execute(insert(editor_snapshot).values(row))
+            transaction.connection.execute(
+                delete(editor_snapshot).where(_snapshot.stream == stream)
+            )
+            transaction.connection.execute(insert(editor_snapshot).values(row))
 
         await self._write(keep)
 
-    async def take_out(self, removed: Removed, also: Callable[[int], Addition]) -> int:
+    async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
         """Say in the log that a stream is kept elsewhere from now on; the number of that, by which
         its events may be deleted. `also` tells more of it, in the same transaction. Raises Conflict
         when the stream does not end there, Unavailable."""
         body = msgspec.json.encode(removed)
 
-        def say(pen: Pen) -> int:
-            if pen.end(removed.stream) != removed.end:
+        def say(transaction: Transaction) -> int:
+            if transaction.end(removed.stream) != removed.end:
                 raise Conflict(f"{removed.stream} does not end at {removed.seq}.")
-            by = pen.add(Addition(STREAM, (Draft(removed.kind, "", body),)))
-            pen.add(also(by))
+            by = transaction.add(Addition(STREAM, (Draft(removed.kind, "", body),)))
+            transaction.add(also(by))
             return by
 
         return await self._write(say)
@@ -114,20 +122,22 @@ class Journal(Reader):
     async def delete_some(self, stream: str, by: int) -> bool:
         """Delete some events of a stream that was taken out; whether any are left. Raises Conflict,
         Unavailable."""
-        return await self._write(lambda pen: delete_some(pen.connection, stream, by))
+        return await self._write(
+            lambda transaction: delete_some(transaction.connection, stream, by)
+        )
 
     async def rebuild(self) -> int:
         """Make all tables again from the events, in one transaction; the number of events."""
         folds = [t for t in BRANCHES[self._branch].sorted_tables if t.name not in LOG]
 
-        def again(pen: Pen) -> int:
+        def again(transaction: Transaction) -> int:
             for table in reversed(folds):
-                pen.connection.execute(table.delete())
+                transaction.connection.execute(table.delete())
             done = position = 0
-            while rows := pen.connection.execute(following(position, _PAGE)).all():
+            while rows := transaction.connection.execute(following(position, _PAGE)).all():
                 for row in rows:
-                    for statement in pen.fold(Event(*row)):
-                        pen.connection.execute(statement)
+                    for statement in transaction.fold(Event(*row)):
+                        transaction.connection.execute(statement)
                 done += len(rows)
                 position = rows[-1].position
             return done
@@ -160,7 +170,7 @@ class Journal(Reader):
     async def health(self) -> str | None:
         """Why nothing can be stored at the moment; None when it can. Writes nothing."""
         try:
-            await self._write(lambda pen: pen.connection)
+            await self._write(lambda transaction: transaction.connection)
         except Unavailable as error:
             return error.detail
         return None
@@ -178,7 +188,7 @@ class Journal(Reader):
         await self._database.close()
         self._database.disown()
 
-    async def _write(self, work: Callable[[Pen], T]) -> T:
+    async def _write(self, work: Callable[[Transaction], T]) -> T:
         if self._closed:
             raise Unavailable("The journal is closed.")
         future: asyncio.Future[T] = self._loop.create_future()

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from action_assistant.errors import CannotStart
-from action_assistant.private import opener
+from action_assistant.private_files import opener
 
 _LOCKS: Final = Path("/proc/locks")
 

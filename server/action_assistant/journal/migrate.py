@@ -11,14 +11,16 @@ from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, MetaData, inspect
 
-from action_assistant import places
+from action_assistant import paths
 from action_assistant.errors import CannotStart
-from action_assistant.journal import tables
 from action_assistant.journal.database import Branch as Branch
-from action_assistant.journal.database import database_of
 from action_assistant.journal.events import Event
+from action_assistant.schema import editor_tables, runner_tables
 
-BRANCHES: Final[dict[Branch, MetaData]] = {"editor": tables.EDITOR, "runner": tables.RUNNER}
+BRANCHES: Final[dict[Branch, MetaData]] = {
+    "editor": editor_tables.EDITOR,
+    "runner": runner_tables.RUNNER,
+}
 #: How our revisions are named, also those of versions to come.
 _OURS: Final = re.compile(rf"({'|'.join(BRANCHES)})_\d+")
 _VERSIONS: Final = "alembic_version"
@@ -26,19 +28,9 @@ log: Final = logging.getLogger(__name__)
 logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in one line
 
 
-def migrate(url: str, branch: Branch, revision: str = "head") -> str:
-    """Upgrade the database and return its revision. Raises CannotStart.
-
-    All of it is one transaction: killed half-way, the database is as it was.
-    """
-    database = database_of(url)
-    database.look(recognize)
-    return database.migrate(upgrade_to(branch, revision))
-
-
 def config_for(connection: Connection, branch: Branch) -> Config:
     """Alembic's configuration, pointed at our scripts and at a connection that is open."""
-    folder = places.migrations()
+    folder = paths.migrations()
     config = Config(attributes={"connection": connection, "metadata": BRANCHES[branch]})
     config.set_main_option("script_location", str(folder).replace("%", "%%"))
     config.set_main_option("version_path_separator", "newline")

@@ -19,7 +19,7 @@ from action_assistant.journal.chain import Head
 from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.events import Event
 from action_assistant.journal.migrate import upgrade_to
-from action_assistant.journal.tables import editor_event
+from action_assistant.schema.editor_tables import editor_event
 
 T = TypeVar("T")
 

@@ -12,8 +12,8 @@ from sqlalchemy.exc import DatabaseError
 from action_assistant.errors import Unavailable
 from action_assistant.journal.chain import NOTHING, Head
 from action_assistant.journal.database import cause_of
-from action_assistant.journal.events import Event, Snapshot
-from action_assistant.journal.tables import editor_event, editor_head, editor_snapshot
+from action_assistant.journal.events import Event, StreamSnapshot
+from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
 
 T = TypeVar("T")
 
@@ -24,7 +24,7 @@ _event, _head, _snapshot = editor_event.c, editor_head.c, editor_snapshot.c
 _EVENTS: Final = select(*(_event[name] for name in Event.__struct_fields__))
 
 
-class Reader:
+class JournalReader:
     """Who can ask a database, in whichever way."""
 
     async def _ask(self, question: Callable[[Connection], T]) -> T:
@@ -56,18 +56,18 @@ class Reader:
         """Ask the tables."""
         return await self._ask(lambda connection: list(connection.execute(statement).all()))
 
-    async def snapshot(self, stream: str) -> Snapshot | None:
+    async def snapshot(self, stream: str) -> StreamSnapshot | None:
         """The cached sum of a stream; None when there is none, or when it does not fit the log."""
         chosen = select(_snapshot.seq, _snapshot.proof, _snapshot.state).where(
             _snapshot.stream == stream
         )
 
-        def find(connection: Connection) -> Snapshot | None:
+        def find(connection: Connection) -> StreamSnapshot | None:
             row = connection.execute(chosen).first()
             if row is None:
                 return None
             seal = seal_of(body_of(connection, stream, row.seq), row.state)
-            return Snapshot(stream, row.seq, row.state) if seal == row.proof else None
+            return StreamSnapshot(stream, row.seq, row.state) if seal == row.proof else None
 
         return await self._ask(find)
 
@@ -85,7 +85,7 @@ class Reader:
         return found or 0
 
 
-class FileReader(Reader):
+class FileJournalReader(JournalReader):
     """Reads the SQLite file of a journal that another process writes; waits for each answer. Never
     changes it, nor holds up its writer."""
 

@@ -13,14 +13,14 @@ from sqlalchemy import Connection, delete, func, select
 from action_assistant.errors import Conflict
 from action_assistant.journal.chain import Head
 from action_assistant.journal.events import Event
-from action_assistant.journal.tables import editor_event, editor_snapshot
+from action_assistant.schema.editor_tables import editor_event, editor_snapshot
 
 #: The stream of all removals.
 STREAM: Final = "removed"
 _SLICE: Final = 1_000  # events deleted in one transaction: others want to write, too
 
 
-class Removed(msgspec.Struct, frozen=True):
+class StreamRemoved(msgspec.Struct, frozen=True):
     """A stream ends at `seq` with `chain` (hex) and is kept as `kept`, whose SHA-256 is `sha256`."""
 
     kind: ClassVar[str] = "stream.removed.v1"
@@ -39,9 +39,9 @@ class Removed(msgspec.Struct, frozen=True):
 
 def taken_out(event: Event) -> tuple[str, Head] | None:
     """Which stream an event says was taken out, and where that ended."""
-    if event.stream != STREAM or event.kind != Removed.kind:
+    if event.stream != STREAM or event.kind != StreamRemoved.kind:
         return None
-    removed = msgspec.json.decode(event.body, type=Removed)
+    removed = msgspec.json.decode(event.body, type=StreamRemoved)
     return removed.stream, removed.end
 
 
@@ -51,7 +51,7 @@ def delete_some(connection: Connection, stream: str, by: int) -> bool:
     event = editor_event.c
     said = select(event.body).where(event.stream == STREAM, event.seq == by)
     body = connection.execute(said).scalar()
-    if body is None or msgspec.json.decode(body, type=Removed).stream != stream:
+    if body is None or msgspec.json.decode(body, type=StreamRemoved).stream != stream:
         raise Conflict(f"Nothing says where {stream} is kept; it stays.")
     newest = connection.execute(select(func.max(event.seq)).where(event.stream == stream)).scalar()
     first = (newest or 0) - _SLICE

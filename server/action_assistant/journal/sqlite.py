@@ -28,7 +28,7 @@ from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.events import Event
 from action_assistant.journal.lock import own as own
 from action_assistant.journal.migrate import recognize, upgrade_to
-from action_assistant.private import opener
+from action_assistant.private_files import opener
 
 T = TypeVar("T")
 

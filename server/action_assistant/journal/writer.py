@@ -13,10 +13,10 @@ from sqlalchemy import Connection, Select, func, select
 from sqlalchemy.exc import DBAPIError, IntegrityError
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
-from action_assistant.journal import tables
 from action_assistant.journal.chain import NOTHING, Head, link
-from action_assistant.journal.database import Database, Session, cause_of
+from action_assistant.journal.database import Database, WriterSession, cause_of
 from action_assistant.journal.events import Addition, Event, Fold
+from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
 
@@ -29,7 +29,7 @@ _TOGETHER: Final = 1000  # jobs after which no others join a transaction
 _HEAVY: Final = 16 << 20  # bytes in one statement, beyond which no other job joins
 _KNOWN: Final = 10_000  # streams whose ends are kept in memory
 _AGAIN: Final = 0.1  # seconds between attempts to find out about a commit
-_LAST: Final = select(func.coalesce(func.max(tables.editor_event.c.position), 0))
+_LAST: Final = select(func.coalesce(func.max(editor_tables.editor_event.c.position), 0))
 
 
 def now() -> int:
@@ -40,19 +40,20 @@ def now() -> int:
 class Job(Generic[T]):
     """Work for the writer's thread, and who waits for its result."""
 
-    def __init__(self, work: Callable[["Pen"], T], future: "asyncio.Future[T]") -> None:
+    def __init__(self, work: Callable[["Transaction"], T], future: "asyncio.Future[T]") -> None:
         self.work = work
         self.future = future
 
 
-class Pen:
-    """What jobs write with. Events are gathered, and stored together by one statement at the end.
+class Transaction:
+    """The transaction that jobs write in. Events are gathered, and stored by one statement at the
+    end.
 
     A job that does nothing else costs no round trip of its own. Every other statement of a job is
     inside a savepoint, so that what a job did wrong touches nobody else's work.
     """
 
-    def __init__(self, session: Session, fold: Fold, clock: Clock) -> None:
+    def __init__(self, session: WriterSession, fold: Fold, clock: Clock) -> None:
         self.fold: Final = fold
         self._session = session
         self._clock = clock
@@ -168,7 +169,7 @@ class Pen:
     def _head(self, stream: str) -> Head:
         head = self._heads.get(stream)
         if head is None:
-            table = tables.editor_head
+            table = editor_tables.editor_head
             found = select(table.c.seq, table.c.chain).where(table.c.stream == stream)
             row = self._session.connection.execute(found).first()
             head = self._heads[stream] = Head(*row) if row is not None else NOTHING
@@ -184,7 +185,7 @@ class Writer:
     def __init__(
         self,
         database: Database,
-        session: Session | None,
+        session: WriterSession | None,
         fold: Fold,
         tell: Callable[[Sequence[tuple[Job[Any], Outcome]]], None],
         clock: Clock = now,
@@ -194,7 +195,7 @@ class Writer:
         self._fold = fold
         self._tell = tell
         self._clock = clock
-        self._pen: Pen | None = None
+        self._transaction: Transaction | None = None
         self._jobs: queue.SimpleQueue[Sequence[Job[Any]] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, name=f"{database.name} pen", daemon=True)
         self._thread.start()
@@ -233,30 +234,32 @@ class Writer:
 
     def _commit(self, jobs: list[Job[Any]]) -> None:
         done: list[Outcome] = []
-        pen: Pen | None = None
+        transaction: Transaction | None = None
         try:
-            session, pen = self._connected()
-            session.run(lambda: self._together(pen, jobs, done))
+            session, transaction = self._connected()
+            session.run(lambda: self._together(transaction, jobs, done))
         except Exception as error:  # whatever it is, the thread lives on, and all who wait hear it
             # After a failed commit nobody knows what the disk holds: begin again from there.
             ours = not isinstance(error, self._database.faults)
             log.error("%s was not written: %s", self._database.name, cause_of(error), exc_info=ours)
             self._disconnect()
-            done = self._settled(pen, done, len(jobs), error)
+            done = self._settled(transaction, done, len(jobs), error)
         self._tell(list(zip(jobs, done, strict=True)))
 
-    def _together(self, pen: Pen, jobs: list[Job[Any]], done: list[Outcome]) -> None:
-        pen.start()
-        done.extend(pen.attempt(job, self._database) for job in jobs)
-        pen.finish()
+    def _together(
+        self, transaction: Transaction, jobs: list[Job[Any]], done: list[Outcome]
+    ) -> None:
+        transaction.start()
+        done.extend(transaction.attempt(job, self._database) for job in jobs)
+        transaction.finish()
 
     def _settled(
-        self, pen: Pen | None, done: list[Outcome], jobs: int, error: Exception
+        self, transaction: Transaction | None, done: list[Outcome], jobs: int, error: Exception
     ) -> list[Outcome]:
         """What became of jobs whose transaction failed: everything or nothing, or nobody knows."""
         text = f"Nothing can be stored at the moment: {cause_of(error)}."
-        if pen is not None and pen.committing and pen.last is not None:
-            match self._stored(*pen.last):
+        if transaction is not None and transaction.committing and transaction.last is not None:
+            match self._stored(*transaction.last):
                 case True:
                     return done
                 case None:
@@ -265,7 +268,7 @@ class Writer:
 
     def _stored(self, event: Event, chain: bytes) -> bool | None:
         """Whether an event is in the log; None when the database cannot be asked for too long."""
-        table = tables.editor_event
+        table = editor_tables.editor_event
         found = select(table.c.chain).where(table.c.position == event.position)
         until = time.monotonic() + self._database.patience
         while True:
@@ -279,22 +282,22 @@ class Writer:
                 return None
             time.sleep(_AGAIN)
 
-    def _connected(self) -> tuple[Session, Pen]:
+    def _connected(self) -> tuple[WriterSession, Transaction]:
         session = self._session
         if session is None or not session.alive():
             self._disconnect()
             session = self._session = self._database.connect()
-        if self._pen is None:
-            self._pen = session.run(lambda: Pen(session, self._fold, self._clock))
-        return session, self._pen
+        if self._transaction is None:
+            self._transaction = session.run(lambda: Transaction(session, self._fold, self._clock))
+        return session, self._transaction
 
     def _disconnect(self) -> None:
-        session, self._session, self._pen = self._session, None, None
+        session, self._session, self._transaction = self._session, None, None
         if session is not None:
             session.close()
 
 
-def _scalar(session: Session, chosen: Select[Any]) -> object:
+def _scalar(session: WriterSession, chosen: Select[Any]) -> object:
     return session.connection.execute(chosen).scalar()
 
 

@@ -1,7 +1,6 @@
 """The runner process: its journal, its service, its routes."""
 
 import sys
-import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -13,86 +12,91 @@ from litestar.types import ASGIApp
 
 from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
-from action_assistant.public import RUNNER
-from action_assistant.runner import archive
-from action_assistant.runner.api import House, routes
-from action_assistant.runner.asking import SMALL
-from action_assistant.runner.control import Control
-from action_assistant.runner.links import ros2_reach
+from action_assistant.public_url import RUNNER
+from action_assistant.runner import projection
+from action_assistant.runner.api.caller import SMALL
+from action_assistant.runner.api.live import Hub
+from action_assistant.runner.api.runs import routes
+from action_assistant.runner.api.services import RunnerServices
+from action_assistant.runner.archives.archive_store import ArchiveStore
+from action_assistant.runner.archives.retention import Retention
+from action_assistant.runner.clock import utc_us
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Reach
+from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
-from action_assistant.runner.live import Hub
-from action_assistant.runner.recordings import Recordings
-from action_assistant.runner.review.desk import Desk
-from action_assistant.runner.review.retention import Retention
-from action_assistant.runner.review.shelf import Shelf
-from action_assistant.runner.review.stored import Asked, Place
-from action_assistant.runner.robots import Robots
-from action_assistant.runner.workers import Workers
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
+from action_assistant.runner.robots.recordings import Recordings
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
-from action_assistant.web.addresses import addresses_of
-from action_assistant.web.asgi import Readiness, application
-from action_assistant.web.crowd import Crowd
-from action_assistant.web.keys import Keys
-from action_assistant.web.revoked import Revoked
-from action_assistant.web.sessions import revocation
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.sessions import revocation
+from action_assistant.web.network.addresses import addresses_of
+from action_assistant.web.network.connection_limits import ConnectionLimits
+from action_assistant.web.server.application import Readiness, application
 
 #: For so long (seconds) a thread may keep the interpreter to itself while the loop waits for it.
 _SWITCH_S: Final = 0.0005
 
 
-def wall_clock() -> int:
-    """Microseconds UTC."""
-    return time.time_ns() // 1000
-
-
 @asynccontextmanager
-async def open_house(settings: RunnerSettings, house: House | None = None) -> AsyncIterator[House]:
+async def open_services(
+    settings: RunnerSettings, services: RunnerServices | None = None
+) -> AsyncIterator[RunnerServices]:
     """Everything the routes need, working. Raises CannotStart."""
-    house = house or House()
+    services = services or RunnerServices()
     sys.setswitchinterval(_SWITCH_S)
-    journal = await Journal.open(_database(settings), branch="runner", fold=archive.fold)
+    journal = await Journal.open(_database(settings), branch="runner", fold=projection.fold)
     try:
         keep = settings.keep or Keep(folder=settings.data / ARCHIVE)
         on_disk = anyio.to_thread.run_sync  # threads wait for disks; what computes goes to workers
         folder, prunes = settings.data / "recordings", keep.raw is None
         recordings = Recordings(folder, on_disk, prunes=prunes)
-        shelf = Shelf(journal, keep.folder, on_disk)
-        async with Workers.opened() as workers:
-            place = Place(_file(settings), keep.folder)
-            house.asked = Asked(workers.looks, place, shelf)
-            ours = Asked(workers.ours, place, shelf)  # what moves again waits behind nobody
-            house.aside = workers.looks
-            reach = ros2_reach(wall_clock)
+        archive_store = ArchiveStore(journal, keep.folder, on_disk)
+        async with RunnerWorkers.opened() as workers:
+            place = StoragePaths(_file(settings), keep.folder)
+            services.asked = WorkerQueries(workers.looks, place, archive_store)
+            ours = WorkerQueries(
+                workers.ours, place, archive_store
+            )  # what moves again waits behind nobody
+            services.run_in_worker = workers.looks
+            reach = ros2_reach(utc_us)
             robots = Robots(reach=reach, recordings=recordings)
             async with (
                 _kept(reach),
-                Control.opened(
-                    shelf,
+                ExecutionService.opened(
+                    archive_store,
                     robots,
-                    wall=wall_clock,
-                    aside=workers.starts,
+                    clock_us=utc_us,
+                    run_in_worker=workers.starts,
                     simulator=Simulators(),
-                    past=lambda run, whole: (ours if whole else house.asked).past(run, whole),
+                    past=lambda run, whole: (ours if whole else services.asked).past(run, whole),
                 ) as control,
             ):
-                house.asked.opened = ours.opened = control.open
-                house.control, house.hub = control, Hub(control, wall_clock)
-                house.crowd = Crowd(limits=settings.limits, keeps_one=True)
-                house.journal = journal
-                house.desk = Desk(control, shelf, on_disk, wall_clock, house.asked)
-                house.retention = Retention(
+                services.asked.opened = ours.opened = control.open
+                services.control, services.hub = control, Hub(control, utc_us)
+                services.connection_limits = ConnectionLimits(
+                    limits=settings.limits, keeps_one=True
+                )
+                services.journal = journal
+                services.review_service = ReviewService(
+                    control, archive_store, on_disk, utc_us, services.asked
+                )
+                services.retention = Retention(
                     journal,
                     recordings,
                     keep,
                     is_open=control.open.__contains__,
-                    wall=wall_clock,
-                    aside=on_disk,
+                    clock_us=utc_us,
+                    run_in_worker=on_disk,
                 )
                 async with anyio.create_task_group() as tasks:
-                    tasks.start_soon(house.desk.run)
-                    tasks.start_soon(house.retention.run)
-                    yield house
+                    tasks.start_soon(services.review_service.run)
+                    tasks.start_soon(services.retention.run)
+                    yield services
                     tasks.cancel_scope.cancel()
     finally:
         await journal.close()
@@ -119,34 +123,34 @@ def _database(settings: RunnerSettings) -> str:
 def create_app(settings: RunnerSettings) -> ASGIApp:
     """The runner as an ASGI application. Raises CannotStart."""
     Journal.prepare(_database(settings), "runner")
-    revoked = Revoked(settings.data)
-    house = House()
+    revoked = Revocations(settings.data)
+    services = RunnerServices()
     public = settings.reached.public
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_house(settings, house):
+        async with open_services(settings, services):
             yield
 
     async def ready() -> Readiness:
         problems: list[str] = []
         try:
-            await house.journal.position()
+            await services.journal.position()
         except Refused as refused:
             problems.append(refused.detail)
-        unrecorded = [each for each in house.control.open.values() if not each.recorder.recorded]
+        unrecorded = [each for each in services.control.open.values() if not each.recorder.recorded]
         if unrecorded:
             problems.append(f"{len(unrecorded)} runs are not being recorded")
         return Readiness(ready=not problems, problems=tuple(problems))
 
     def measures() -> dict[str, float]:
         return {
-            "action_assistant_runs_open": len(house.control.open),
-            "action_assistant_live_sockets": len(house.hub.boxes),
+            "action_assistant_runs_open": len(services.control.open),
+            "action_assistant_live_sockets": len(services.hub.boxes),
         }
 
     return application(
-        [*routes(house), *revocation(revoked)],
+        [*routes(services), *revocation(revoked)],
         title="TeMoto Action Assistant: runner",
         keys=Keys.of(settings.data),
         revoked=revoked,

@@ -7,22 +7,22 @@ from typing import Any, Final
 
 from anyio import CapacityLimiter
 
-from action_assistant.web import workers
-from action_assistant.web.workers import Crashed, Lane, kept_warm
+from action_assistant.web.workers import lanes as workers
+from action_assistant.web.workers.lanes import Crashed, Lane, kept_warm
 
-__all__ = ["Crashed", "Lane", "Workers", "child"]
+__all__ = ["Crashed", "Lane", "RunnerWorkers", "child"]
 
 #: What the server process has imported before it forks anybody.
 _PRELOADED: Final = (
-    "action_assistant.runner.starting",
+    "action_assistant.runner.start.start_checks",
     "action_assistant.runner.links.simulated",
-    "action_assistant.runner.review.stored",
+    "action_assistant.runner.review.worker_queries",
 )
 _NICE: Final = 5  # somebody waits for a start
 _NICER: Final = 10
 
 
-class Workers:
+class RunnerWorkers:
     """The lanes of a runner. `starts`: what stands between a person and a start, and what goes on
     with runs. `looks`: everything that is looked back on, which may take long. `ours`: what the runner
     itself has to know, behind nobody."""
@@ -35,7 +35,7 @@ class Workers:
 
     @classmethod
     @asynccontextmanager
-    async def opened(cls) -> "AsyncIterator[Workers]":
+    async def opened(cls) -> "AsyncIterator[RunnerWorkers]":
         """Workers, as long as you are inside. The first ones are made meanwhile."""
         lanes = cls()
         async with kept_warm(lanes.starts, lanes.looks, lanes.ours):

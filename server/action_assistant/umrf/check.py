@@ -11,12 +11,12 @@ from action_assistant.umrf.checks.scenarios import check_scenarios
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.subgraphs import check_subgraphs
 from action_assistant.umrf.checks.values import check_static, check_values
-from action_assistant.umrf.codec import ActionReading, Reading
 from action_assistant.umrf.codes import REFUSED, STRUCTURAL, rank
 from action_assistant.umrf.facts import PINNED, EngineFacts
+from action_assistant.umrf.files.codec import ActionReading, Reading
+from action_assistant.umrf.files.origins import placed
+from action_assistant.umrf.files.writing import write
 from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem, Signature
-from action_assistant.umrf.places import placed
-from action_assistant.umrf.writing import write
 
 __all__ = [
     "REFUSED",

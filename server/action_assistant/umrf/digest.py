@@ -5,9 +5,9 @@ from typing import Any
 
 import rfc8785
 
-from action_assistant.umrf.jsontext import Json, Number
+from action_assistant.umrf.files.writing import tree_of
+from action_assistant.umrf.json.text import Json, Number
 from action_assistant.umrf.model import Graph
-from action_assistant.umrf.writing import tree_of
 
 
 def digest(graph: Graph) -> str:

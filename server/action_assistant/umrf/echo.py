@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import msgspec
 
 from action_assistant.umrf.facts import EngineFacts
-from action_assistant.umrf.jsontext import Json, dump, parse_small
+from action_assistant.umrf.json.text import Json, dump, parse_small
 from action_assistant.umrf.model import (
     ENGINE_DEFAULTS,
     ENTRY,

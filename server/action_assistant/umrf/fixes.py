@@ -5,7 +5,7 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.umrf.jsontext import dump, parse_small
+from action_assistant.umrf.json.text import dump, parse_small
 from action_assistant.umrf.model import Action, Graph, Key, Parameter, Problem, Relation
 from action_assistant.umrf.parameters import with_example
 from action_assistant.umrf.relations import MAX_REFERRED_ID

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from action_assistant.umrf.jsontext import Json, Number, dump, parse_small
+from action_assistant.umrf.json.text import Json, Number, dump, parse_small
 from action_assistant.umrf.model import JsonText, Parameter
 
 #: The engine has no limit; a file of ours could not be read again beyond it.

@@ -5,7 +5,7 @@ from typing import Final, get_args
 
 import msgspec
 
-from action_assistant.umrf.jsontext import Json, Number
+from action_assistant.umrf.json.text import Json, Number
 from action_assistant.umrf.model import (
     ENGINE_DEFAULTS,
     PRECONDITIONS,

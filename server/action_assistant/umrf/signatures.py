@@ -5,7 +5,7 @@ See docs/umrf-and-the-engine.md 2.1.
 
 import msgspec
 
-from action_assistant.umrf.jsontext import Json, dump, parse_small
+from action_assistant.umrf.json.text import Json, dump, parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Parameter, Signature
 from action_assistant.umrf.parameters import flat_name
 

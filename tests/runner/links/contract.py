@@ -10,6 +10,8 @@ from contextlib import suppress
 import anyio
 import msgspec
 
+from action_assistant.runner.execution.echo_difference import difference
+from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
     EngineRefused,
@@ -20,9 +22,7 @@ from action_assistant.runner.links.port import (
     Report,
     Transitions,
 )
-from action_assistant.runner.sameness import difference
-from action_assistant.runner.seen import Snapshot
-from action_assistant.umrf import codec
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.runner.links import ros2_checkup
-from action_assistant.runner.links.ros2_checkup import environment
+from action_assistant.runner.links.ros2 import checkup
+from action_assistant.runner.links.ros2.checkup import environment
 
 NOBODY = 54_321  # an id that no file of accounts names, as those of containers
 
@@ -15,7 +15,7 @@ NOBODY = 54_321  # an id that no file of accounts names, as those of containers
 def test_shared_memory_of_a_container_whose_user_has_no_name_here_is_told_by_number(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ros2_checkup, "_SHM", tmp_path)
+    monkeypatch.setattr(checkup, "_SHM", tmp_path)
     (tmp_path / "fastrtps_port7411").touch()
     (tmp_path / "fastrtps_ended").symlink_to(tmp_path / "gone")
     os.chown(tmp_path / "fastrtps_port7411", NOBODY, NOBODY)
@@ -24,6 +24,6 @@ def test_shared_memory_of_a_container_whose_user_has_no_name_here_is_told_by_num
 
 
 def test_nobodys_memory_is_nothing_to_tell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ros2_checkup, "_SHM", tmp_path)
+    monkeypatch.setattr(checkup, "_SHM", tmp_path)
     (tmp_path / "fastrtps_port7411").touch()
     assert not [each for each in environment({}) if "Fast DDS too" in each.what]

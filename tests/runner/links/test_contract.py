@@ -7,7 +7,9 @@ from typing import Any
 import anyio
 import pytest
 
-from action_assistant.runner.links.absent import AbsentLink
+from action_assistant.runner.emulator.engine import EmulatedEngine
+from action_assistant.runner.emulator.messages import Stop
+from action_assistant.runner.links.observations import NodeState, Snapshot
 from action_assistant.runner.links.port import (
     EngineRefused,
     ForeignCommand,
@@ -18,15 +20,13 @@ from action_assistant.runner.links.port import (
     Report,
     Transitions,
 )
-from action_assistant.runner.seen import NodeState, Snapshot
-from action_assistant.runner.standin_engine import StandIn
-from action_assistant.runner.standin_wire import Stop
-from action_assistant.umrf import codec
+from action_assistant.runner.links.unreachable import UnreachableLink
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
-from runner.air import Air, now_ms
-from runner.air_link import AirLink
+from runner.fake_link import FakeLink
+from runner.fake_network import FakeNetwork, now_ms
+from runner.harness import engine, run_in_virtual_time, sequence, virtual
 from runner.links.contract import PROMISES, Bench, Promise, keep
-from runner.world import engine, live_through, sequence, virtual
 
 ENDLESS = {"*": [{"never": True}]}
 
@@ -65,18 +65,20 @@ async def simulator() -> AsyncIterator[Link]:
 @asynccontextmanager
 async def stand_in() -> AsyncIterator[Link]:
     """A stand-in robot, over messages that take their time and with all of its quirks."""
-    air = Air()
-    air.join(StandIn("David", script=script_from({"behaviours": SCRIPT}), born_ms=now_ms()))
-    async with blowing(air), alive(AirLink(air, "David")) as link:
+    network = FakeNetwork()
+    network.join(
+        EmulatedEngine("David", script=script_from({"behaviours": SCRIPT}), born_ms=now_ms())
+    )
+    async with blowing(network), alive(FakeLink(network, "David")) as link:
         await anyio.sleep(0.1)
         yield link
 
 
 @asynccontextmanager
-async def blowing(air: Air) -> AsyncIterator[None]:
+async def blowing(network: FakeNetwork) -> AsyncIterator[None]:
     """Messages travel."""
     async with anyio.create_task_group() as wind:
-        wind.start_soon(air.blow)
+        wind.start_soon(network.blow)
         yield
         wind.cancel_scope.cancel()
 
@@ -89,18 +91,18 @@ def test_a_link_keeps_what_every_link_promises(promise: Promise, behind: Any) ->
             bench = Bench(link=link, endless=sequence("endless"), quick=sequence("quick"))
             await keep(promise, bench)
 
-    live_through(main)
+    run_in_virtual_time(main)
 
 
 @virtual
 async def test_commands_of_others_are_reported() -> None:
     heard: list[Report] = []
-    air = Air()
-    async with alive(AirLink(air, "David")) as link, blowing(air):
+    network = FakeNetwork()
+    async with alive(FakeLink(network, "David")) as link, blowing(network):
         with link.listen(heard.append):
             await anyio.sleep(0.1)
-            air.carry(Stop(graph_name="patrol", targets=("Carol",)), "terminal")
-            air.carry(Stop(graph_name="patrol", targets=("David",)), "terminal")
+            network.carry(Stop(graph_name="patrol", targets=("Carol",)), "terminal")
+            network.carry(Stop(graph_name="patrol", targets=("David",)), "terminal")
     foreign = [each for each in heard if isinstance(each, ForeignCommand)]
     assert [(each.command, each.graph, each.sender) for each in foreign] == [
         ("stop", "patrol", "terminal")
@@ -162,7 +164,7 @@ async def test_an_engine_that_is_switched_off_answers_nothing() -> None:
 
 @virtual
 async def test_a_link_that_is_not_there_says_so_whatever_it_is_asked() -> None:
-    link = AbsentLink("no link")
+    link = UnreachableLink("no link")
     with pytest.raises(NotSent, match="no link"):
         await link.stop("patrol")
     with pytest.raises(NotSent, match="no link"):

@@ -15,17 +15,17 @@ import pytest
 from action_assistant.runner.links.port import (
     EngineChanged,
     EngineRefused,
+    GraphOutline,
     NoAnswer,
     NotSent,
-    Outline,
     Report,
     Transitions,
 )
 from action_assistant.runner.links.simulated import SimulatedLink, Simulators
 from action_assistant.umrf.facts import SIMULATED
+from runner.harness import carousel, sequence
 from runner.links.contract import PROMISES, Bench, Promise, has_ended, keep, moves, placed, shown
 from runner.links.test_contract import SCRIPT
-from runner.world import carousel, sequence
 
 pytestmark = pytest.mark.anyio
 
@@ -58,7 +58,7 @@ async def test_it_keeps_what_every_link_promises(promise: Promise) -> None:
 async def test_it_reads_the_graph_from_the_text_that_is_sent() -> None:
     async with simulated() as link:
         order = placed(sequence("quick"), "r1")
-        outline = Outline("quick", {})
+        outline = GraphOutline("quick", {})
         await link.start(msgspec.structs.replace(order, graph=outline))
         bench = Bench(link=link, endless=sequence("endless"), quick=sequence("quick"))
         assert (await shown(bench, bench.quick, has_ended("FINISHED"))).run == "r1"

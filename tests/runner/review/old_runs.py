@@ -17,15 +17,16 @@ import msgspec
 from action_assistant.journal import sqlite as sqlite_journal
 from action_assistant.journal.events import Draft, Event
 from action_assistant.journal.journal import Journal
-from action_assistant.runner import archive
-from action_assistant.runner.events import Ended, Observed, Published, encode
-from action_assistant.runner.recorder import stream_of
-from action_assistant.runner.recordings import Recordings
-from action_assistant.runner.review import about, bundle
-from action_assistant.runner.review.retention import Retention
-from action_assistant.runner.review.shelf import Shelf
-from action_assistant.runner.runs import replay
-from action_assistant.runner.seen import NodeState
+from action_assistant.runner import projection
+from action_assistant.runner.analysis import annotations
+from action_assistant.runner.archives import archive_file
+from action_assistant.runner.archives.archive_store import ArchiveStore
+from action_assistant.runner.archives.retention import Retention
+from action_assistant.runner.links.observations import NodeState
+from action_assistant.runner.robots.recordings import Recordings
+from action_assistant.runner.runs.events import Ended, Observed, Published, encode
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.settings import Keep
 from runner.test_runs import REQUESTED
 
@@ -38,7 +39,7 @@ _HOURS: Final = ("1970-03-01T07", "1970-03-01T08", "1970-04-10T23")
 
 def opened(data: Path) -> "asyncio.Future[Journal]":
     url = f"sqlite:///{data / 'runner.db'}"
-    return asyncio.ensure_future(Journal.open(url, branch="runner", fold=archive.fold))
+    return asyncio.ensure_future(Journal.open(url, branch="runner", fold=projection.fold))
 
 
 async def filled(data: Path) -> None:
@@ -69,24 +70,26 @@ async def add_run(journal: Journal, run: str, number: int, length: int, ended_at
         await journal.append(stream_of(run), drafts[i : i + 500])
     told = replay(events)
     assert told is not None
-    await journal.append(about.stream_about(run), [about.draft(about.sum_of(told, None, ended_at))])
+    await journal.append(
+        annotations.stream_about(run), [annotations.draft(annotations.sum_of(told, None, ended_at))]
+    )
 
 
 def retention(journal: Journal, data: Path, **more: Any) -> Retention:
     keep = Keep(folder=data / "archive", runs=30, raw=7)
     recordings = Recordings(data / "recordings", asyncio.to_thread, prunes=False)
-    fields: dict[str, Any] = {"is_open": lambda _: False, "wall": lambda: NOW}
-    return Retention(journal, recordings, keep, aside=asyncio.to_thread, **(fields | more))
+    fields: dict[str, Any] = {"is_open": lambda _: False, "clock_us": lambda: NOW}
+    return Retention(journal, recordings, keep, run_in_worker=asyncio.to_thread, **(fields | more))
 
 
-def shelf(journal: Journal, data: Path) -> Shelf:
-    return Shelf(journal, data / "archive", asyncio.to_thread)
+def archive_store(journal: Journal, data: Path) -> ArchiveStore:
+    return ArchiveStore(journal, data / "archive", asyncio.to_thread)
 
 
 async def everything(journal: Journal, data: Path) -> dict[str, list[Event]]:
     """All runs, wherever they are kept; the journal has to be sound."""
     assert await journal.verify() == []
-    read = shelf(journal, data).read
+    read = archive_store(journal, data).read
     return {run: await read(stream_of(run)) for run in LENGTHS}
 
 
@@ -120,10 +123,10 @@ def put_away(data: Path, dies_at: int) -> None:
 
 
 _STEPS: Final[tuple[tuple[Any, str], ...]] = (
-    (bundle.Bundle, "add"),
-    (bundle.Bundle, "close"),
-    (bundle, "sha256_of"),
-    (bundle, "_settle"),
+    (archive_file.ArchiveFile, "add"),
+    (archive_file.ArchiveFile, "close"),
+    (archive_file, "sha256_of"),
+    (archive_file, "_settle"),
     (os, "fsync"),
     (Path, "replace"),
     (Path, "unlink"),

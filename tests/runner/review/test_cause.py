@@ -6,9 +6,12 @@ import msgspec
 import pytest
 
 from action_assistant.journal.events import Draft
-from action_assistant.places import examples
-from action_assistant.runner import recorded_runs
-from action_assistant.runner.events import (
+from action_assistant.paths import examples
+from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.causes import Cause, causes
+from action_assistant.runner.archives import examples as recorded_runs
+from action_assistant.runner.links.observations import GraphState, NodeResult, NodeState
+from action_assistant.runner.runs.events import (
     AlarmRaised,
     Author,
     Ended,
@@ -20,16 +23,14 @@ from action_assistant.runner.events import (
     StopRequested,
     decode,
 )
-from action_assistant.runner.review.cause import Cause, causes
-from action_assistant.runner.review.cause_words import words
-from action_assistant.runner.runs import Run, replay
-from action_assistant.runner.seen import GraphState, NodeResult, NodeState
-from action_assistant.umrf import codec
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.run import Run
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
+from runner.harness import ANN
 from runner.process import RunnerProcess
 from runner.record_examples import graph, line, recorded
-from runner.review.test_desk import eventually
-from runner.world import ANN
+from runner.review.test_service import eventually
 
 EXAMPLES = {
     "wrong_parameter": 'Grip was started with speed = "fast": a number was expected.',

@@ -4,15 +4,16 @@ from typing import Any
 
 import msgspec
 
-from action_assistant.runner.events import Ended, Observed, Published
-from action_assistant.runner.review.compare import compare
-from action_assistant.runner.runs import Run, replay
-from action_assistant.runner.seen import NodeResult, NodeState
-from action_assistant.umrf import codec
+from action_assistant.runner.analysis.comparison import compare
+from action_assistant.runner.links.observations import NodeResult, NodeState
+from action_assistant.runner.runs.events import Ended, Observed, Published
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
+from runner.harness import sequence
 from runner.test_runs import REQUESTED
-from runner.world import sequence
 
 PLAN = sequence(actions=2)
 

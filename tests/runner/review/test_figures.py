@@ -13,17 +13,23 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from action_assistant.runner import shapes
-from action_assistant.runner.durations import Took, at_rank, took_us
-from action_assistant.runner.recorder import stream_of
-from action_assistant.runner.review import about, again, compare, exports, statistics
-from action_assistant.runner.review.desk import Desk
-from action_assistant.runner.review.shelf import Shelf
-from action_assistant.umrf import codec
+from action_assistant.runner.analysis import (
+    annotations,
+    comparison,
+    expected_runs,
+    exports,
+    statistics,
+)
+from action_assistant.runner.archives.archive_store import ArchiveStore
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.durations import Took, at_rank, took_us
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
-from runner.bounds import Air, Lived, lived
+from runner.bounds import Lived, NetworkFaults, lived
+from runner.harness import at_once, clock_us, run_in_virtual_time
 from runner.test_bounds import AIRS, CALL
-from runner.world import at_once, live_through, wall
 
 SCRIPTS = st.dictionaries(
     st.sampled_from(["Work_0", "Work_1", "*"]), st.lists(CALL, min_size=1, max_size=1), max_size=3
@@ -49,11 +55,11 @@ def durations(told: Lived) -> dict[str, int]:
 
 def figures(told: Lived) -> statistics.Statistics:
     """Statistics of such a run, from what is kept of it."""
-    ledger = told.place.world.ledger
+    ledger = told.place.harness.ledger
 
     async def found() -> statistics.Statistics:
-        draft = about.draft(about.sum_of(told.run, None, 0))
-        await ledger.append(about.stream_about(told.run.id), [draft])
+        draft = annotations.draft(annotations.sum_of(told.run, None, 0))
+        await ledger.append(annotations.stream_about(told.run.id), [draft])
         rows = await ledger.query(statistics.runs_of(told.run.graph_name, None, 10))
         sums = await ledger.query(statistics.sums_of([row.id for row in rows]))
         return statistics.statistics(rows, sums, graph_of(told))
@@ -62,7 +68,7 @@ def figures(told: Lived) -> statistics.Statistics:
 
 
 def graph_of(told: Lived) -> Graph:
-    (requested, *_) = told.place.world.ledger.told(told.run.id)
+    (requested, *_) = told.place.harness.ledger.told(told.run.id)
     return codec.read(getattr(requested, "umrf", "").encode()).graph
 
 
@@ -75,13 +81,13 @@ def graph_of(told: Lived) -> Graph:
 @given(
     graph=st.sampled_from(["line", "join", "ends"]),
     script=SCRIPTS,
-    air=AIRS,
+    network=AIRS,
     stop=st.none() | st.floats(0.1, 9.0),
 )
 def test_the_truth_lies_inside_of_every_figure(
-    graph: str, script: dict[str, list[dict[str, Any]]], air: Air, stop: float | None
+    graph: str, script: dict[str, list[dict[str, Any]]], network: NetworkFaults, stop: float | None
 ) -> None:
-    told = lived(graph, script, air, stop)
+    told = lived(graph, script, network, stop)
     run, real = told.run, durations(told)
     for row in csv.DictReader(io.StringIO(exports.intervals(run).decode())):
         if row["action"] in real and row["seconds_least"]:
@@ -90,7 +96,7 @@ def test_the_truth_lies_inside_of_every_figure(
             assert (
                 not row["seconds"] or abs(float(row["seconds"]) - real[row["action"]] / 1e6) < 0.002
             )
-    for name, shown in shapes.shown(run).actions.items():
+    for name, shown in views.shown(run).actions.items():
         for visit in shown.visits:
             if visit.until is None or visit.not_after is None or name not in real:
                 continue
@@ -114,7 +120,7 @@ def test_the_truth_lies_inside_of_every_figure(
             point.span.least - ROUNDED <= (last - run.started_at) / 1e6 + 0.5
         )  # the engine's own end
         assert point.span.most is None or (last - run.started_at) / 1e6 <= point.span.most + ROUNDED
-    for name, calls in again.recorded(run).behaviours.items():
+    for name, calls in expected_runs.recorded(run).behaviours.items():
         after = calls[0].get("after_s")
         (visit, *_) = run.actions[name].visits
         if after is not None and visit.most is not None:
@@ -122,7 +128,7 @@ def test_the_truth_lies_inside_of_every_figure(
 
 
 def test_a_robot_that_tells_no_results_has_neither_failed_nor_passed_arrows_by() -> None:
-    told = lived("line", {"*": [{"after_s": 1.0}]}, Air(), None)
+    told = lived("line", {"*": [{"after_s": 1.0}]}, NetworkFaults(), None)
     assert told.run.end == "finished"
     found = figures(told)
     assert (found.judged, found.succeeded, found.unknown) == (0, 0, 1)
@@ -132,7 +138,7 @@ def test_a_robot_that_tells_no_results_has_neither_failed_nor_passed_arrows_by()
 
 
 def test_a_run_took_as_long_as_it_moved_and_not_until_that_was_proven() -> None:
-    told = lived("line", {"*": [{"after_s": 1.0}]}, Air(get_loss=0.0), None)
+    told = lived("line", {"*": [{"after_s": 1.0}]}, NetworkFaults(get_loss=0.0), None)
     (point,) = figures(told).runs
     assert point.took is None
     assert point.span is not None
@@ -144,29 +150,30 @@ def test_a_run_took_as_long_as_it_moved_and_not_until_that_was_proven() -> None:
 
 
 def test_what_ended_unseen_and_what_was_seen_to_go_on_are_not_the_same() -> None:
-    done = lived("line", {"*": [{"after_s": 1.0}]}, Air(), None)
-    other = lived("line", {"*": [{"never": True, "ignores_stop": True}]}, Air(), None)
+    done = lived("line", {"*": [{"after_s": 1.0}]}, NetworkFaults(), None)
+    other = lived("line", {"*": [{"never": True, "ignores_stop": True}]}, NetworkFaults(), None)
     texts = [
-        getattr(each.place.world.ledger.told(each.run.id)[0], "umrf", "") for each in (done, other)
+        getattr(each.place.harness.ledger.told(each.run.id)[0], "umrf", "")
+        for each in (done, other)
     ]
-    found = compare.compare(done.run, other.run, *texts)
+    found = comparison.compare(done.run, other.run, *texts)
     first = next(step for step in found.steps if step.action == "Work_0")
     assert first.relation == "end"
-    twice = compare.compare(done.run, done.run, texts[0], texts[0])
+    twice = comparison.compare(done.run, done.run, texts[0], texts[0])
     assert {step.relation for step in twice.steps} == {"unknown"}
     assert "not known" in twice.text
 
 
 def test_a_script_says_between_which_bounds_it_had_to_choose() -> None:
-    told = lived("line", {"*": [{"after_s": 3.0}]}, Air(), None)
-    found = again.recorded(told.run)
+    told = lived("line", {"*": [{"after_s": 3.0}]}, NetworkFaults(), None)
+    found = expected_runs.recorded(told.run)
     assert 2.0 <= found.behaviours["Work_0"][0]["after_s"] <= 4.0
     assert any("between" in doubt.text for doubt in found.doubts)
 
 
 def test_visits_stand_in_mcap_between_their_bounds() -> None:
-    told = lived("line", {"*": [{"after_s": 3.0}]}, Air(), None)
-    events = told.place.world.ledger.streams[stream_of(told.run.id)]
+    told = lived("line", {"*": [{"after_s": 3.0}]}, NetworkFaults(), None)
+    events = told.place.harness.ledger.streams[stream_of(told.run.id)]
     read = make_reader(io.BytesIO(exports.mcap(events)))
     visits = {
         channel.topic: msgspec.json.decode(message.data)
@@ -198,25 +205,30 @@ def test_a_percentile_of_ranges_holds_that_of_what_was_true(
 
 
 def test_runs_that_an_older_version_has_summed_up_are_summed_up_again(tmp_path: Path) -> None:
-    told = lived("line", {"*": [{"after_s": 2.0}]}, Air(), None)
-    ledger = told.place.world.ledger
-    old = {"Work_0": about.ActionSum(visits=1, took=(0,)), "Work_1": about.ActionSum(visits=1)}
+    told = lived("line", {"*": [{"after_s": 2.0}]}, NetworkFaults(), None)
+    ledger = told.place.harness.ledger
+    old = {
+        "Work_0": annotations.ActionSum(visits=1, took=(0,)),
+        "Work_1": annotations.ActionSum(visits=1),
+    }
 
     async def again_() -> list[Any]:
-        stream = about.stream_about(told.run.id)
+        stream = annotations.stream_about(told.run.id)
         ledger.streams.pop(stream, None)
-        await ledger.append(stream, [about.draft(about.SummedUp(1, old))])
+        await ledger.append(stream, [annotations.draft(annotations.SummedUp(1, old))])
         before = await ledger.query(statistics.sums_of([told.run.id]))
         assert [row.took for row in before if row.took] == [[[0, None]]]  # at least: it is no value
-        async with told.place.world.runner() as control, anyio.create_task_group() as tasks:
-            desk = Desk(control, Shelf(ledger, tmp_path, at_once), at_once, wall)
-            tasks.start_soon(desk.run)
+        async with told.place.harness.runner() as control, anyio.create_task_group() as tasks:
+            review_service = ReviewService(
+                control, ArchiveStore(ledger, tmp_path, at_once), at_once, clock_us
+            )
+            tasks.start_soon(review_service.run)
             await anyio.sleep(5)
             tasks.cancel_scope.cancel()
         assert len(ledger.streams[stream]) == 2  # once, and no more
         return await ledger.query(statistics.sums_of([told.run.id]))
 
-    rows = live_through(again_)
+    rows = run_in_virtual_time(again_)
     assert {row.action for row in rows} == {f"Work_{i}" for i in range(4)}
     for row in rows:
         ((least, most),) = row.took

@@ -12,15 +12,17 @@ import pytest
 from sqlalchemy import select
 
 from action_assistant.journal.events import Event
-from action_assistant.journal.tables import run
-from action_assistant.runner.events import Author
-from action_assistant.runner.recorder import stream_of
-from action_assistant.runner.review import about, bundle
-from action_assistant.runner.review.film import film
-from action_assistant.runner.review.reel import Reels
-from action_assistant.runner.review.shelf import Archived
+from action_assistant.runner.analysis import annotations
+from action_assistant.runner.analysis.keyframes import KeyframeStore
+from action_assistant.runner.analysis.replay import run_replay
+from action_assistant.runner.archives import archive_file
+from action_assistant.runner.archives.archive_store import Archived
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.schema.runner_tables import run
 from runner.review.old_runs import (
     LENGTHS,
+    archive_store,
     copies,
     everything,
     filled,
@@ -28,7 +30,6 @@ from runner.review.old_runs import (
     put_away,
     raw_messages,
     retention,
-    shelf,
     waited,
 )
 
@@ -52,8 +53,8 @@ def data(old: Path, tmp_path: Path) -> Path:
 async def test_an_archived_run_looks_as_it_did(data: Path) -> None:
     journal = await opened(data)
     before = await everything(journal, data)
-    shelved = shelf(journal, data)
-    film_before = await film(Reels(shelved, asyncio.to_thread), "r2", after=2_000)
+    shelved = archive_store(journal, data)
+    film_before = await run_replay(KeyframeStore(shelved, asyncio.to_thread), "r2", after=2_000)
     rows = await journal.query(select(run.c.id, run.c.summary, run.c.state, run.c.result))
     swept = await retention(journal, data).sweep(30, None)
     assert (swept.runs, swept.more, swept.problems) == (3, False, [])
@@ -61,7 +62,10 @@ async def test_an_archived_run_looks_as_it_did(data: Path) -> None:
     assert [await shelved.read(stream_of(each)) for each in LENGTHS] == list(before.values())
     assert await shelved.read("run/r2", after=10, limit=3) == before["r2"][10:13]
     assert await shelved.read("run/r2", after=10, upto=11) == before["r2"][10:11]
-    assert await film(Reels(shelved, asyncio.to_thread), "r2", after=2_000) == film_before
+    assert (
+        await run_replay(KeyframeStore(shelved, asyncio.to_thread), "r2", after=2_000)
+        == film_before
+    )
     assert (await retention(journal, data).sweep(30, None)).runs == 0
     for _ in range(2):
         again = select(run.c.id, run.c.summary, run.c.state, run.c.result).order_by(run.c.number)
@@ -75,8 +79,8 @@ async def test_an_archived_run_looks_as_it_did(data: Path) -> None:
 
 async def test_pinned_and_young_and_open_runs_stay(data: Path) -> None:
     journal = await opened(data)
-    marked = about.Marked(1, Author("ann", "Ann"), about.Marks(pinned=True))
-    await journal.append(about.stream_about("r1"), [about.draft(marked)])
+    marked = annotations.Marked(1, Author("ann", "Ann"), annotations.Marks(pinned=True))
+    await journal.append(annotations.stream_about("r1"), [annotations.draft(marked)])
     only = retention(journal, data, is_open=lambda each: each == "r2")
     assert (await only.sweep(98, None)).runs == 0
     assert (await only.sweep(30, None)).runs == 1
@@ -90,16 +94,16 @@ async def test_an_archive_that_is_gone_or_damaged_is_named(data: Path) -> None:
     path = data / "archive" / "runs" / "1970-01" / "run-000001-r1.jsonl.gz"
     moved = path.rename(data / "moved.gz")
     with pytest.raises(Archived, match=r"archived on 1970-04-11 as runs/.*runs restore"):
-        await shelf(journal, data).read("run/r1")
+        await archive_store(journal, data).read("run/r1")
     whole = moved.read_bytes()
     path.write_bytes(whole[:200] + b"?" + whole[201:])
-    with pytest.raises(bundle.Damaged):
-        await shelf(journal, data).read("run/r1")
+    with pytest.raises(archive_file.Damaged):
+        await archive_store(journal, data).read("run/r1")
     shutil.copy(path.parent / "run-000003-r3.jsonl.gz", path)
-    with pytest.raises(bundle.Damaged):
-        await shelf(journal, data).read("run/r1")
+    with pytest.raises(archive_file.Damaged):
+        await archive_store(journal, data).read("run/r1")
     path.write_bytes(whole)
-    assert len(await shelf(journal, data).read("run/r1")) == 12
+    assert len(await archive_store(journal, data).read("run/r1")) == 12
     await journal.close()
 
 

@@ -5,18 +5,18 @@ from typing import Any, Final
 from litestar import Request, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor import importing
-from action_assistant.editor.house import Door
-from action_assistant.editor.importing import Pieces
-from action_assistant.editor.rehearsal import Rehearsal, Rehearsing, rehearsed
+from action_assistant.editor.interchange import importing
+from action_assistant.editor.interchange.importing import Pieces
+from action_assistant.editor.interchange.rehearsal import Rehearsal, Rehearsing, rehearsed
+from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
-from action_assistant.web.access import Needs
-from action_assistant.web.asgi import BODY_LIMIT
+from action_assistant.web.auth.access import Needs
+from action_assistant.web.server.application import BODY_LIMIT
 
 _SCRIPT: Final = 1_000_000  # bytes of a body that says what to play
 
 
-def routes(door: Door) -> list[ControllerRouterHandler]:
+def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """Everything that only helps to draw."""
 
     @post(
@@ -29,7 +29,7 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         request_max_body_size=BODY_LIMIT,
     )
     async def read_pieces(request: Request[Any, Any, Any]) -> Pieces:
-        found = await door.house.workers.files(importing.pieces, await request.body())
+        found = await app_state.services.workers.files(importing.pieces, await request.body())
         pieces: Pieces = encoded(found)
         return pieces
 
@@ -42,10 +42,10 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         request_max_body_size=_SCRIPT,
     )
     async def rehearse(graph_id: str, data: Rehearsing) -> Rehearsal:
-        house = door.house
-        await house.catalogue.require(graph_id)
-        sight = await house.sights.moment(graph_id, data.seq)
-        played: Rehearsal = encoded(await house.workers.files(rehearsed, sight, data))
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        sight = await services.graph_reader.moment(graph_id, data.seq)
+        played: Rehearsal = encoded(await services.workers.files(rehearsed, sight, data))
         return played
 
     return [read_pieces, rehearse]

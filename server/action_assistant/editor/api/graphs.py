@@ -7,18 +7,20 @@ from litestar import Request, Response, delete, get, patch, post
 from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor import contents, edits, importing
-from action_assistant.editor import happenings as h
-from action_assistant.editor.catalogue import GraphView
-from action_assistant.editor.history import Entry
-from action_assistant.editor.house import Door
-from action_assistant.editor.importing import Preview, Reading
-from action_assistant.editor.rewriting import Rewriting, rewritten
+from action_assistant.editor.catalogue import server_edits
+from action_assistant.editor.catalogue.catalogue import GraphView
+from action_assistant.editor.catalogue.history import HistoryEntry
+from action_assistant.editor.documents import contents
+from action_assistant.editor.interchange import importing
+from action_assistant.editor.interchange.edited_text import TextEdit, edited_text
+from action_assistant.editor.interchange.importing import ImportReport, Preview
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.model import Problem
-from action_assistant.web.access import Needs, person_of
-from action_assistant.web.asgi import BODY_LIMIT
+from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.server.application import BODY_LIMIT
 
 Asking = Request[Any, Any, Any]
 Seq = Annotated[int, Parameter(ge=1)]
@@ -27,7 +29,7 @@ Seq = Annotated[int, Parameter(ge=1)]
 class MadeGraph(GraphView, frozen=True, omit_defaults=True):
     """A new graph; `reading` is there when it was read from a file."""
 
-    reading: Reading | None = None
+    reading: ImportReport | None = None
 
 
 class Describing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -50,15 +52,15 @@ class Restoring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seq: int
 
 
-def routes(door: Door) -> list[ControllerRouterHandler]:
+def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """Everything under `/api/graphs` except versions and rooms."""
-    return [*_catalogue(door), *_contents(door), *_past(door)]
+    return [*_catalogue(app_state), *_contents(app_state), *_past(app_state)]
 
 
-def _catalogue(door: Door) -> list[ControllerRouterHandler]:
+def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
     @get("/api/graphs", summary="All graphs, the last changed first", operation_id="listGraphs")
     async def list_graphs(deleted: bool = False) -> list[GraphView]:
-        return await door.house.catalogue.all(deleted=deleted)
+        return await app_state.services.catalogue.all(deleted=deleted)
 
     @post(
         "/api/graphs",
@@ -72,18 +74,18 @@ def _catalogue(door: Door) -> list[ControllerRouterHandler]:
         request: Asking, preview: bool = False
     ) -> Response[MadeGraph] | Response[Preview]:
         if preview:
-            found = await door.house.workers.files(importing.preview, await request.body())
+            found = await app_state.services.workers.files(importing.preview, await request.body())
             return Response(encoded(found), status_code=200)
-        house, person = door.house, person_of(request)
-        await house.people.seen(person)
-        made, told = await house.catalogue.create(await request.body(), person.id)
+        services, person = app_state.services, person_of(request)
+        await services.people.seen(person)
+        made, told = await services.catalogue.create(await request.body(), person.id)
         reading = None if told is None else encoded(told)
         body = MadeGraph(**msgspec.structs.asdict(made), reading=reading)
         return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 
     @get("/api/graphs/{graph_id:str}", summary="One graph", operation_id="getGraph")
     async def get_graph(graph_id: str) -> GraphView:
-        return await door.house.catalogue.get(graph_id)
+        return await app_state.services.catalogue.get(graph_id)
 
     @patch(
         "/api/graphs/{graph_id:str}",
@@ -92,9 +94,9 @@ def _catalogue(door: Door) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def describe_graph(graph_id: str, data: Describing, request: Asking) -> GraphView:
-        house, person = door.house, person_of(request)
-        await house.people.seen(person)
-        return await house.catalogue.describe(
+        services, person = app_state.services, person_of(request)
+        await services.people.seen(person)
+        return await services.catalogue.describe(
             graph_id, person.id, name=data.name, description=data.description
         )
 
@@ -105,9 +107,9 @@ def _catalogue(door: Door) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def delete_graph(graph_id: str, request: Asking) -> None:
-        house, person = door.house, person_of(request)
-        await house.people.seen(person)
-        await house.catalogue.delete(graph_id, person.id)
+        services, person = app_state.services, person_of(request)
+        await services.people.seen(person)
+        await services.catalogue.delete(graph_id, person.id)
 
     @post(
         "/api/graphs/{graph_id:str}/recover",
@@ -117,24 +119,24 @@ def _catalogue(door: Door) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def recover_graph(graph_id: str, request: Asking) -> GraphView:
-        house, person = door.house, person_of(request)
-        await house.people.seen(person)
-        return await house.catalogue.recover(graph_id, person.id)
+        services, person = app_state.services, person_of(request)
+        await services.people.seen(person)
+        return await services.catalogue.recover(graph_id, person.id)
 
     return [list_graphs, create_graph, get_graph, describe_graph, delete_graph, recover_graph]
 
 
-def _contents(door: Door) -> list[ControllerRouterHandler]:
+def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
     @get(
         "/api/graphs/{graph_id:str}/umrf",
         summary="A graph as UMRF, now or after its change `at`",
         operation_id="getUmrf",
     )
     async def get_umrf(graph_id: str, at: Seq | None = None) -> Response[bytes]:
-        house = door.house
-        await house.catalogue.require(graph_id)
-        sight = await house.sights.moment(graph_id, at)
-        text = await house.sights.ask(contents.umrf, sight)
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        sight = await services.graph_reader.moment(graph_id, at)
+        text = await services.graph_reader.ask(contents.umrf, sight)
         return Response(text, media_type="application/json", headers={"x-seq": str(sight.seq)})
 
     @get(
@@ -143,10 +145,10 @@ def _contents(door: Door) -> list[ControllerRouterHandler]:
         operation_id="getProblems",
     )
     async def get_problems(graph_id: str, seq: Seq | None = None) -> Problems:
-        house = door.house
-        await house.catalogue.require(graph_id)
-        sight = await house.sights.moment(graph_id, seq)
-        return Problems(sight.seq, encoded(await house.sights.problems(sight)))
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        sight = await services.graph_reader.moment(graph_id, seq)
+        return Problems(sight.seq, encoded(await services.graph_reader.problems(sight)))
 
     @post(
         "/api/graphs/{graph_id:str}/rewriting",
@@ -156,18 +158,18 @@ def _contents(door: Door) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
         request_max_body_size=BODY_LIMIT,
     )
-    async def get_rewriting(graph_id: str, seq: Seq, request: Asking) -> Rewriting:
-        house = door.house
+    async def get_rewriting(graph_id: str, seq: Seq, request: Asking) -> TextEdit:
+        services = app_state.services
         text = await request.body()
-        await house.catalogue.require(graph_id)
-        then = await house.sights.at(graph_id, seq)
-        answer: Rewriting = encoded(await house.workers.files(rewritten, then, text))
+        await services.catalogue.require(graph_id)
+        then = await services.graph_reader.at(graph_id, seq)
+        answer: TextEdit = encoded(await services.workers.files(edited_text, then, text))
         return answer
 
     return [get_umrf, get_problems, get_rewriting]
 
 
-def _past(door: Door) -> list[ControllerRouterHandler]:
+def _past(app_state: EditorState) -> list[ControllerRouterHandler]:
     @get(
         "/api/graphs/{graph_id:str}/history",
         summary="What was done to a graph, newest first",
@@ -177,10 +179,10 @@ def _past(door: Door) -> list[ControllerRouterHandler]:
         graph_id: str,
         limit: Annotated[int, Parameter(ge=1, le=1000)] = 100,
         before: Seq | None = None,
-    ) -> list[Entry]:
-        house = door.house
-        await house.catalogue.require(graph_id)
-        return await house.history.of(graph_id, limit=limit, before=before)
+    ) -> list[HistoryEntry]:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        return await services.history.of(graph_id, limit=limit, before=before)
 
     @get(
         "/api/graphs/{graph_id:str}/diff",
@@ -192,11 +194,13 @@ def _past(door: Door) -> list[ControllerRouterHandler]:
         before: Annotated[int, Parameter(query="from", ge=1)],
         after: Annotated[int | None, Parameter(query="to", ge=1)] = None,
     ) -> Difference:
-        house = door.house
-        await house.catalogue.require(graph_id)
-        then = await house.sights.at(graph_id, before)
-        later = await house.sights.moment(graph_id, after)
-        found: Difference = encoded(await house.sights.ask(contents.differing, then, later))
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        then = await services.graph_reader.at(graph_id, before)
+        later = await services.graph_reader.moment(graph_id, after)
+        found: Difference = encoded(
+            await services.graph_reader.ask(contents.differing, then, later)
+        )
         return found
 
     @post(
@@ -207,16 +211,18 @@ def _past(door: Door) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def restore_graph(graph_id: str, data: Restoring, request: Asking) -> GraphView:
-        house, person = door.house, person_of(request)
-        await house.catalogue.require(graph_id)
-        await house.people.seen(person)
-        then = await house.sights.at(graph_id, data.seq)
-        async with house.rooms.enter(h.graph_stream(graph_id)) as room:
+        services, person = app_state.services, person_of(request)
+        await services.catalogue.require(graph_id)
+        await services.people.seen(person)
+        then = await services.graph_reader.at(graph_id, data.seq)
+        async with services.rooms.enter(h.graph_stream(graph_id)) as room:
             before = room.seq
-            seq = await edits.restore(room, person.id, then.state, aside=house.workers.graphs)
+            seq = await server_edits.restore(
+                room, person.id, then.state, run_in_worker=services.workers.graphs
+            )
         if seq > before:
-            deed = h.draft(h.RESTORED, person.id, h.Restored(data.seq, seq))
-            await house.journal.append(h.about_stream(graph_id), [deed])
-        return await house.catalogue.get(graph_id)
+            restored = h.draft(h.RESTORED, person.id, h.GraphRestored(data.seq, seq))
+            await services.journal.append(h.about_stream(graph_id), [restored])
+        return await services.catalogue.get(graph_id)
 
     return [get_history, get_difference, restore_graph]

@@ -9,13 +9,13 @@ from anyio import to_thread
 from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.house import Door
-from action_assistant.editor.invitations import Invitation
+from action_assistant.editor.catalogue.invitations import Invitation
+from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput, Conflict
-from action_assistant.web.access import Needs, person_of
-from action_assistant.web.addresses import Addresses
-from action_assistant.web.keys import Author
-from action_assistant.web.signed_in import OpenSession, SignedInBrowsers
+from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.auth.session_files import OpenSession, SessionFiles
+from action_assistant.web.network.addresses import Addresses
 
 
 class Sharing(msgspec.Struct, frozen=True):
@@ -40,13 +40,13 @@ class Inviting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(
-    door: Door, addresses: Addresses, browsers: SignedInBrowsers
+    app_state: EditorState, addresses: Addresses, browsers: SessionFiles
 ) -> list[ControllerRouterHandler]:
     """Everything under `/api/invitations` and `/api/sessions`."""
-    return [*_links(door, addresses), *_one(door, addresses), *_sessions(browsers)]
+    return [*_links(app_state, addresses), *_one(app_state, addresses), *_sessions(browsers)]
 
 
-def _sessions(browsers: SignedInBrowsers) -> list[ControllerRouterHandler]:
+def _sessions(browsers: SessionFiles) -> list[ControllerRouterHandler]:
     @get(
         "/api/sessions",
         summary="Browsers that are signed in, the newest first",
@@ -69,7 +69,7 @@ def _sessions(browsers: SignedInBrowsers) -> list[ControllerRouterHandler]:
     return [list_sessions, end]
 
 
-def _links(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
+def _links(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterHandler]:
     @get(
         "/api/invitations",
         summary="All links, the newest first, with who came in by them",
@@ -77,7 +77,7 @@ def _links(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         guards=[Needs("share")],
     )
     async def list_invitations() -> Sharing:
-        links = door.house.invitations.all()
+        links = app_state.services.invitations.all()
         return Sharing(
             addresses.origins(), addresses.is_encrypted, links, proxied=addresses.is_proxied
         )
@@ -89,16 +89,16 @@ def _links(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
         guards=[Needs("share")],
     )
     async def invite(data: Inviting, request: Request[Any, Any, Any]) -> Response[Invitation]:
-        house, person = door.house, person_of(request)
-        await house.people.seen(person)
-        made = await house.invitations.make(data.role, data.label, person.id)
+        services, person = app_state.services, person_of(request)
+        await services.people.seen(person)
+        made = await services.invitations.make(data.role, data.label, person.id)
         location = f"/api/invitations/{made.id}"
         return Response(made, status_code=201, headers={"location": location})
 
     return [list_invitations, invite]
 
 
-def _one(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
+def _one(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterHandler]:
     @post(
         "/api/invitations/{invitation:str}/revoke",
         status_code=200,
@@ -108,7 +108,9 @@ def _one(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
     )
     async def revoke(invitation: str, request: Request[Any, Any, Any]) -> Invitation:
         person = person_of(request)
-        return await door.house.invitations.revoke(invitation, Author(person.id, person.name))
+        return await app_state.services.invitations.revoke(
+            invitation, PersonRef(person.id, person.name)
+        )
 
     @get(
         "/api/invitations/{invitation:str}/qr",
@@ -119,7 +121,7 @@ def _one(door: Door, addresses: Addresses) -> list[ControllerRouterHandler]:
     async def code(invitation: str, origin: str) -> Response[bytes]:
         if not addresses.is_page(origin):
             raise BadInput("The page is not to be found there.", where={"path": "/origin"})
-        found = door.house.invitations.get(invitation)
+        found = app_state.services.invitations.get(invitation)
         if found.path is None:
             raise Conflict("This link was revoked.")
         headers = {"cache-control": "no-store"}

@@ -8,15 +8,15 @@ import anyio
 from litestar import WebSocket, websocket
 from litestar.types import ControllerRouterHandler, Receive, Send
 
-from action_assistant.editor import happenings as h
-from action_assistant.editor import wire
-from action_assistant.editor.budget import Budget
-from action_assistant.editor.house import Door
-from action_assistant.editor.member import Member
-from action_assistant.editor.room import Room
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.rooms.member import Member
+from action_assistant.editor.rooms.rate_limits import ByteRateLimits
+from action_assistant.editor.rooms.room import Room
+from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused
-from action_assistant.web.access import person_of, plain, refuse
-from action_assistant.web.roles import allowed
+from action_assistant.web.auth.access import person_of, plain, refuse
+from action_assistant.web.auth.roles import allowed
 
 log: Final = logging.getLogger(__name__)
 
@@ -26,26 +26,26 @@ _NORMAL: Final = 1000
 _GOODBYE: Final = 1.0  # seconds that a close frame gets
 
 
-def routes(door: Door) -> list[ControllerRouterHandler]:
+def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """The route; `y-websocket` appends the name of its room, which is always `room`."""
 
     @websocket("/api/graphs/{graph_id:str}/room")
     async def room(socket: Socket, graph_id: str) -> None:
-        house, person = door.house, person_of(socket)
+        services, person = app_state.services, person_of(socket)
         address = socket.client.host if socket.client is not None else ""
         try:
-            with house.crowd.admitted(person.id, address):
-                await house.catalogue.require(graph_id)
-                await house.people.seen(person)
-                async with house.rooms.enter(h.graph_stream(graph_id)) as found:
+            with services.connection_limits.admitted(person.id, address):
+                await services.catalogue.require(graph_id)
+                await services.people.seen(person)
+                async with services.rooms.enter(h.graph_stream(graph_id)) as found:
                     await socket.accept()
-                    if _knows_another(socket, house.epoch, found):
-                        await _part(socket, house.epoch)
+                    if _knows_another(socket, services.epoch, found):
+                        await _part(socket, services.epoch)
                         return
                     edits = allowed(person.role, "edit")
                     member = Member(person, edits=edits, acks=_wants_acks(socket))
-                    member.post_epoch(house.epoch)
-                    await _converse(socket, found, member, house.budget)
+                    member.post_epoch(services.epoch)
+                    await _converse(socket, found, member, services.rate_limits)
         except Refused as refused:
             await _refuse(socket, refused)
 
@@ -70,17 +70,19 @@ async def _part(socket: Socket, epoch: str) -> None:
     """Send away who knows another history, with the name of this one."""
     with anyio.move_on_after(_GOODBYE):
         if _wants_acks(socket):
-            await socket.send_bytes(wire.epoch(epoch))
-        await socket.close(wire.OTHER_EPOCH, wire.REASONS[wire.OTHER_EPOCH])
+            await socket.send_bytes(messages.epoch(epoch))
+        await socket.close(messages.OTHER_EPOCH, messages.REASONS[messages.OTHER_EPOCH])
 
 
-async def _converse(socket: Socket, room: Room, member: Member, budget: Budget) -> None:
+async def _converse(
+    socket: Socket, room: Room, member: Member, rate_limits: ByteRateLimits
+) -> None:
     """Until one side ends it."""
     receive, send = plain(socket)
     room.join(member)
     # Two plain tasks: a thousand idle sockets are a thousand times what stands around each.
     tasks = [
-        asyncio.create_task(_listen(receive, room, member, budget)),
+        asyncio.create_task(_listen(receive, room, member, rate_limits)),
         asyncio.create_task(_speak(send, member)),
     ]
     for task in tasks:
@@ -97,10 +99,12 @@ async def _converse(socket: Socket, room: Room, member: Member, budget: Budget) 
             task.result()  # raises what went wrong
     if code != _NORMAL:
         with anyio.move_on_after(_GOODBYE):
-            await socket.close(code, member.said or wire.REASONS.get(code))
+            await socket.close(code, member.said or messages.REASONS.get(code))
 
 
-async def _listen(receive: Receive, room: Room, member: Member, budget: Budget) -> None:
+async def _listen(
+    receive: Receive, room: Room, member: Member, rate_limits: ByteRateLimits
+) -> None:
     """What the client says. Ends the member when the client goes, or says what cannot be read."""
     while True:
         event: Any = await receive()
@@ -109,19 +113,19 @@ async def _listen(receive: Receive, room: Room, member: Member, budget: Budget) 
             return
         data = event.get("bytes")
         if data is None:
-            member.refuse(wire.UNREADABLE)
+            member.refuse(messages.UNREADABLE)
             return
         try:
-            message = wire.parse(data)
-        except wire.Malformed as error:
+            message = messages.parse(data)
+        except messages.Malformed as error:
             log.info("%s sent %s", member.person.id, error)
-            member.refuse(wire.MALFORMED)
+            member.refuse(messages.MALFORMED)
             return
         if message is not None:
             room.hear(member, message)
             if member.far_ahead:
                 await member.until_heard()
-            spend = budget.spend if isinstance(message, wire.Edit) else budget.speak
+            spend = rate_limits.spend if isinstance(message, messages.Edit) else rate_limits.speak
             wait = spend(member.person.id, len(data)) + member.toll()
             if wait > 0:
                 await anyio.sleep(wait)
@@ -140,6 +144,6 @@ async def _speak(send: Send, member: Member) -> None:
 async def _refuse(socket: Socket, refused: Refused) -> None:
     """Answer the request for an upgrade with a plain refusal."""
     if socket.connection_state != "init":
-        await socket.close(wire.RESTARTING, wire.REASONS[wire.RESTARTING])
+        await socket.close(messages.RESTARTING, messages.REASONS[messages.RESTARTING])
         return
     await refuse(socket.scope, socket.receive, socket.send, refused)

@@ -6,9 +6,9 @@ import msgspec
 from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.house import Door
-from action_assistant.editor.versions import VersionView
-from action_assistant.web.access import Needs, person_of
+from action_assistant.editor.catalogue.versions import VersionView
+from action_assistant.editor.services import EditorState
+from action_assistant.web.auth.access import Needs, person_of
 
 
 class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -18,7 +18,7 @@ class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seq: int | None = None
 
 
-def routes(door: Door) -> list[ControllerRouterHandler]:
+def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """Everything about versions."""
 
     @get(
@@ -27,9 +27,9 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         operation_id="listVersions",
     )
     async def list_versions(graph_id: str) -> list[VersionView]:
-        house = door.house
-        await house.catalogue.require(graph_id)
-        return await house.versions.of(graph_id)
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        return await services.versions.of(graph_id)
 
     @post(
         "/api/graphs/{graph_id:str}/versions",
@@ -40,11 +40,11 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
     async def publish_version(
         graph_id: str, request: Request[Any, Any, Any], data: Publishing | None = None
     ) -> Response[VersionView]:
-        house, person = door.house, person_of(request)
-        await house.catalogue.require(graph_id)
-        await house.people.seen(person)
+        services, person = app_state.services, person_of(request)
+        await services.catalogue.require(graph_id)
+        await services.people.seen(person)
         wanted = data or Publishing()
-        version, new = await house.versions.publish(
+        version, new = await services.versions.publish(
             graph_id, person, label=wanted.label, seq=wanted.seq
         )
         return Response(
@@ -59,6 +59,6 @@ def routes(door: Door) -> list[ControllerRouterHandler]:
         operation_id="getVersion",
     )
     async def get_version(version_id: str) -> VersionView:
-        return await door.house.versions.get(version_id)
+        return await app_state.services.versions.get(version_id)
 
     return [list_versions, publish_version, get_version]

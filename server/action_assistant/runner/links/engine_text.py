@@ -9,8 +9,8 @@ from typing import Final, Literal
 
 import msgspec
 
-from action_assistant.runner.parameters import Values, reported
-from action_assistant.runner.seen import ACTIVE, Snapshot
+from action_assistant.runner.links.observations import ACTIVE, Snapshot
+from action_assistant.runner.links.parameter_texts import Values, reported
 
 #: Responses of a relation that end or hold an action which runs.
 _HALTING: Final = frozenset({"stop", "pause"})
@@ -61,7 +61,7 @@ class _Related(msgspec.Struct, frozen=True):
     actions: tuple[_Child, ...] = ()
 
 
-class _Named(msgspec.Struct, frozen=True):
+class _NamedGraph(msgspec.Struct, frozen=True):
     graph_name: str
 
 
@@ -84,7 +84,7 @@ class _Attributes(msgspec.Struct, frozen=True):
 _GRAPH = msgspec.json.Decoder(_Graph)
 _RELATED = msgspec.json.Decoder(_Related)
 _SENT = msgspec.json.Decoder(_Sent)
-_NAMED = msgspec.json.Decoder(_Named)
+_NAMED = msgspec.json.Decoder(_NamedGraph)
 _ATTRIBUTES = msgspec.json.Decoder(_Attributes)
 _RUNTIME = msgspec.json.Decoder(_Runtime)
 _MESSAGES = msgspec.json.Decoder(tuple[_Said | str, ...])

@@ -9,14 +9,18 @@ Whoever implements this keeps messages on one topic apart as the engine needs (t
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Annotated, Literal, Protocol, TypeAlias
+from typing import Annotated, Final, Literal, Protocol, TypeAlias
 
 import msgspec
 
-from action_assistant.runner.engine_process import EngineProcess
-from action_assistant.runner.seen import Exact, Snapshot
+from action_assistant.runner.links.engine_process import EngineProcess
+from action_assistant.runner.links.observations import Exact, Snapshot
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph
+
+#: The engine that is always there.
+SIMULATOR: Final = "simulator"
+
 
 EngineState: TypeAlias = Literal["answering", "busy", "gone", "restarted"]
 Command: TypeAlias = Literal["start", "stop", "pause", "resume", "modify"]
@@ -36,19 +40,19 @@ class NoAnswer(Exception):
     """The engine did not answer a get in time, or cannot; the text says what is known."""
 
 
-class Outline(msgspec.Struct, frozen=True):
+class GraphOutline(msgspec.Struct, frozen=True):
     """What the runner itself knows of a graph: its name, and the aid of each action by full name."""
 
     name: str
     actions: dict[str, str]
 
 
-def outline(graph: Graph | Outline) -> Outline:
+def graph_outline(graph: Graph | GraphOutline) -> GraphOutline:
     """What the runner needs to know of a graph."""
-    if isinstance(graph, Outline):
+    if isinstance(graph, GraphOutline):
         return graph
     named = {each.full_name: each.key for each in graph.actions if not each.missing}
-    return Outline(graph.name, named)
+    return GraphOutline(graph.name, named)
 
 
 class Order(msgspec.Struct, frozen=True, kw_only=True):
@@ -56,7 +60,7 @@ class Order(msgspec.Struct, frozen=True, kw_only=True):
     graph reads the text, beside the runner; where it is at hand it may be given along."""
 
     run: str
-    graph: Graph | Outline
+    graph: Graph | GraphOutline
     umrf: str
     targets: tuple[str, ...] = ()
 

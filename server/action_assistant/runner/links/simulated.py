@@ -22,7 +22,7 @@ import msgspec
 from anyio import to_thread
 
 from action_assistant.errors import TooMany
-from action_assistant.runner.links.ears import Ears
+from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -62,11 +62,13 @@ class Simulators:
         self._turn = anyio.Lock()
         self._links: WeakSet[SimulatedLink] = WeakSet()
 
-    def __call__(self, facts: EngineFacts, script: str, wall: Callable[[], int]) -> "SimulatedLink":
+    def __call__(
+        self, facts: EngineFacts, script: str, clock_us: Callable[[], int]
+    ) -> "SimulatedLink":
         """A simulated engine. Its process begins with its first start. Raises TooMany."""
         if sum(each.is_alive for each in self._links) >= MOST:
             raise TooMany(f"{MOST} simulated runs go on already; stop some, or wait.")
-        link = SimulatedLink(facts, script, wall, self.take)
+        link = SimulatedLink(facts, script, clock_us, self.take)
         self._links.add(link)
         return link
 
@@ -88,15 +90,15 @@ class SimulatedLink:
         self,
         facts: EngineFacts,
         script: str,
-        wall: Callable[[], int],
+        clock_us: Callable[[], int],
         take: Callable[[Callable[[], None]], Awaitable[None]],
     ) -> None:
         self._facts = facts
         self._script = script
-        self._wall = wall
+        self._clock_us = clock_us
         self._take = take
         self._incarnation = secrets.token_hex(8)
-        self._ears = Ears[Report]()
+        self._subscribers = Listeners[Report]()
         self._numbers = itertools.count(1)
         self._asked: dict[int, asyncio.Future[Any]] = {}
         self._writer: asyncio.StreamWriter | None = None
@@ -145,9 +147,9 @@ class SimulatedLink:
     async def get(self) -> Answer:
         """What the engine holds right now. Raises NoAnswer."""
         if self._process is None and not self._why:  # nothing was started yet
-            at = self._wall()
+            at = self._clock_us()
             return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=())
-        asked_at = self._wall()
+        asked_at = self._clock_us()
         try:
             found: Answer = await self._told("get")
         except NotSent as gone:
@@ -160,7 +162,7 @@ class SimulatedLink:
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Every transition from now on."""
-        return self._ears.listening(hear)
+        return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
         """End the engine, and its process."""
@@ -226,7 +228,7 @@ class SimulatedLink:
     def _hear(self, report: Report) -> None:
         if isinstance(report, EngineChanged):
             self._state, self._why = report.state, report.why
-        self._ears.tell(report)
+        self._subscribers.tell(report)
 
     def _end(self, why: str) -> None:
         """The engine is no more; whoever waits for it is told."""
@@ -240,7 +242,7 @@ class SimulatedLink:
             if not future.done():
                 future.set_exception(NoAnswer(self._why))
         if why == _DIED and (fresh or was != "gone"):
-            self._ears.tell(EngineChanged(at=self._wall(), state="gone", why=self._why))
+            self._subscribers.tell(EngineChanged(at=self._clock_us(), state="gone", why=self._why))
 
 
 def _born(theirs: socket.socket, facts: EngineFacts, script: str) -> Any:
@@ -265,7 +267,7 @@ def _live(wire: socket.socket, facts: EngineFacts, script: str) -> None:
 async def _serve(wire: socket.socket, facts: EngineFacts, script: str) -> None:
     reader, writer = await asyncio.open_connection(sock=wire)
     writer.transport.set_write_buffer_limits(high=_WAITING)
-    link = SimulatorLink(engine_of(facts, script), wall=_now)
+    link = SimulatorLink(engine_of(facts, script), clock_us=_now)
 
     def hear(report: Report) -> None:
         for part in _parts(report):

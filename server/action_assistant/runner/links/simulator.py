@@ -13,8 +13,17 @@ from typing import Final, TypeAlias, assert_never
 import anyio
 import msgspec
 
-from action_assistant.runner.admission import slowed
-from action_assistant.runner.links.ears import Ears
+from action_assistant.runner.links.listeners import Listeners
+from action_assistant.runner.links.observations import (
+    Exact,
+    GraphResult,
+    GraphState,
+    Hazard,
+    NodeResult,
+    NodeState,
+    Snapshot,
+)
+from action_assistant.runner.links.parameter_texts import Values, values_of
 from action_assistant.runner.links.port import (
     Answer,
     EngineChanged,
@@ -28,19 +37,15 @@ from action_assistant.runner.links.port import (
     Standing,
     Transitions,
 )
-from action_assistant.runner.parameters import Values, values_of
-from action_assistant.runner.seen import (
-    Exact,
-    GraphResult,
-    GraphState,
-    Hazard,
-    NodeResult,
-    NodeState,
-    Snapshot,
-)
-from action_assistant.umrf import codec, semantics
+from action_assistant.umrf import semantics
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics import Script
+
+#: No simulated action is quicker: a loop of instant actions would never let go of the processor.
+_QUICKEST_S: Final = 0.01
+
 
 _GRAIN_MS: Final = 0.01  # clocks are not finer: what is due so soon is due now
 _SLICE: Final = 50  # engine steps between two turns of the event loop
@@ -49,9 +54,11 @@ _SLICE: Final = 50  # engine steps between two turns of the event loop
 Simulator: TypeAlias = Callable[[EngineFacts, str, Callable[[], int]], Link]
 
 
-def in_this_process(facts: EngineFacts, script: str, wall: Callable[[], int]) -> "SimulatorLink":
+def in_this_process(
+    facts: EngineFacts, script: str, clock_us: Callable[[], int]
+) -> "SimulatorLink":
     """A simulated engine that shares the event loop: where time is virtual."""
-    return SimulatorLink(engine_of(facts, script), wall=wall)
+    return SimulatorLink(engine_of(facts, script), clock_us=clock_us)
 
 
 def engine_of(facts: EngineFacts, script: str) -> semantics.Engine:
@@ -61,18 +68,18 @@ def engine_of(facts: EngineFacts, script: str) -> semantics.Engine:
 
 
 class SimulatorLink:
-    """A simulated engine in this process. `wall` gives microseconds UTC."""
+    """A simulated engine in this process. `clock_us` gives microseconds UTC."""
 
     simulated: Final = True
 
-    def __init__(self, engine: semantics.Engine, *, wall: Callable[[], int]) -> None:
+    def __init__(self, engine: semantics.Engine, *, clock_us: Callable[[], int]) -> None:
         self._engine = engine
-        self._wall = wall
+        self._clock_us = clock_us
         self._origin = anyio.current_time()
-        self._origin_wall = wall()
+        self._origin_wall = clock_us()
         self._incarnation = secrets.token_hex(8)
         self._runs: dict[str, str] = {}  # graph name -> run
-        self._ears = Ears[Report]()
+        self._subscribers = Listeners[Report]()
         self._wake = anyio.Event()
         self._dead: str | None = None
 
@@ -98,7 +105,7 @@ class SimulatorLink:
         self._runs[order.graph.name] = order.run
         try:
             self._tell(self._engine.start(graph, self._now()))
-        except semantics.EngineRefused as refused:
+        except semantics.GraphRefused as refused:
             if before is not None:  # that one goes on, or is stopped, under its own identity
                 self._runs[order.graph.name] = before
             self._wake.set()
@@ -125,7 +132,7 @@ class SimulatorLink:
             raise NotSent(self._dead)
         try:
             self._tell(self._engine.modify(_whole(order), self._now(), continue_from=continue_from))
-        except semantics.EngineRefused as refused:
+        except semantics.GraphRefused as refused:
             self._wake.set()
             raise EngineRefused(str(refused)) from refused
 
@@ -133,7 +140,7 @@ class SimulatorLink:
         """What the engine holds right now."""
         self._alive()
         self._advance()
-        at = self._wall()
+        at = self._clock_us()
         graphs = tuple(
             Snapshot(
                 at=at,
@@ -164,7 +171,7 @@ class SimulatorLink:
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Every transition from now on."""
-        return self._ears.listening(hear)
+        return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
         """End the engine."""
@@ -202,9 +209,9 @@ class SimulatorLink:
             if seen is not None and run is not None:
                 per_run.setdefault(run, []).append(seen)
         for run, changes in per_run.items():
-            self._ears.tell(Transitions(run=run, changes=tuple(changes)))
+            self._subscribers.tell(Transitions(run=run, changes=tuple(changes)))
         for trace in traces:
-            if isinstance(trace, semantics.Hazard) and trace.effect in {"crash", "hang"}:
+            if isinstance(trace, semantics.HazardEvent) and trace.effect in {"crash", "hang"}:
                 self._fail(trace)
 
     def _begun(self, traces: Sequence[semantics.Trace]) -> dict[int, Values]:
@@ -213,7 +220,7 @@ class SimulatorLink:
         last = {
             (trace.graph, trace.node): trace
             for trace in traces
-            if isinstance(trace, semantics.NodeState)
+            if isinstance(trace, semantics.NodeStateEvent)
         }
         found: dict[int, Values] = {}
         for (name, node), trace in last.items():
@@ -222,13 +229,13 @@ class SimulatorLink:
                 found[id(trace)] = values_of(graph.nodes[node].inputs.values())
         return found
 
-    def _fail(self, hazard: semantics.Hazard) -> None:
+    def _fail(self, hazard: semantics.HazardEvent) -> None:
         """From now on nobody answers, as with the real engine; a hung one still exists."""
         what = "has crashed" if hazard.effect == "crash" else "hangs"
         why = f"The simulated engine {what} ({hazard.code}). {hazard.message}".rstrip()
         self._dead = why
         state: EngineState = "gone" if hazard.effect == "crash" else "busy"
-        self._ears.tell(EngineChanged(at=self._at(hazard.t_ms), state=state, why=why))
+        self._subscribers.tell(EngineChanged(at=self._at(hazard.t_ms), state=state, why=why))
 
     def _at(self, t_ms: float) -> int:
         return self._origin_wall + round(t_ms * 1000)
@@ -248,18 +255,29 @@ def _whole(order: Order) -> Graph:
 def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact | None:
     """What of a trace is worth a place in the history; relations follow from results."""
     match trace:
-        case semantics.NodeState():
+        case semantics.NodeStateEvent():
             inputs = begun.get(id(trace))
             return NodeState(at, trace.graph, trace.node, trace.state, inputs)
-        case semantics.NodeResult():
+        case semantics.NodeResultEvent():
             return NodeResult(at, trace.graph, trace.node, trace.result, trace.message)
-        case semantics.GraphState():
+        case semantics.GraphStateEvent():
             return GraphState(at, trace.graph, trace.state)
-        case semantics.GraphResult():
+        case semantics.GraphResultEvent():
             return GraphResult(at, trace.graph, trace.value)
-        case semantics.Hazard():
+        case semantics.HazardEvent():
             return Hazard(at, trace.graph, trace.code, trace.effect, trace.node, trace.message)
         case semantics.EdgeEval() | semantics.Dispatch() | semantics.NotReady():
             return None
         case _:
             assert_never(trace)
+
+
+def slowed(script: Script) -> Script:
+    """The script without what is quicker than any simulated action may be."""
+    behaviours = {
+        key: tuple(
+            msgspec.structs.replace(each, after_s=max(each.after_s, _QUICKEST_S)) for each in calls
+        )
+        for key, calls in script.behaviours.items()
+    }
+    return Script(behaviours)

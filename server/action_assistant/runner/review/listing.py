@@ -1,4 +1,4 @@
-"""What is read page by page, put together in a worker: the list of runs, and the events of one."""
+"""The list of runs and the events of one, page by page. For workers."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -8,8 +8,8 @@ import msgspec
 from sqlalchemy import Row
 
 from action_assistant.journal.events import Event
-from action_assistant.runner import archive, shapes
-from action_assistant.runner.review.desk import Desk
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.runs import queries, views
 
 _PAGE: Final = 500  # events read at once
 
@@ -25,29 +25,32 @@ class HistoryEvent(msgspec.Struct, frozen=True):
 
 
 async def listed(
-    desk: Desk, wanted: archive.Filter, limit: int, going: Mapping[str, shapes.Summary]
-) -> list[shapes.Listed]:
+    review_service: ReviewService,
+    wanted: queries.Filter,
+    limit: int,
+    going: Mapping[str, views.RunSummary],
+) -> list[views.Listed]:
     """Runs, newest first; those that are `going` are as they are there."""
-    rows = await desk.rows(archive.listed(wanted, limit))
-    labels = await _labels(desk, rows)
+    rows = await review_service.rows(queries.listed(wanted, limit))
+    labels = await _labels(review_service, rows)
     shown = (
-        shapes.listed(going.get(row.id) or shapes.summary_of_row(row), row, labels.get(row.id, []))
+        views.listed(going.get(row.id) or views.summary_of_row(row), row, labels.get(row.id, []))
         for row in rows
     )
     return [each for each in shown if not wanted.states or each.state in wanted.states]
 
 
-async def _labels(desk: Desk, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
+async def _labels(review_service: ReviewService, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     if rows:
-        for row in await desk.rows(archive.labels_of([row.id for row in rows])):
+        for row in await review_service.rows(queries.labels_of([row.id for row in rows])):
             found.setdefault(row.run, []).append(row.label)
     return found
 
 
-async def streamed(desk: Desk, run: str, after: int) -> tuple[int, bytes]:
+async def streamed(review_service: ReviewService, run: str, after: int) -> tuple[int, bytes]:
     """A page of stored events as an event stream has them, and the seq of the last one."""
-    events = await desk.events(run, after, _PAGE)
+    events = await review_service.events(run, after, _PAGE)
     lines = [
         b"id: %d\nevent: %b\ndata: %b\n\n" % (each.seq, each.kind.encode(), _told(each))
         for each in events
@@ -56,5 +59,5 @@ async def streamed(desk: Desk, run: str, after: int) -> tuple[int, bytes]:
 
 
 def _told(event: Event) -> bytes:
-    at, body = shapes.time(event.at), msgspec.Raw(event.body)
+    at, body = views.time(event.at), msgspec.Raw(event.body)
     return msgspec.json.encode(HistoryEvent(event.seq, event.kind, event.author, at, body))

@@ -32,7 +32,7 @@ def check_flow(subject: Subject) -> None:
         message = "No action is connected to the entry: the graph is HALTED as soon as it starts."
         subject.report("no-entry", "error", message, member="/graph_entry")
         return
-    reach = Reach(subject)
+    reach = Reachable(subject)
     together = Together(subject, reach.runs, reach.reports)
     _check_bypasses(subject, reach)
     check_responses(subject, reach.reports, together)
@@ -64,7 +64,7 @@ def _check_sides(subject: Subject) -> None:
             subject.report("H2b", severity, message, relation=relation, fix="mirror-relation")
 
 
-def _check_bypasses(subject: Subject, reach: "Reach") -> None:
+def _check_bypasses(subject: Subject, reach: "Reachable") -> None:
     """H3: bypasses that can happen, told once."""
     if "H3" not in subject.facts.hazards or subject.facts.bypass_fixed:
         return
@@ -90,7 +90,7 @@ def _check_bypasses(subject: Subject, reach: "Reach") -> None:
     subject.report("H3", "warning", message, relation=first, member="/conditions", also=others)
 
 
-class Reach:
+class Reachable:
     """What can happen at all: which actions can run, and which can report an end.
 
     `stages` tell in which order: a parent that reports before its child ran is none of a loop.
@@ -161,7 +161,7 @@ def _first(relations: list[Relation]) -> list[Relation]:
     return [relation for relation in relations if not relation.listing]
 
 
-def _check_waiting(subject: Subject, reach: Reach) -> None:
+def _check_waiting(subject: Subject, reach: Reachable) -> None:
     """Actions that never run, and why."""
     net: dict[Key, int] = {}
     for number, members in enumerate(loops(subject)):
@@ -207,7 +207,7 @@ def _report_missed_join(
             subject.report("H8", "error", message, relation=relation, member="/required")
 
 
-def _check_exit(subject: Subject, reach: Reach) -> None:
+def _check_exit(subject: Subject, reach: Reachable) -> None:
     exits = subject.incoming.get(EXIT, [])
     if not exits:
         message = (

@@ -5,7 +5,8 @@ from itertools import islice
 from typing import Final, Literal
 
 from action_assistant.umrf.facts import EngineFacts
-from action_assistant.umrf.jsontext import pointer
+from action_assistant.umrf.files.writing import name_order
+from action_assistant.umrf.json.text import pointer
 from action_assistant.umrf.model import (
     ENTRY,
     EXIT,
@@ -18,7 +19,6 @@ from action_assistant.umrf.model import (
     Where,
 )
 from action_assistant.umrf.parameters import example_of, flat_name
-from action_assistant.umrf.writing import name_order
 
 #: Problems of one code and severity that are kept.
 MAX_EACH: Final = 1_000

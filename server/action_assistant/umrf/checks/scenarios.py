@@ -6,9 +6,9 @@ import msgspec
 
 from action_assistant.umrf.checks.places import Subject, joined
 from action_assistant.umrf.checks.trials import Coverage, Trial, Trials
+from action_assistant.umrf.courses.network import Network
 from action_assistant.umrf.fixes import with_optional_outputs
 from action_assistant.umrf.model import EXIT, Graph, Key, Relation, Severity
-from action_assistant.umrf.semantics.network import Network
 from action_assistant.umrf.semantics.parts import exit_owner
 
 _BLOCKED: Final = {"H2", "H6", "H7", "H8", "H9", "no-entry", "ghost", "actors"}

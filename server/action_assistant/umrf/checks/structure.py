@@ -7,7 +7,7 @@ import re
 from typing import Final
 
 from action_assistant.umrf.checks.places import Subject, quoted
-from action_assistant.umrf.jsontext import Json, Number, dump, parse_small
+from action_assistant.umrf.json.text import Json, Number, dump, parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Parameter, Relation, Severity
 from action_assistant.umrf.parameters import MAX_PATH, NATIVE, fits, keys_of
 from action_assistant.umrf.relations import MAX_REFERRED_ID, condition_of, remap_of, whole_of

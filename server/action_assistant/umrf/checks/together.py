@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import Final
 
 from action_assistant.umrf.checks.places import Subject
+from action_assistant.umrf.courses.network import Mask, behind
 from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
-from action_assistant.umrf.semantics.network import Mask, behind
 
 #: Pairs that are looked at; where there are more the rest is not followed: any two may meet, then.
 PAIRS: Final = 400_000

@@ -1,15 +1,17 @@
-"""Ways through a graph: all actions end with on_true, or one of them, the first time, otherwise."""
+"""Trial courses of a graph: all actions end with on_true, or one of them, the first time,
+otherwise.
+"""
 
 from collections.abc import Iterator
 from typing import Final
 
 import msgspec
 
+from action_assistant.umrf.courses.course import Course, Outcome
+from action_assistant.umrf.courses.deviations import Deviations, Tied
+from action_assistant.umrf.courses.network import Network
+from action_assistant.umrf.courses.whole import whole
 from action_assistant.umrf.model import Action, Graph, Precondition
-from action_assistant.umrf.semantics.course import Course, Outcome
-from action_assistant.umrf.semantics.deviations import Deviations, Tied
-from action_assistant.umrf.semantics.network import Network
-from action_assistant.umrf.semantics.whole import whole
 
 #: States that all trials of one graph may look at, so that checking takes seconds: about 2 µs each.
 BUDGET: Final = 5_000_000

@@ -1,18 +1,18 @@
 """The engine's behaviour as a deterministic step function (docs/umrf-and-the-engine.md 2)."""
 
 from action_assistant.umrf.semantics.engine import Engine, GraphNow
-from action_assistant.umrf.semantics.graphs import EngineRefused
+from action_assistant.umrf.semantics.graphs import GraphRefused
 from action_assistant.umrf.semantics.parts import Execution
 from action_assistant.umrf.semantics.script import Behaviour, Script, script_from
 from action_assistant.umrf.semantics.simulate import CUT_OFF, simulate
 from action_assistant.umrf.semantics.trace import (
     Dispatch,
     EdgeEval,
-    GraphResult,
-    GraphState,
-    Hazard,
-    NodeResult,
-    NodeState,
+    GraphResultEvent,
+    GraphStateEvent,
+    HazardEvent,
+    NodeResultEvent,
+    NodeStateEvent,
     NotReady,
     Trace,
 )
@@ -23,14 +23,14 @@ __all__ = [
     "Dispatch",
     "EdgeEval",
     "Engine",
-    "EngineRefused",
     "Execution",
     "GraphNow",
-    "GraphResult",
-    "GraphState",
-    "Hazard",
-    "NodeResult",
-    "NodeState",
+    "GraphRefused",
+    "GraphResultEvent",
+    "GraphStateEvent",
+    "HazardEvent",
+    "NodeResultEvent",
+    "NodeStateEvent",
     "NotReady",
     "Script",
     "Trace",

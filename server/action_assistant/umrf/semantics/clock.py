@@ -8,7 +8,12 @@ from typing import TypeAlias
 
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.semantics.parts import ACTIVE, HELD, Node, Running
-from action_assistant.umrf.semantics.trace import GraphState, Hazard, NodeState, Trace
+from action_assistant.umrf.semantics.trace import (
+    GraphStateEvent,
+    HazardEvent,
+    NodeStateEvent,
+    Trace,
+)
 
 Task: TypeAlias = Callable[[], None]
 
@@ -62,13 +67,13 @@ class Clock:
         graph.count(node.state, -1)
         graph.count(state, 1)
         node.state = state
-        self._out.append(NodeState(self._t(), graph.name, node.full_name, state))
+        self._out.append(NodeStateEvent(self._t(), graph.name, node.full_name, state))
         if state not in ACTIVE or state in HELD:
             self._touched.add(graph)
 
     def _graph_state(self, graph: Running, state: str) -> None:
         graph.state = state
-        self._out.append(GraphState(self._t(), graph.name, state))
+        self._out.append(GraphStateEvent(self._t(), graph.name, state))
         self._touched.add(graph)
 
     def _t(self) -> float:
@@ -78,7 +83,7 @@ class Clock:
         self, graph: Running, code: str, effect: str, message: str, node: Node | None = None
     ) -> None:
         name = node.full_name if node else None
-        self._out.append(Hazard(self._t(), graph.name, code, effect, name, message))
+        self._out.append(HazardEvent(self._t(), graph.name, code, effect, name, message))
 
     def _crash(self, graph: Running, code: str, message: str, node: Node | None = None) -> None:
         """The engine's process ends here, with every graph in it."""

@@ -1,4 +1,4 @@
-"""The engine's clockwork: what one action's end sets in motion.
+"""The core of the engine's semantics: what the end of one action sets in motion.
 
 See docs/umrf-and-the-engine.md 2.3, 2.4, 2.9.
 """
@@ -15,8 +15,8 @@ from action_assistant.umrf.semantics.parts import (
     RESERVED,
     Edge,
     Execution,
-    Link,
     Node,
+    NodeLink,
     Outcome,
     Running,
     linked_nodes,
@@ -25,8 +25,8 @@ from action_assistant.umrf.semantics.script import OUTCOMES, Script
 from action_assistant.umrf.semantics.trace import (
     Dispatch,
     EdgeEval,
-    GraphResult,
-    NodeResult,
+    GraphResultEvent,
+    NodeResultEvent,
     NotReady,
 )
 from action_assistant.umrf.semantics.values import RemapUnknown, fill_outputs, hand_over
@@ -93,7 +93,7 @@ class Core(Clock):
             self._sub_halted(graph)
 
     def _ask(
-        self, graph: Running, node: Node, edge: Edge, child: Node, link: Link, result: Outcome
+        self, graph: Running, node: Node, edge: Edge, child: Node, link: NodeLink, result: Outcome
     ) -> str:
         """One relation. `done` ends the round, `ignored` counts for HALTED, `` neither."""
         child.receive(link)
@@ -160,7 +160,7 @@ class Core(Clock):
     def _finish(self, graph: Running, last: Node, result: Outcome) -> None:
         graph.result = result
         self._graph_state(graph, "FINISHED")
-        self._out.append(GraphResult(self._t(), graph.name, result))
+        self._out.append(GraphResultEvent(self._t(), graph.name, result))
         if graph.active - last.active > 0:
             message = "The graph is FINISHED while actions still run; a stop does not reach them."
             self._hazard(graph, "H12", "goes on", message)
@@ -296,7 +296,7 @@ class Core(Clock):
 
     def _result(self, graph: Running, node: Node, result: str) -> None:
         said = node.call.message if result != "on_stopped" else None
-        self._out.append(NodeResult(self._t(), graph.name, node.full_name, result, said))
+        self._out.append(NodeResultEvent(self._t(), graph.name, node.full_name, result, said))
 
     # Stop and pause of one action
 

@@ -12,10 +12,10 @@ import msgspec
 
 from action_assistant.umrf.facts import SIMULATED, EngineFacts
 from action_assistant.umrf.model import Graph, Key, Signature
-from action_assistant.umrf.semantics.graphs import EngineRefused, Graphs
+from action_assistant.umrf.semantics.graphs import GraphRefused, Graphs
 from action_assistant.umrf.semantics.parts import Running
 from action_assistant.umrf.semantics.script import Script
-from action_assistant.umrf.semantics.trace import GraphState, Trace
+from action_assistant.umrf.semantics.trace import GraphStateEvent, Trace
 
 _Deed: TypeAlias = Callable[[Running], None]
 
@@ -90,28 +90,28 @@ class Engine(Graphs):
         by_name: bool = False,
     ) -> list[Trace]:
         """Starts a graph. `states`: run states that its file carries. `by_name`: the engine takes
-        it from its own index, and matches it each time. Raises `EngineRefused`."""
+        it from its own index, and matches it each time. Raises `GraphRefused`."""
         self._run_until(at_ms)
         old = self.graphs.get(graph.name)
         if self.crashed or self.locked:
             return self._taken()
         if old is not None and old.state in _BUSY:
             active = old.state
-            self._out.append(GraphState(self._t(), graph.name, "UNINITIALIZED"))
+            self._out.append(GraphStateEvent(self._t(), graph.name, "UNINITIALIZED"))
             self._command(partial(self._stop_graph, old))
-            raise EngineRefused(
+            raise GraphRefused(
                 f"Cannot execute UMRF graph '{graph.name}' because it's already active ({active})"
             )
         running = self._built(graph.name, graph, None, None)
         if running.has_ghost_ends:
-            raise EngineRefused(f"An end of graph '{graph.name}' names an action that is not there")
+            raise GraphRefused(f"An end of graph '{graph.name}' names an action that is not there")
         for node in running.nodes.values():
             state = (states or {}).get(node.key, "UNINITIALIZED")
             running.count(state, 1)
             node.state = state
         if old is None:
             if not self._resolves(running):
-                raise EngineRefused(f"Could not resolve graph '{graph.name}'")
+                raise GraphRefused(f"Could not resolve graph '{graph.name}'")
             self._refuse_broken(running, matched=True)
             self._begin_graph(running)
         elif any(node.busy_until == inf for node in old.nodes.values()):
@@ -146,7 +146,7 @@ class Engine(Graphs):
 
     def modify(self, graph: Graph, at_ms: float, continue_from: str = "") -> list[Trace]:
         """Gives a running, paused or halted graph of this name a new structure and lets it go on.
-        Raises `EngineRefused`; a graph that was paused for it then stays PAUSED."""
+        Raises `GraphRefused`; a graph that was paused for it then stays PAUSED."""
         self._run_until(at_ms)
         old = self.graphs.get(graph.name)
         if old is not None and not self.crashed and not self.locked:

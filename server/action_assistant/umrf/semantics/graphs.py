@@ -23,10 +23,10 @@ from action_assistant.umrf.semantics.parts import (
     restructure,
 )
 from action_assistant.umrf.semantics.script import Script
-from action_assistant.umrf.semantics.trace import Hazard, NodeState
+from action_assistant.umrf.semantics.trace import HazardEvent, NodeStateEvent
 
 
-class EngineRefused(Exception):
+class GraphRefused(Exception):
     """The engine throws instead of starting. What happened before comes with the next call."""
 
     def __init__(self, message: str) -> None:
@@ -64,8 +64,8 @@ class Graphs(Core):
         while self._waiting and not self._busy and not self.crashed and not self.locked:
             try:
                 self._waiting.popleft()()
-            except EngineRefused as e:
-                self._out.append(Hazard(self._t(), "", "refused", "goes on", None, e.message))
+            except GraphRefused as e:
+                self._out.append(HazardEvent(self._t(), "", "refused", "goes on", None, e.message))
             self._settle()
 
     # Start
@@ -133,7 +133,7 @@ class Graphs(Core):
             return
         node, is_first = found
         self.graphs[graph.name] = graph
-        failed = NodeState(self._t(), "", node.full_name, "ERROR")
+        failed = NodeStateEvent(self._t(), "", node.full_name, "ERROR")
         self._out.append(failed)
         self._graph_state(graph, "UNINITIALIZED")
         if is_first:
@@ -142,7 +142,7 @@ class Graphs(Core):
         why = "its library is not there" if matched else "a graph that is held is not matched again"
         message = f"{node.full_name} cannot be built ({why}): a broken graph stays in the engine."
         self._hazard(graph, "H6", "goes on", message, node)
-        raise EngineRefused("map::at")
+        raise GraphRefused("map::at")
 
     def _clear(self, old: Running) -> None:
         if old.broken:
@@ -176,7 +176,7 @@ class Graphs(Core):
             try:
                 self._refuse_broken(new, matched=matched)
                 self._begin_graph(new)
-            except EngineRefused:
+            except GraphRefused:
                 return
             finally:
                 self._free()
@@ -197,11 +197,11 @@ class Graphs(Core):
             )
             self._hazard(graph, "H6", "goes on", message)
             graph.broken = graph.deadly = True
-            raise EngineRefused("map::at")
+            raise GraphRefused("map::at")
         named = {node.actor for node in graph.nodes.values() if node.actor}
         remote = named - {self.actor} if self.actor or len(named) > 1 else set()
         if remote and not self.facts.synchronises:
-            raise EngineRefused(
+            raise GraphRefused(
                 f"Cannot execute UMRF graph '{graph.name}': actor synchronizer not initialized."
             )
         if self._lacks_inputs(graph):
@@ -308,7 +308,7 @@ class Graphs(Core):
 
     def _modify_graph(self, old: Running, new: Graph, continue_from: str) -> None:
         if old.state not in ("RUNNING", "PAUSED", "HALTED"):
-            raise EngineRefused(
+            raise GraphRefused(
                 f"Cannot modify graph '{old.name}' because it is not in PAUSED state. "
                 f"Current state: '{old.state}'"
             )
@@ -329,7 +329,7 @@ class Graphs(Core):
         else:
             then()
         if lost is not None:
-            raise EngineRefused(
+            raise GraphRefused(
                 f"Cannot modify graph '{old.name}': Action '{lost.full_name}' cannot be deleted, "
                 f"because it is in an active state ({lost.state})"
             )
@@ -357,7 +357,7 @@ class Graphs(Core):
             return
         try:
             self._begin_graph(running)
-        except EngineRefused:
+        except GraphRefused:
             self._ended(graph, node, "on_error")
 
     def _stop_sub(self, node: Node) -> None:

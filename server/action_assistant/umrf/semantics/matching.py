@@ -5,7 +5,7 @@ from typing import Final, Literal
 
 import msgspec
 
-from action_assistant.umrf.jsontext import parse_small
+from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Parameter, Signature
 from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.semantics.parts import Node

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import inf
 from typing import TypeAlias
 
+from action_assistant.umrf.files.writing import name_order
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
@@ -18,7 +19,6 @@ from action_assistant.umrf.model import (
 )
 from action_assistant.umrf.semantics.script import Behaviour
 from action_assistant.umrf.semantics.values import Slot, slots_of
-from action_assistant.umrf.writing import name_order
 
 ENTRY_NODE = "graph_entry_0"
 EXIT_NODE = "graph_exit_0"
@@ -33,7 +33,7 @@ ACTIVE = frozenset({"RUNNING", "PAUSE_REQUESTED", "PAUSED", "STOPPING"})
 HELD = frozenset({"PAUSE_REQUESTED", "PAUSED"})
 
 
-class Link:
+class NodeLink:
     """What a child knows of one parent."""
 
     __slots__ = ("conditions", "received", "required")
@@ -96,7 +96,7 @@ class Node:
         self.actor = action.actor
         self.behaviours = behaviours
         self.children: list[Edge] = []
-        self.links: dict[str, Link] = {}
+        self.links: dict[str, NodeLink] = {}
         self.waiting_links = 0
         self.inputs: dict[str, Slot] = slots_of(action.inputs)
         self.outputs: dict[str, Slot] = slots_of(action.outputs)
@@ -126,13 +126,13 @@ class Node:
         """Whether a thread of its has not ended by then: also of one that was given up as ERROR."""
         return self.active or self.busy_until > at_ms
 
-    def link(self, parent: str, link: Link) -> None:
+    def link(self, parent: str, link: NodeLink) -> None:
         """Adds a parent, unless an earlier listing has it."""
         if parent not in self.links:
             self.links[parent] = link
             self.waiting_links += link.required
 
-    def receive(self, link: Link) -> None:
+    def receive(self, link: NodeLink) -> None:
         """Marks a parent as reported, for ever."""
         if not link.received:
             link.received = True
@@ -229,9 +229,9 @@ def _link_parents(running: Running, nodes: Mapping[Key, Node], ghosts: Mapping[K
         if relation.child == EXIT:
             if relation.parent in ghosts:
                 running.has_ghost_ends = True
-            running.exit.link(parent, Link(conditions, relation.required))
+            running.exit.link(parent, NodeLink(conditions, relation.required))
         elif relation.child in nodes:
-            nodes[relation.child].link(parent, Link(conditions, relation.required))
+            nodes[relation.child].link(parent, NodeLink(conditions, relation.required))
 
 
 def _link_children(running: Running, nodes: Mapping[Key, Node], ghosts: Mapping[Key, str]) -> None:

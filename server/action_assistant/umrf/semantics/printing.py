@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from action_assistant.umrf.model import Action
-from action_assistant.umrf.semantics.parts import ENTRY_NODE, Edge, Link, Node, Running
+from action_assistant.umrf.semantics.parts import ENTRY_NODE, Edge, Node, NodeLink, Running
 from action_assistant.umrf.semantics.script import DEFAULT
 from action_assistant.umrf.semantics.values import Slot
 
@@ -126,7 +126,7 @@ def _name(full_name: str) -> dict[str, Any]:
     return {"name": name, "instance_id": int(number)}
 
 
-def _parent(full_name: str, link: Link, with_conditions: bool) -> dict[str, Any]:
+def _parent(full_name: str, link: NodeLink, with_conditions: bool) -> dict[str, Any]:
     fields = _name(full_name) | {"required": link.required}
     if with_conditions:
         said = link.conditions

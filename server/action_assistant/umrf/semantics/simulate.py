@@ -6,9 +6,9 @@ from typing import Final
 from action_assistant.umrf.facts import SIMULATED, EngineFacts
 from action_assistant.umrf.model import Graph, Key
 from action_assistant.umrf.semantics.engine import Engine
-from action_assistant.umrf.semantics.graphs import EngineRefused
+from action_assistant.umrf.semantics.graphs import GraphRefused
 from action_assistant.umrf.semantics.script import Script
-from action_assistant.umrf.semantics.trace import Hazard, Trace
+from action_assistant.umrf.semantics.trace import HazardEvent, Trace
 
 DAY_MS: Final = 86_400_000.0
 #: The code of the last event of a trace that has more events than were asked for.
@@ -57,14 +57,14 @@ def simulate(
         f"The simulation ends here, after {max_events:,} events; the graph does not. How it goes on is "
         "not known."
     )
-    yield Hazard(engine.now, graph.name, CUT_OFF, "cut off", None, message)
+    yield HazardEvent(engine.now, graph.name, CUT_OFF, "cut off", None, message)
 
 
 def _started(engine: Engine, graph: Graph, states: Mapping[Key, str] | None) -> list[Trace]:
     try:
         return engine.start(graph, 0.0, states)
-    except EngineRefused as e:
-        refused = Hazard(0.0, graph.name, "refused", "goes on", None, e.message)
+    except GraphRefused as e:
+        refused = HazardEvent(0.0, graph.name, "refused", "goes on", None, e.message)
         return [*engine.advance(0.0), refused]
 
 

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import msgspec
 
 
-class NodeState(msgspec.Struct, frozen=True, tag_field="kind", tag="node_state"):
+class NodeStateEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="node_state"):
     """An action changed its state. Times are milliseconds as the caller counts them."""
 
     t_ms: float
@@ -17,7 +17,7 @@ class NodeState(msgspec.Struct, frozen=True, tag_field="kind", tag="node_state")
     state: str
 
 
-class GraphState(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_state"):
+class GraphStateEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_state"):
     """A graph changed its state."""
 
     t_ms: float
@@ -52,7 +52,7 @@ class NotReady(msgspec.Struct, frozen=True, tag_field="kind", tag="not_ready"):
     why: str
 
 
-class GraphResult(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_result"):
+class GraphResultEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_result"):
     """The exit of a graph was satisfied with this result."""
 
     t_ms: float
@@ -60,7 +60,7 @@ class GraphResult(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_resu
     value: str
 
 
-class Hazard(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="kind", tag="hazard"):
+class HazardEvent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="kind", tag="hazard"):
     """Here the real engine crashes, hangs or does something that nobody wants.
 
     See docs/umrf-and-the-engine.md 3.
@@ -77,7 +77,7 @@ class Hazard(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="kind", 
     message: str = ""
 
 
-class NodeResult(
+class NodeResultEvent(
     msgspec.Struct, frozen=True, omit_defaults=True, tag_field="kind", tag="node_result"
 ):
     """How a visit of an action ended; the real engine tells nobody."""
@@ -90,5 +90,12 @@ class NodeResult(
 
 
 Trace: TypeAlias = (
-    NodeState | GraphState | EdgeEval | Dispatch | NotReady | GraphResult | Hazard | NodeResult
+    NodeStateEvent
+    | GraphStateEvent
+    | EdgeEval
+    | Dispatch
+    | NotReady
+    | GraphResultEvent
+    | HazardEvent
+    | NodeResultEvent
 )

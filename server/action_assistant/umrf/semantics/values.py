@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import msgspec
 
-from action_assistant.umrf.jsontext import Json, Number, parse_small
+from action_assistant.umrf.json.text import Json, Number, parse_small
 from action_assistant.umrf.model import Parameter, Remap
 from action_assistant.umrf.parameters import flat_name
 

@@ -1,0 +1,243 @@
+"""The file of a backup: a zip that says what has to be in it, with the size and SHA-256 of each part.
+
+`about.json` comes first in reading and last in writing. Journals are `editor.db` and `runner.db`, SQLite
+files whatever database they came from; `files/…` is what else was in the data folder, `archive/…` the
+archives of runs. Format 1 had the journals alone, without sizes.
+"""
+
+import hashlib
+import os
+import shutil
+import stat
+import zipfile
+import zlib
+from pathlib import Path, PurePosixPath
+from typing import IO, Final
+
+import msgspec
+
+from action_assistant.commands.backups.progress import Progress
+from action_assistant.errors import CannotStart
+from action_assistant.journal.database import Branch
+from action_assistant.version import VERSION
+
+FORMAT: Final = 2
+FILES: Final = "files"
+ARCHIVE: Final = "archive"
+_ABOUT: Final = "about.json"
+_CHUNK: Final = 1 << 20
+_LONGEST: Final = 64 << 20  # bytes of about.json: a line for each of half a million files
+_LEVEL: Final = 1
+#: Bytes that one byte may become. What we write stays below 230 at this level, whatever it is.
+_TIGHTEST: Final = 300
+_ROOM: Final = 64 << 20  # bytes that have to be left on the disk
+_MODE: Final = 0o600
+
+
+class JournalCopy(msgspec.Struct, frozen=True):
+    """One journal in a backup: its last position, SHA-256 of the file, and its size."""
+
+    events: int
+    sha256: str
+    bytes: int | None = None
+
+
+class BackupPart(msgspec.Struct, frozen=True):
+    """A file in a backup."""
+
+    bytes: int
+    sha256: str
+
+
+class BackupManifest(msgspec.Struct, frozen=True, kw_only=True):
+    """What a backup says of itself. `database`: where the graphs were, without a password; None in
+    the data folder. `settings`: of the environment, without the token. `missing`: sentences."""
+
+    format: int
+    version: str
+    made_at: float
+    journals: dict[Branch, JournalCopy]
+    files: dict[str, BackupPart] = {}
+    database: str | None = None
+    settings: dict[str, str] = {}
+    missing: tuple[str, ...] = ()
+
+
+class Packer:
+    """Writes a backup, which is there under its name once `close` returns, or not at all."""
+
+    def __init__(self, folder: Path, progress: Progress) -> None:
+        self.files: dict[str, BackupPart] = {}
+        self._part = folder / "backup.zip"
+        descriptor = os.open(self._part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _MODE)
+        self._raw = os.fdopen(descriptor, "wb")
+        self._zip = zipfile.ZipFile(self._raw, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL)
+        self._progress = progress
+
+    def journal(self, branch: Branch, path: Path, events: int) -> JournalCopy:
+        """Take in the copy of a journal."""
+        held = self._take(f"{branch}.db", path)
+        return JournalCopy(events, held.sha256, held.bytes)
+
+    def file(self, name: str, path: Path) -> BackupPart:
+        """Take in a file. Raises OSError."""
+        self.files[name] = self._take(name, path)
+        return self.files[name]
+
+    def text(self, name: str, content: bytes) -> None:
+        """Take in a file that is nowhere."""
+        self._zip.writestr(name, content)
+        self.files[name] = BackupPart(len(content), hashlib.sha256(content).hexdigest())
+
+    def close(self, about: BackupManifest, target: Path) -> None:
+        """Say what it is, and put it into its place."""
+        self._zip.writestr(_ABOUT, msgspec.json.format(msgspec.json.encode(about)))
+        self._zip.close()
+        self._raw.flush()
+        os.fsync(self._raw.fileno())
+        self._raw.close()
+        self._part.replace(target)
+        sync(target.parent)
+
+    def abandon(self) -> None:
+        """Let go of the file."""
+        self._raw.close()
+
+    def _take(self, name: str, path: Path) -> BackupPart:
+        entry = zipfile.ZipInfo(name) if path.suffix == ".gz" else name  # the former: as it is
+        with path.open("rb") as there, self._zip.open(entry, "w", force_zip64=True) as here:
+            size, digest = _poured(there, here, f"packing {name}", self._progress)
+        return BackupPart(size, digest)
+
+
+class Package:
+    """A backup that is read. Nothing of it is written before all of it that it says was looked at."""
+
+    def __init__(self, source: Path) -> None:
+        self._source = source
+        try:
+            self._zip = zipfile.ZipFile(source)
+        except FileNotFoundError as error:
+            raise CannotStart(f"There is no file {source}.") from error
+        except (zipfile.BadZipFile, OSError) as error:
+            raise self._no_backup(error) from error
+        try:
+            self.about: Final = self._read_about()
+            self.parts: Final = self._parts()
+        except BaseException:
+            self._zip.close()
+            raise
+
+    def unpack(self, folder: Path, progress: Progress) -> None:
+        """All its parts into a folder, each proven. Raises CannotStart."""
+        total = sum(entry.file_size for entry, _ in self.parts.values())
+        if total > _TIGHTEST * self._source.stat().st_size + _CHUNK:
+            raise self._damaged("its parts lie over each other")
+        free = shutil.disk_usage(folder).free
+        if total + _ROOM > free:
+            raise CannotStart(
+                f"{self._source} needs {total >> 20} MiB, and {folder} has {free >> 20} MiB left."
+            )
+        for name, (entry, sha256) in self.parts.items():
+            path = folder / name
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            try:
+                descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _MODE)
+                with self._zip.open(entry) as there, os.fdopen(descriptor, "wb") as here:
+                    _, digest = _poured(there, here, f"unpacking {name}", progress)
+            except (zipfile.BadZipFile, zlib.error, EOFError) as error:
+                raise self._damaged(f"{name} cannot be read ({error})") from error
+            if digest != sha256:
+                raise self._damaged(f"{name} is not what was written")
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._zip.close()
+
+    def _read_about(self) -> BackupManifest:
+        try:
+            entry = self._entry(_ABOUT)
+            if entry.file_size > _LONGEST:
+                raise self._damaged(f"{_ABOUT} is too long")
+            about = msgspec.json.decode(self._zip.read(entry), type=BackupManifest)
+        except (zipfile.BadZipFile, msgspec.DecodeError, zlib.error, EOFError) as error:
+            raise self._no_backup(error) from error
+        if about.format > FORMAT:
+            raise CannotStart(f"{self._source} was made by a newer version, {about.version}.")
+        return about
+
+    def _parts(self) -> dict[str, tuple[zipfile.ZipInfo, str]]:
+        """Every file that belongs to it, as it lies in the zip, and its SHA-256."""
+        sizes = {f"{branch}.db": each.bytes for branch, each in self.about.journals.items()}
+        digests = {f"{branch}.db": each.sha256 for branch, each in self.about.journals.items()}
+        for name, held in self.about.files.items():
+            if not _is_place(name):
+                raise self._damaged(f"{name!r} is no name for one of its files")
+            sizes[name], digests[name] = held.bytes, held.sha256
+        parts = {}
+        for name, size in sizes.items():
+            entry = self._entry(name)
+            if size is not None and size != entry.file_size:
+                raise self._damaged(f"{name} has not the size that it should have")
+            parts[name] = entry, digests[name]
+        return parts
+
+    def _entry(self, name: str) -> zipfile.ZipInfo:
+        try:
+            entry = self._zip.getinfo(name)
+        except KeyError as error:
+            raise self._no_backup(f"it has no {name}") from error
+        mode = entry.external_attr >> 16
+        if mode and stat.S_IFMT(mode) not in {0, stat.S_IFREG}:
+            raise self._damaged(f"{name} is no plain file")
+        if entry.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
+            raise self._damaged(f"{name} is packed in a way that we do not use")
+        if entry.flag_bits & 1:
+            raise self._damaged(f"{name} is encrypted")
+        if entry.file_size > _TIGHTEST * entry.compress_size + _CHUNK:
+            raise self._damaged(f"{name} is packed more tightly than we do")
+        return entry
+
+    def _damaged(self, why: str) -> CannotStart:
+        return CannotStart(f"{self._source} is damaged, or no backup of ours: {why}.")
+
+    def _no_backup(self, why: object) -> CannotStart:
+        return CannotStart(f"{self._source} is no backup of ours, or is damaged: {why}.")
+
+
+def about_now(**fields: object) -> BackupManifest:
+    """What this version says."""
+    return msgspec.convert({"format": FORMAT, "version": VERSION, **fields}, type=BackupManifest)
+
+
+def sync(path: Path) -> None:
+    """What was written or renamed has to be found after a power cut, too."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def sha256_of(path: Path) -> str:
+    """Of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _is_place(name: str) -> bool:
+    """Whether a name leads to a place below one of the two folders, and nowhere else."""
+    parts = PurePosixPath(name).parts
+    plain = all(each not in {"", ".", ".."} and each.isprintable() for each in name.split("/"))
+    return plain and len(parts) > 1 and parts[0] in {FILES, ARCHIVE} and "\\" not in name
+
+
+def _poured(there: IO[bytes], here: IO[bytes], text: str, progress: Progress) -> tuple[int, str]:
+    """Copy all that comes; its size in bytes and its SHA-256."""
+    size, digest = 0, hashlib.sha256()
+    while block := there.read(_CHUNK):
+        here.write(block)
+        digest.update(block)
+        size += len(block)
+        progress.tell(f"{text}: {size >> 20} MiB")
+    return size, digest.hexdigest()

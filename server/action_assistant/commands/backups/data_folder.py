@@ -1,0 +1,167 @@
+"""What a data folder holds, as `backup` and `restore` see it: journals, keys, archives, and the rest."""
+
+import asyncio
+import sqlite3
+import tempfile
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+from sqlalchemy import Row, Select, select
+
+from action_assistant.commands.backups.progress import Progress
+from action_assistant.errors import CannotStart
+from action_assistant.journal.copying import sentence
+from action_assistant.journal.database import Branch
+from action_assistant.journal.databases import database_of
+from action_assistant.journal.events import Fold
+from action_assistant.journal.journal import Journal
+from action_assistant.journal.removal import StreamRemoved
+from action_assistant.runner.archives.raw_messages import RawPut
+from action_assistant.schema.runner_tables import runner_event
+from action_assistant.settings import ARCHIVE, RESTORING
+from action_assistant.web.auth import keys, revocations
+from action_assistant.web.network import certificate
+
+BRANCHES: Final[tuple[Branch, ...]] = ("editor", "runner")
+RECORDINGS: Final = "recordings"
+#: What is taken along beside journals and archives. A folder of these is put back file by file, if
+#: its files never change; the others are put back where there is none.
+MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS})
+WHOLE: Final = frozenset({keys.TOKEN_FILE, certificate.FOLDER, "sessions", "sessions.db"})
+#: What is made anew, or belongs to this place alone.
+_OWN: Final = frozenset(
+    {
+        *(f"{branch}.db" for branch in BRANCHES),
+        *("editor.mark", "editor.database", "open.html", ARCHIVE, RESTORING),
+    }
+)
+_PASSING: Final = (".lock", ".lock.new", "-wal", "-shm", "-journal", ".part")
+ASIDE: Final = "before-restore-"
+_MAGIC: Final = b"SQLite format 3\0"
+_PAGES: Final = 5_000  # copied between two words about it
+
+
+def belongings(data: Path) -> Iterator[tuple[str, Path]]:
+    """Files that are taken along, with their places in the folder."""
+    for name in sorted(MERGED | WHOLE):
+        top = data / name
+        for path in sorted(top.rglob("*")) if top.is_dir() else [top]:
+            if path.is_file() and not path.is_symlink() and not _is_passing(path):
+                yield path.relative_to(data).as_posix(), path
+
+
+def left_out(data: Path) -> list[Path]:
+    """What is in the folder that is nothing of ours."""
+    if not data.is_dir():
+        return []
+    known = MERGED | WHOLE | _OWN
+    return sorted(
+        path
+        for path in data.iterdir()
+        if path.name not in known and not _is_passing(path) and not path.name.startswith(ASIDE)
+    )
+
+
+def _is_passing(path: Path) -> bool:
+    return path.name.startswith(".") or path.name == "lock" or path.name.endswith(_PASSING)
+
+
+def is_database(path: Path) -> bool:
+    """Whether a file is SQLite's, so that its bytes alone do not say what is in it."""
+    with path.open("rb") as file:
+        return file.read(len(_MAGIC)) == _MAGIC
+
+
+def tables_copied(source: Path, target: Path, name: str, progress: Progress) -> None:
+    """A SQLite file as it is at one moment, while others may write."""
+
+    def tell(_: int, remaining: int, total: int) -> None:
+        progress.tell(f"{name}: {total - remaining} of {total} pages copied")
+
+    with (
+        closing(sqlite3.connect(f"{source.as_uri()}?mode=ro", uri=True)) as there,
+        closing(sqlite3.connect(target)) as here,
+    ):
+        target.chmod(0o600)
+        there.execute("BEGIN")  # else it would begin again with each commit of somebody else
+        there.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        there.backup(here, pages=_PAGES, progress=tell, sleep=0)
+
+
+def fold_of(branch: Branch) -> Fold:
+    """How a journal becomes its tables."""
+    if branch == "editor":
+        from action_assistant.editor.log.graph_events import fold as editor_fold
+
+        return editor_fold
+    from action_assistant.runner.projection import fold as runner_fold
+
+    return runner_fold
+
+
+def checked(path: Path, branch: Branch, progress: Progress, *, anew: bool = False) -> int:
+    """The number of events of a copy, each of which is sound; its tables are those of this version.
+    `anew`: it begins another epoch. Raises CannotStart."""
+    from action_assistant.editor.log import epochs
+
+    async def look() -> int:
+        url = f"sqlite:///{path}"
+        journal = await Journal.open(url, branch=branch, fold=fold_of(branch))
+        try:
+            told = lambda count: progress.tell(f"{branch}: {count} events proven")  # noqa: E731
+            for damage in await journal.verify(told):
+                raise CannotStart(
+                    f"The journal of the {branch} is damaged: {sentence(damage)}. "
+                    "`verify` tells more."
+                )
+            events = await journal.position()
+            if anew and branch == "editor":
+                await epochs.begin(journal, "a backup was restored")
+            return events
+        finally:
+            await journal.close()
+
+    events = asyncio.run(look())
+    path.with_name(f"{path.name}.lock").unlink(missing_ok=True)
+    return events
+
+
+def rows_of(path: Path, question: Select[Any]) -> list[Row[Any]]:
+    """Ask a SQLite file that nobody writes."""
+    found: list[Row[Any]] = []
+    database_of(f"sqlite:///{path}").look(lambda c: found.extend(c.execute(question).all()))
+    return found
+
+
+def archived(runner: Path) -> dict[str, str]:
+    """Places of archives, in their folder, and what their SHA-256 is by the copy of a journal."""
+    if not runner.exists():
+        return {}
+    event = runner_event.c
+    kinds = event.kind.in_([StreamRemoved.kind, RawPut.kind])
+    places = {}
+    for row in rows_of(
+        runner, select(event.kind, event.body).where(kinds).order_by(event.position)
+    ):
+        if row.kind == StreamRemoved.kind:
+            removed = msgspec.json.decode(row.body, type=StreamRemoved)
+            places[removed.kept] = removed.sha256
+        else:
+            put = msgspec.json.decode(row.body, type=RawPut)
+            places[put.file] = put.sha256
+    return places
+
+
+@contextmanager
+def workshop(parent: Path, prefix: str) -> Iterator[Path]:
+    """A folder for the work, on the disk where its result will lie, for this user alone. Faults of
+    disk and databases become CannotStart."""
+    try:
+        with tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as folder:
+            yield Path(folder)
+    except (OSError, sqlite3.Error) as error:
+        text = error.strerror if isinstance(error, OSError) else str(error)
+        raise CannotStart(f"Cannot work in {parent}: {text}.") from error

@@ -1,0 +1,43 @@
+"""How far something has come that takes a while, said on stderr."""
+
+import sys
+import time
+from typing import Final
+
+from action_assistant.safe_text import printable
+
+_EVERY: Final = 1.0  # seconds
+
+
+class Progress:
+    """Says nothing in the first second, and then one thing a second: over the last one on a terminal,
+    on a line of its own elsewhere."""
+
+    def __init__(self) -> None:
+        self._next = time.monotonic() + _EVERY
+        self._shown = False
+
+    def tell(self, text: str) -> None:
+        """It has come so far."""
+        if time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + _EVERY
+        self._shown = sys.stderr.isatty()
+        if self._shown:
+            _steer(f"\r\x1b[K{printable(text)} …")
+        else:
+            sys.stderr.write(f"{text} …\n")
+            sys.stderr.flush()
+
+    def end(self) -> None:
+        """Something else is said next."""
+        if self._shown:
+            _steer("\r\x1b[K")
+        self._shown = False
+
+
+def _steer(text: str) -> None:
+    """To the terminal itself, past what makes everything else plain."""
+    stream = sys.__stderr__ or sys.stderr
+    stream.write(text)
+    stream.flush()

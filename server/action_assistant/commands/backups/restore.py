@@ -1,0 +1,332 @@
+"""`restore`: puts a backup in the place of what is there, or into an empty folder or database.
+
+Everything is unpacked and proven beside its place first. While it is put there, `restore.unfinished`
+stands in the folder, with which nothing starts: whatever ends it, what is there is as before, or whole,
+or marked.
+"""
+
+import argparse
+import asyncio
+import os
+import shutil
+import time
+from contextlib import ExitStack
+from itertools import count
+from pathlib import Path
+from typing import Final
+
+import msgspec
+from sqlalchemy import Connection, inspect, select
+
+from action_assistant import settings
+from action_assistant.commands.backups.backup_file import (
+    FILES,
+    BackupManifest,
+    Package,
+    sha256_of,
+    sync,
+)
+from action_assistant.commands.backups.data_folder import (
+    ASIDE,
+    BRANCHES,
+    MERGED,
+    WHOLE,
+    checked,
+    fold_of,
+    left_out,
+    rows_of,
+    workshop,
+)
+from action_assistant.commands.backups.progress import Progress
+from action_assistant.errors import CannotStart
+from action_assistant.journal.database import Branch, cause_of
+from action_assistant.journal.databases import database_of
+from action_assistant.schema.editor_tables import editor_event
+from action_assistant.web.auth.keys import TOKEN_FILE
+
+_WORK: Final = ".restore-"
+_JOURNALS: Final = tuple(f"{branch}.db" for branch in BRANCHES)
+_MARKS: Final = ("editor.mark", "editor.database", settings.RESTORING)
+_event: Final = editor_event.c
+_LAST: Final = select(_event.position, _event.chain).order_by(_event.position.desc()).limit(1)
+
+
+class Under(msgspec.Struct, frozen=True):
+    """What is being put into the folder: the SHA-256 of the editor's journal in the backup, and where
+    the log ends that it becomes here. For who comes again."""
+
+    sha256: str
+    position: int
+    chain: str
+
+
+def restore(options: argparse.Namespace) -> int:
+    """The command. Raises CannotStart."""
+    from action_assistant.editor.log import database_location
+
+    data, source = options.data.resolve(), options.file.resolve()
+    progress = Progress()
+    package = Package(source)
+    try:
+        about = package.about
+        _check_names(about, source)
+        _check_folder(data, source)
+        url = (
+            options.database
+            or database_location.remembered(data)
+            or f"sqlite:///{data / 'editor.db'}"
+        )
+        _make(data)
+        with workshop(data, _WORK) as folder, ExitStack() as locks:
+            for branch in about.journals:
+                locks.callback(os.close, _locked(data, branch))
+            _sweep(data, folder)
+            package.unpack(folder, progress)
+            for branch in about.journals:
+                checked(folder / f"{branch}.db", branch, progress, anew=True)
+            aside, kept = _put(folder, data, url, about, progress)
+    finally:
+        package.close()
+    progress.end()
+    _tell(about, url, data, aside, kept)
+    return 0
+
+
+def _make(data: Path) -> None:
+    try:
+        data.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise CannotStart(f"Cannot make {data}: {error.strerror}.") from error
+
+
+def _check_names(about: BackupManifest, source: Path) -> None:
+    """A backup may write what belongs to a data folder, and nothing else there."""
+    for name in about.files:
+        top, inner = name.split("/")[:2]
+        if top == FILES and inner not in MERGED | WHOLE:
+            raise CannotStart(f"{source} is damaged, or no backup of ours: {name!r} is in it.")
+
+
+def _check_folder(data: Path, source: Path) -> None:
+    """Not among the things of others."""
+    strangers = [path for path in left_out(data) if path != source]
+    if strangers and not any((data / name).exists() for name in (*_JOURNALS, *WHOLE, *_MARKS)):
+        names = ", ".join(path.name for path in strangers[:3])
+        raise CannotStart(
+            f"{data} holds other things ({names}): name an empty folder, or one of this program."
+        )
+
+
+def _sweep(data: Path, folder: Path) -> None:
+    """What is left of restores that were interrupted while they unpacked."""
+    for path in data.glob(f"{_WORK}*"):
+        if path != folder:
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _put(
+    folder: Path, data: Path, url: str, about: BackupManifest, progress: Progress
+) -> tuple[Path | None, list[str]]:
+    """Everything into its place; where what was there has gone, and what stayed as it was."""
+    from action_assistant.editor.log import database_location, epochs
+
+    mark, is_own = data / settings.RESTORING, database_location.is_own(data, url)
+    has_graphs = "editor" in about.journals
+    _begin(mark, folder, url, about, progress, elsewhere=has_graphs and not is_own)
+    old = [f"{branch}.db" for branch in about.journals if branch == "runner" or is_own]
+    aside: Path | None = None
+    if any((data / name).exists() for name in old):
+        aside = _aside(data)
+    kept = [name for name in about.files if not _placed(folder, name, data)]
+    for name in old:
+        _exchange(folder / name, data / name, aside)
+    if has_graphs:
+        (data / epochs.MARK).unlink(missing_ok=True)
+        database_location.remember(data, url)
+    mark.unlink()
+    sync(data)
+    return aside, kept
+
+
+def _begin(
+    mark: Path,
+    folder: Path,
+    url: str,
+    about: BackupManifest,
+    progress: Progress,
+    *,
+    elsewhere: bool,
+) -> None:
+    """Mark the folder; and bring the graphs into a database `elsewhere`, where one transaction does
+    it. Raises CannotStart, and then the folder is as before."""
+    from action_assistant.journal.copying import copy
+
+    before = _under(mark)
+    if elsewhere and before is not None and _is_there(url, before, about):
+        return  # an interrupted restore got so far
+    _write(mark, _end_of(folder, about))
+    if not elsewhere:
+        return
+    staged = database_of(f"sqlite:///{folder / 'editor.db'}")
+    tell = lambda count: progress.tell(f"editor: {count} events stored")  # noqa: E731
+    try:
+        copy(staged, database_of(url), branch="editor", fold=fold_of("editor"), tell=tell)
+    except CannotStart:
+        if before is None:
+            mark.unlink()
+        else:
+            _write(mark, before)
+        raise
+
+
+def _aside(data: Path) -> Path:
+    """A new folder for what was there before."""
+    name = time.strftime(f"{ASIDE}%Y%m%d-%H%M%S")
+    for number in count(1):
+        path = data / (name if number == 1 else f"{name}-{number}")
+        try:
+            path.mkdir(mode=0o700)
+        except FileExistsError:
+            continue
+        return path
+    raise AssertionError
+
+
+def _under(mark: Path) -> Under | None:
+    try:
+        return msgspec.json.decode(mark.read_bytes(), type=Under)
+    except FileNotFoundError:
+        return None
+    except msgspec.DecodeError:
+        return Under("", 0, "")  # cut short by what interrupted it
+
+
+def _end_of(folder: Path, about: BackupManifest) -> Under:
+    if "editor" not in about.journals:
+        return Under("", 0, "")
+    row = rows_of(folder / "editor.db", _LAST)[0]
+    return Under(about.journals["editor"].sha256, row.position, bytes(row.chain).hex())
+
+
+def _is_there(url: str, under: Under, about: BackupManifest) -> bool:
+    """Whether a database holds the same backup already. Raises CannotStart."""
+    if "editor" not in about.journals or under.sha256 != about.journals["editor"].sha256:
+        return False
+    database = database_of(url)
+
+    def last(connection: Connection) -> tuple[int, str] | None:
+        if not inspect(connection).has_table(editor_event.name):
+            return None
+        row = connection.execute(_LAST).first()
+        return None if row is None else (row.position, bytes(row.chain).hex())
+
+    async def ask() -> tuple[int, str] | None:
+        try:
+            return await database.at_one_moment(last)
+        finally:
+            await database.close()
+
+    try:
+        return asyncio.run(ask()) == (under.position, under.chain)
+    except database.faults as error:
+        raise CannotStart(f"{database.name} cannot be read: {cause_of(error)}.") from error
+
+
+def _placed(folder: Path, name: str, data: Path) -> bool:
+    """Put a file into its place; False when another one stays there. Nothing is overwritten."""
+    top, _, inner = name.partition("/")
+    base = data if top == FILES else settings.keep(data).folder
+    source, target = folder / name, base / inner
+    whole = inner.split("/")[0]
+    if top == FILES and whole in WHOLE and not (data / whole).exists():
+        source, target = folder / FILES / whole, data / whole  # all of a folder at once
+    if not source.exists():
+        return True  # it went with its folder
+    if target.exists():
+        return target.is_file() and sha256_of(target) == sha256_of(source)
+    if top == FILES and whole in WHOLE and target != data / whole:
+        return False  # of one folder come all files from here, or none
+    for parent in reversed(target.parents):
+        parent.mkdir(mode=0o700, exist_ok=True)
+    _move(source, target)
+    return True
+
+
+def _move(source: Path, target: Path) -> None:
+    """There as a whole or not at all, also on another disk."""
+    part = source
+    if source.stat().st_dev != target.parent.stat().st_dev:
+        part = target.with_name(f".{target.name}.part")
+        shutil.copyfile(source, part)
+        part.chmod(0o600)
+    for path in part.rglob("*") if part.is_dir() else [part]:
+        sync(path)
+    part.replace(target)
+    sync(target.parent)
+
+
+def _locked(data: Path, branch: Branch) -> int:
+    """Keep everybody else out of a journal, also out of one that cannot be opened."""
+    from action_assistant.journal.sqlite import own
+
+    try:
+        return own(data / f"{branch}.db")
+    except CannotStart as error:
+        raise CannotStart(f"{error} End action-assistant first.") from error
+
+
+def _exchange(new: Path, old: Path, aside: Path | None) -> None:
+    """Put a file in the place of another, which is kept. At no moment is there none."""
+    for path in (old, old.with_name(f"{old.name}-wal")):
+        if aside is not None and path.exists() and not (aside / path.name).exists():
+            os.link(path, aside / path.name)
+    # What an old log still holds must not be applied to the new file.
+    for suffix in ("-wal", "-shm"):
+        old.with_name(f"{old.name}{suffix}").unlink(missing_ok=True)
+    sync(new)
+    new.replace(old)
+    sync(old.parent)
+
+
+def _write(path: Path, content: msgspec.Struct) -> None:
+    part = path.with_name(f".{path.name}.part")
+    descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    with os.fdopen(descriptor, "wb") as file:
+        file.write(msgspec.json.encode(content))
+        file.flush()
+        os.fsync(descriptor)
+    part.replace(path)
+    sync(path.parent)
+
+
+def _tell(about: BackupManifest, url: str, data: Path, aside: Path | None, kept: list[str]) -> None:
+    from action_assistant.editor.log import database_location
+
+    for branch, copied in about.journals.items():
+        print(f"{branch}: as it was after {copied.events} events")
+    if "editor" in about.journals and (about.database or not database_location.is_own(data, url)):
+        before = about.database or "the data folder"
+        here = (
+            str(data / "editor.db")
+            if database_location.is_own(data, url)
+            else database_location.shown(url)
+        )
+        print(f"the graphs, which were in {before}, are in {here} now")
+    if aside is not None:
+        print(f"what was there before is in {aside}")
+    for name in dict.fromkeys(_top(each) for each in kept):
+        print(f"kept as it was, though the backup has another one: {name}")
+    if f"{FILES}/{TOKEN_FILE}" in kept:
+        print(
+            f"Links and sessions of the backup do not open this server, which keeps its own token. "
+            f"To have those of the backup, move {data / TOKEN_FILE} away and restore again."
+        )
+    for name, value in about.settings.items():
+        print(f"it was made where {name}={value}")
+    for each in about.missing:
+        print(f"missing in the backup: {each}")
+
+
+def _top(name: str) -> str:
+    top, _, inner = name.partition("/")
+    return inner.split("/")[0] if top == FILES else inner

@@ -1,0 +1,105 @@
+"""Runs that shall go the same for ever, simulated again: `runs verify`, for continuous integration."""
+
+import argparse
+from collections.abc import Iterator
+from typing import Final, Literal
+
+import msgspec
+
+from action_assistant.commands.client import No, Server, print_json, refused, running
+from action_assistant.runner.analysis.expected_runs import (
+    Departure,
+    ExpectedStep,
+    course,
+    departure,
+)
+from action_assistant.runner.review.service import Expectation
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.semantics import script_from
+
+_WORDS: Final = {"result": "ends", "runs": "is told to", "state": "is", "hazard": "does"}
+
+
+class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
+    """What became of one expectation. `against`: the graph as it was sent then, or as it is now."""
+
+    name: str
+    run: str
+    against: Literal["then", "now"]
+    same: bool
+    why: str = ""
+
+
+def verify(options: argparse.Namespace) -> int:
+    """Simulate every expectation again; 1 when any takes another course."""
+    with running(options) as server:
+        try:
+            verdicts = list(_verdicts(server, options))
+        except No as error:
+            return refused(error)
+    if options.json:
+        print_json(msgspec.to_builtins(verdicts))
+    elif not verdicts:
+        print("Nothing is expected yet: open a run in the page and choose “Expect this course”.")
+    else:
+        for each in verdicts:
+            print(f"{'same   ' if each.same else 'DIFFERS'}  {each.name} ({each.against})")
+            if each.why:
+                print(f"         {each.why}")
+    return 0 if all(each.same for each in verdicts) else 1
+
+
+def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[VerifyVerdict]:
+    wanted = server.graph_id(options.graph) if options.graph else None
+    answer = server.runner("GET", "/api/expectations").content
+    for each in msgspec.json.decode(answer, type=list[Expectation]):
+        if wanted is not None and each.graph != wanted:
+            continue
+        yield _verdict(each, bytes(each.umrf), "then")
+        if each.graph is not None:
+            yield _now(server, each, each.graph)
+
+
+def _now(server: Server, each: Expectation, graph: str) -> VerifyVerdict:
+    """Against the graph as it is now. One that is gone cannot be asked any more."""
+    try:
+        umrf = server.editor("GET", f"/api/graphs/{graph}/umrf").content
+    except No as error:
+        return VerifyVerdict(
+            name=each.name, run=each.run, against="now", same=False, why=str(error)
+        )
+    return _verdict(each, umrf, "now")
+
+
+def _verdict(each: Expectation, umrf: bytes, against: Literal["then", "now"]) -> VerifyVerdict:
+    script = script_from(msgspec.json.decode(each.script))
+    try:
+        found = course(codec.read(umrf).graph, script)
+    except codec.Unreadable as wrong:
+        return VerifyVerdict(
+            name=each.name, run=each.run, against=against, same=False, why=wrong.message
+        )
+    apart = departure(_unnamed(each.course), _unnamed(found))
+    why = _sentence(apart) if apart is not None else ""
+    return VerifyVerdict(name=each.name, run=each.run, against=against, same=apart is None, why=why)
+
+
+def _unnamed(steps: "list[ExpectedStep] | tuple[ExpectedStep, ...]") -> list[ExpectedStep]:
+    """Without the name of the top graph: a graph may be renamed and still do the same."""
+    top = steps[0].graph if steps else ""
+    return [
+        msgspec.structs.replace(step, graph=step.graph.removeprefix(top).lstrip("_"))
+        for step in steps
+    ]
+
+
+def _sentence(apart: Departure) -> str:
+    return f"Step {apart.place + 1}: expected {_said(apart.expected)}, found {_said(apart.found)}."
+
+
+def _said(step: ExpectedStep | None) -> str:
+    if step is None:
+        return "the end"
+    if step.what == "ends":
+        return f"the graph to end {step.how}"
+    return f"{step.node or 'the graph'} {_WORDS[step.what]} {step.how}"

@@ -1,0 +1,158 @@
+"""Routes about the editor itself: configuration, people, and what happens as it happens."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from datetime import datetime
+from typing import Any, Final
+
+import anyio
+import msgspec
+from litestar import Request, get
+from litestar.response import ServerSentEvent, ServerSentEventMessage
+from litestar.types import ControllerRouterHandler
+
+from action_assistant import paths
+from action_assistant.editor.interchange.action_uses import LibraryAction
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.rooms.presence import colour_of
+from action_assistant.editor.services import EditorState
+from action_assistant.editor.workers import encoded
+from action_assistant.errors import BadInput
+from action_assistant.journal.events import Event
+from action_assistant.version import VERSION
+from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.network.addresses import Addresses
+
+_SILENCE: Final = 10.0  # seconds after which a listener is told that we are still here
+
+
+class Config(msgspec.Struct, frozen=True):
+    """What a page has to know. `runner_url` has no slash at its end."""
+
+    mode: str
+    version: str
+    runner_url: str
+
+
+class StoredEvent(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Something that was stored. `seq` counts in `stream`."""
+
+    position: int
+    stream: str
+    seq: int
+    kind: str
+    author: PersonRef
+    at: datetime
+    graph: str | None = None
+
+
+class Example(msgspec.Struct, frozen=True):
+    """A graph that comes with the program. Posting `umrf` makes it one of yours."""
+
+    name: str
+    umrf: Any
+
+
+class Participant(msgspec.Struct, frozen=True):
+    """Somebody who acted here."""
+
+    id: str
+    name: str
+    color: str
+
+
+def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterHandler]:
+    """Everything that is about no single graph."""
+
+    @get("/api/config", summary="What a page has to know", operation_id="getConfig")
+    async def get_config(request: Request[Any, Any, Any]) -> Config:
+        runner = addresses.runner_at(
+            request.headers.get("host", ""), app_state.services.settings.runner_port
+        )
+        return Config("local", VERSION, runner)
+
+    @get("/api/people", summary="Everyone who acted here", operation_id="listPeople")
+    async def list_people() -> list[Participant]:
+        everyone = app_state.services.people.everyone()
+        return [Participant(p.id, p.name, colour_of(p.id)) for p in everyone]
+
+    @get(
+        "/api/examples",
+        summary="The graphs that come with the program, as UMRF",
+        operation_id="listExamples",
+    )
+    async def list_examples() -> list[Example]:
+        files = [path async for path in anyio.Path(paths.examples()).glob("*.umrf.graph.json")]
+        return [
+            Example(
+                path.name.removesuffix(".umrf.graph.json"), msgspec.Raw(await path.read_bytes())
+            )
+            for path in sorted(files)
+        ]
+
+    @get(
+        "/api/actions",
+        summary="The actions that all graphs together know, by name",
+        operation_id="listActions",
+    )
+    async def list_actions() -> list[LibraryAction]:
+        known: list[LibraryAction] = encoded(await app_state.services.library.all())
+        return known
+
+    @get(
+        "/api/events",
+        summary="What is stored, as server-sent events; `after` and Last-Event-ID are positions",
+        operation_id="followEvents",
+        media_type="text/event-stream",
+    )
+    async def follow_events(
+        request: Request[Any, Any, Any], after: int | None = None
+    ) -> ServerSentEvent:
+        last = request.headers.get("last-event-id")
+        if last is not None:
+            if not last.isdecimal():
+                raise BadInput("Last-Event-ID is the number of an event.")
+            after = int(last)
+        return ServerSentEvent(_told(app_state, after))
+
+    return [get_config, list_people, list_examples, list_actions, follow_events]
+
+
+async def _told(app_state: EditorState, after: int | None) -> AsyncIterator[ServerSentEventMessage]:
+    """Stored events after a position, then new ones as they come."""
+    services = app_state.services
+    async with services.journal.follow() as events:
+        done = await services.journal.position() if after is None else after
+        while after is not None and (page := await services.journal.read_all(after=done)):
+            for event in page:
+                yield _message(app_state, event)
+            done = page[-1].position
+        coming = asyncio.ensure_future(anext(events))
+        try:
+            while True:
+                await asyncio.wait({coming}, timeout=_SILENCE)
+                if not coming.done():
+                    yield ServerSentEventMessage(comment="still here")
+                    continue
+                event = coming.result()
+                coming = asyncio.ensure_future(anext(events))
+                if event.position > done:
+                    yield _message(app_state, event)
+        except StopAsyncIteration:  # the journal is closed
+            return
+        finally:
+            coming.cancel()
+
+
+def _message(app_state: EditorState, event: Event) -> ServerSentEventMessage:
+    happened = StoredEvent(
+        event.position,
+        event.stream,
+        event.seq,
+        event.kind,
+        app_state.services.people.person(event.author),
+        h.when(event.at),
+        h.graph_of(event.stream),
+    )
+    data = msgspec.json.encode(happened).decode()
+    return ServerSentEventMessage(data=data, event=event.kind, id=event.position)

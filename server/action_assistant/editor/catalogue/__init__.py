@@ -1,0 +1,1 @@
+"""Graphs, versions, people and invitations, as the tables and rooms know them."""

@@ -1,0 +1,220 @@
+"""The graphs that there are: made, imported, named, deleted and brought back."""
+
+from datetime import datetime
+from typing import Any, Final
+
+import msgspec
+from sqlalchemy import Row, Select, select
+
+from action_assistant.editor.catalogue import server_edits
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.documents.contents import Counts, GraphInfo, info_of
+from action_assistant.editor.documents.document import new_aid
+from action_assistant.editor.interchange import changes, importing
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.errors import BadInput, NotFound
+from action_assistant.journal.events import Addition, Draft
+from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
+from action_assistant.umrf.check import check
+from action_assistant.umrf.model import Graph
+from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+NAME_LIMIT: Final = 200  # characters
+DESCRIPTION_LIMIT: Final = 10_000
+
+
+class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A graph as lists and pages show it. `seq` counts the changes of its document.
+
+    `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
+    change it. `people`: who is in it now.
+    """
+
+    id: str
+    name: str
+    description: str
+    seq: int
+    updated_at: datetime
+    made_at: datetime
+    actions: int | None = None
+    problems: Counts | None = None
+    robots: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+    people: tuple[PersonRef, ...] = ()
+    deleted_at: datetime | None = None
+    damaged: int | None = None
+
+
+class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An empty graph."""
+
+    name: str
+    description: str = ""
+
+
+class Catalogue:
+    """All graphs. Raises NotFound for those that are none, or deleted."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        rooms: Rooms,
+        graph_reader: GraphReader,
+        run_in_worker: RunInWorker = run_here,
+    ) -> None:
+        self._journal = journal
+        self._run_in_worker = run_in_worker
+        self._rooms = rooms
+        self._graph_reader = graph_reader
+
+    async def require(self, graph: str) -> None:
+        """Be sure that there is such a graph."""
+        await self._row(graph)
+
+    async def get(self, graph: str) -> GraphView:
+        """One graph."""
+        return await self._view(await self._row(graph))
+
+    async def all(self, *, deleted: bool = False) -> list[GraphView]:
+        """Every graph, the last changed first; or those that were deleted."""
+        gone = editor_tables.graph.c.deleted_at
+        chosen = _rows().where(gone.is_not(None) if deleted else gone.is_(None))
+        rows = await self._journal.query(chosen)
+        views = [await self._view(row) for row in rows]
+        return sorted(views, key=lambda view: view.updated_at, reverse=True)
+
+    async def create(self, body: bytes, author: str) -> tuple[GraphView, bytes | None]:
+        """A graph from a UMRF file, or an empty one from an object with a name only; with JSON of a
+        `Reading` in the first case.
+
+        Raises BadInput, NotUmrf, TooLarge with the place; then nothing is stored.
+        """
+        try:
+            wanted = msgspec.json.decode(body, type=NewGraph)
+        except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+            return await self.bring(body, author)
+        name, description = _fit(wanted.name, wanted.description)
+        graph = Graph(name=name, description=description)
+        made = h.draft(h.CREATED, author, h.GraphCreated(name, description))
+        about = info_of(graph, check(graph))
+        return await self._add(changes.first(graph), about, [made], author), None
+
+    async def bring(
+        self, body: bytes, author: str, *, run_in_worker: RunInWorker | None = None
+    ) -> tuple[GraphView, bytes]:
+        """A graph from a UMRF file. The log keeps the file as it came."""
+        found = await (run_in_worker or self._run_in_worker)(importing.imported, body)
+        about = found.about
+        made = h.draft(
+            h.CREATED,
+            author,
+            h.GraphCreated(about.name, about.description, found.dialect, found.notes),
+        )
+        drafts = [made, Draft(h.IMPORTED, author, body)]
+        return await self._add(found.update, about, drafts, author), found.reading
+
+    async def describe(
+        self, graph: str, author: str, *, name: str | None, description: str | None
+    ) -> GraphView:
+        """Give a graph another name or description. It is an edit of its document."""
+        row = await self._row(graph)
+        new_name, new_description = _fit(
+            row.name if name is None else name,
+            row.description if description is None else description,
+        )
+        async with self._rooms.enter(h.graph_stream(graph)) as room:
+            await server_edits.rename(
+                room,
+                author,
+                name=None if name is None else new_name,
+                description=None if description is None else new_description,
+                run_in_worker=self._run_in_worker,
+            )
+            return await self.get(graph)
+
+    async def delete(self, graph: str, author: str) -> None:
+        """Take a graph out of sight; everyone in it has to leave."""
+        await self._row(graph)
+        await self._journal.append(h.about_stream(graph), [h.draft(h.DELETED, author)])
+        self._rooms.expel(h.graph_stream(graph))
+
+    async def recover(self, graph: str, author: str) -> GraphView:
+        """Bring a deleted graph back."""
+        row = await self._row(graph, deleted=True)
+        if row.deleted_at is not None:
+            await self._journal.append(h.about_stream(graph), [h.draft(h.RECOVERED, author)])
+        return await self.get(graph)
+
+    async def _add(
+        self, update: bytes, of: GraphInfo, about: list[Draft], author: str
+    ) -> GraphView:
+        made = new_aid()
+        document = Draft(h.UPDATED, author, update)
+        await self._journal.append_all(
+            [
+                Addition(h.about_stream(made), tuple(about)),
+                Addition(h.graph_stream(made), (document,)),
+            ]
+        )
+        self._graph_reader.made(made, update, of)
+        return await self.get(made)
+
+    async def _row(self, graph: str, *, deleted: bool = False) -> Row[Any]:
+        rows = await self._journal.query(_rows().where(editor_tables.graph.c.id == graph))
+        if not rows or (rows[0].deleted_at is not None and not deleted):
+            raise NotFound(f"There is no graph {graph!r}.")
+        return rows[0]
+
+    async def _view(self, row: Row[Any]) -> GraphView:
+        summary = await self._graph_reader.summary(row.id, row.seq)
+        name = row.name if summary.name is None else summary.name
+        description = row.description if summary.description is None else summary.description
+        if (name, description) != (row.name, row.description):
+            now = h.GraphDescribed(name, description, summary.seq)
+            await self._journal.append(
+                h.about_stream(row.id), [h.draft(h.DESCRIBED, h.SERVER, now)]
+            )
+        room = self._rooms.open_room(h.graph_stream(row.id))
+        return GraphView(
+            id=row.id,
+            name=name,
+            description=description,
+            seq=max(row.seq, summary.seq),
+            updated_at=h.when(row.at),
+            made_at=h.when(row.made_at),
+            actions=summary.actions,
+            problems=summary.problems,
+            robots=summary.robots,
+            labels=summary.labels,
+            people=() if room is None else room.attendance.people(),
+            deleted_at=None if row.deleted_at is None else h.when(row.deleted_at),
+            damaged=summary.damaged,
+        )
+
+
+def _rows() -> Select[Any]:
+    """Graphs with the number and time of their document's last change."""
+    event, graph = editor_tables.editor_event, editor_tables.graph
+    last = (
+        select(event.c.seq)
+        .where(event.c.stream == "graph/" + graph.c.id)
+        .order_by(event.c.seq.desc())
+        .limit(1)
+    )
+    at = last.with_only_columns(event.c.at)
+    return select(graph, last.scalar_subquery().label("seq"), at.scalar_subquery().label("at"))
+
+
+def _fit(name: str, description: str) -> tuple[str, str]:
+    name = name.strip()
+    if not name or len(name) > NAME_LIMIT:
+        raise BadInput(f"A name has 1 to {NAME_LIMIT} characters.", where={"path": "/name"})
+    if len(description) > DESCRIPTION_LIMIT:
+        raise BadInput(
+            f"A description has up to {DESCRIPTION_LIMIT} characters.",
+            where={"path": "/description"},
+        )
+    return name, description

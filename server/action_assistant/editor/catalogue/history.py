@@ -1,0 +1,136 @@
+"""The history of a graph: events of its two streams, edits of one person in one go as one entry."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from datetime import datetime
+from typing import Any, Final, Literal, TypeAlias
+
+import msgspec
+from msgspec.structs import replace
+from sqlalchemy import Row, select
+
+from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.catalogue.versions import Versions, VersionView
+from action_assistant.editor.log import graph_events as h
+from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
+from action_assistant.web.auth.keys import PersonRef
+
+_ONE_GO: Final = 5 * 60  # seconds between two edits of one entry
+_CHANGES: Final = 10_000  # changes of the document that one answer looks at
+
+Kind: TypeAlias = Literal[
+    "created", "imported", "edited", "published", "restored", "deleted", "recovered"
+]
+
+
+class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Something that was done to a graph, between `at` and `until`.
+
+    `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
+    was after that deed; edits begin at `from_seq`. `restored` is the change that was gone back to.
+    """
+
+    kind: Kind
+    author: PersonRef
+    at: datetime
+    until: datetime
+    seq: int
+    from_seq: int | None = None
+    restored: int | None = None
+    version: VersionView | None = None
+
+
+class GraphHistory:
+    """Tells the past of graphs."""
+
+    def __init__(self, journal: Journal, people: People, versions: Versions) -> None:
+        self._journal = journal
+        self._people = people
+        self._versions = versions
+
+    async def of(self, graph: str, *, limit: int, before: int | None) -> list[HistoryEntry]:
+        """Up to `limit` entries, newest first; with `before` only what was before that change."""
+        rows = await self._rows(graph, before)
+        versions = await self._versions.by_event(graph)
+        restored = await self._restored(graph)
+        found = list(_entries(reversed(rows), self._people, versions, restored))
+        return found[::-1][:limit]
+
+    async def _rows(self, graph: str, before: int | None) -> list[Row[Any]]:
+        event = editor_tables.editor_event.c
+        document = h.graph_stream(graph)
+        chosen = (
+            select(event.seq, event.kind, event.author, event.at)
+            .where(event.stream.in_([document, h.about_stream(graph)]))
+            .order_by(event.position.desc())
+            .limit(_CHANGES)
+        )
+        if before is not None:
+            there = select(event.position).where(event.stream == document, event.seq == before)
+            chosen = chosen.where(event.position < there.scalar_subquery())
+        return await self._journal.query(chosen)
+
+    async def _restored(self, graph: str) -> dict[int, int]:
+        """Which changes went back to which."""
+        event = editor_tables.editor_event.c
+        chosen = select(event.body).where(
+            event.stream == h.about_stream(graph), event.kind == h.RESTORED
+        )
+        rows = await self._journal.query(chosen)
+        restorings = (msgspec.json.decode(row.body, type=h.GraphRestored) for row in rows)
+        return {restored.seq: restored.restored for restored in restorings}
+
+
+def _entries(
+    rows: Iterable[Row[Any]],
+    people: People,
+    versions: Mapping[int, VersionView],
+    restored: Mapping[int, int],
+) -> Iterator[HistoryEntry]:
+    """Entries in order of time from events in order of time."""
+    seq = 1
+    last: HistoryEntry | None = None
+    for row in rows:
+        at = h.when(row.at)
+        entry = HistoryEntry(
+            kind="edited", author=people.person(row.author), at=at, until=at, seq=seq
+        )
+        match row.kind:
+            case h.UPDATED | h.DEFERRED if row.seq == 1:
+                continue  # what the graph was created with
+            case h.UPDATED | h.DEFERRED:
+                seq = row.seq
+                if seq in restored:
+                    entry = replace(entry, kind="restored", seq=seq, restored=restored[seq])
+                elif last is not None and _same_go(last, entry):
+                    last = replace(last, until=at, seq=seq)
+                    continue
+                else:
+                    entry = replace(entry, seq=seq, from_seq=seq)
+            case h.CREATED:
+                entry = replace(entry, kind="created", seq=1)
+            case h.IMPORTED if last is not None:
+                last = replace(last, kind="imported")
+                continue
+            case h.PUBLISHED:
+                version = versions[row.seq]
+                entry = replace(entry, kind="published", seq=version.seq, version=version)
+            case h.DELETED:
+                entry = replace(entry, kind="deleted")
+            case h.RECOVERED:
+                entry = replace(entry, kind="recovered")
+            case _:
+                continue
+        if last is not None:
+            yield last
+        last = entry
+    if last is not None:
+        yield last
+
+
+def _same_go(last: HistoryEntry, entry: HistoryEntry) -> bool:
+    return (
+        last.kind == "edited"
+        and last.author == entry.author
+        and (entry.at - last.until).total_seconds() < _ONE_GO
+    )

@@ -1,0 +1,59 @@
+"""The action library: the actions that all graphs use, each name once."""
+
+from sqlalchemy import select
+
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.interchange.action_uses import NOTHING, GraphUse, merged, used
+from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
+from action_assistant.web.workers.lanes import HOPELESS
+
+
+class Library:
+    """Reads a graph again only when it has changed."""
+
+    def __init__(self, journal: Journal, graph_reader: GraphReader) -> None:
+        self._journal = journal
+        self._graph_reader = graph_reader
+        self._read: dict[str, tuple[int, bytes]] = {}
+        self._shown: tuple[dict[str, int], bytes] = {}, b"[]"
+
+    async def all(self) -> bytes:
+        """Every action that a graph uses, by name: JSON of a list of `Known`. Graphs that cannot be
+        read are left out."""
+        graph, event = editor_tables.graph, editor_tables.editor_event
+        last = (
+            select(event.c.seq)
+            .where(event.c.stream == "graph/" + graph.c.id)
+            .order_by(event.c.seq.desc())
+            .limit(1)
+        )
+        rows = await self._journal.query(
+            select(
+                graph.c.id,
+                graph.c.made_at,
+                last.scalar_subquery().label("seq"),
+                last.with_only_columns(event.c.at).scalar_subquery().label("at"),
+            )
+            .where(graph.c.deleted_at.is_(None))
+            .order_by(graph.c.made_at, graph.c.id)
+        )
+        for row in rows:
+            await self._refresh(row.id, row.seq)
+        seqs = {row.id: self._read[row.id][0] for row in rows}
+        if self._shown[0] != seqs:
+            self._read = {row.id: self._read[row.id] for row in rows}
+            newest_first = sorted(rows, key=lambda row: row.at, reverse=True)
+            uses = [(GraphUse(row.id, row.made_at), self._read[row.id][1]) for row in newest_first]
+            self._shown = seqs, await self._graph_reader.ask(merged, uses)
+        return self._shown[1]
+
+    async def _refresh(self, graph: str, seq: int) -> None:
+        known = self._read.get(graph)
+        if known is None or known[0] < seq:
+            try:
+                sight = await self._graph_reader.now(graph)
+                seq, actions = sight.seq, await self._graph_reader.ask(used, sight)
+            except HOPELESS:
+                actions = NOTHING
+            self._read[graph] = seq, actions

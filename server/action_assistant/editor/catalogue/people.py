@@ -1,0 +1,54 @@
+"""Who acted here, under the name they last gave."""
+
+from sqlalchemy import select
+
+from action_assistant.editor.log.graph_events import (
+    EXAMPLES,
+    NAMED,
+    PEOPLE,
+    SERVER,
+    PersonNamed,
+    draft,
+)
+from action_assistant.errors import Unavailable
+from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
+from action_assistant.web.auth.keys import PersonRef
+
+_OURS = {SERVER: "Action Assistant", EXAMPLES: "Examples"}
+
+
+class People:
+    """Names by id. Knows everyone who ever acted."""
+
+    def __init__(self, journal: Journal, names: dict[str, str]) -> None:
+        self._journal = journal
+        self._names = names
+
+    @classmethod
+    async def known(cls, journal: Journal) -> "People":
+        """Those in the journal."""
+        rows = await journal.query(select(editor_tables.person.c.id, editor_tables.person.c.name))
+        return cls(journal, {row.id: row.name for row in rows})
+
+    async def seen(self, person: PersonRef) -> None:
+        """Somebody acts: remember the name, if it is new."""
+        if self._names.get(person.id) == person.name:
+            return
+        before = self._names.get(person.id)
+        self._names[person.id] = person.name
+        try:
+            await self._journal.append(PEOPLE, [draft(NAMED, person.id, PersonNamed(person.name))])
+        except Unavailable:  # it is told when they act next
+            self._names.pop(person.id)
+            if before is not None:
+                self._names[person.id] = before
+            raise
+
+    def person(self, author: str) -> PersonRef:
+        """Who the author of an event is."""
+        return PersonRef(author, self._names.get(author) or _OURS.get(author, ""))
+
+    def everyone(self) -> list[PersonRef]:
+        """All of them, by name."""
+        return sorted((PersonRef(*item) for item in self._names.items()), key=lambda p: p.name)

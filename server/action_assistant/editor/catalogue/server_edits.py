@@ -1,0 +1,29 @@
+"""Edits that the server makes itself: on a copy, entering the room as the difference (rule R9)."""
+
+from action_assistant.editor.interchange.changes import renaming, restoring
+from action_assistant.editor.rooms.room import Room
+from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+
+async def rename(
+    room: Room,
+    author: str,
+    *,
+    name: str | None,
+    description: str | None,
+    run_in_worker: RunInWorker = run_here,
+) -> int:
+    """Give the graph another name or description; the seq."""
+    state = await room.look(lambda replica, _: replica.doc.get_update())
+    return await room.submit(await run_in_worker(renaming, state, name, description), author)
+
+
+async def restore(
+    room: Room, author: str, then: bytes, *, run_in_worker: RunInWorker = run_here
+) -> int:
+    """Make the graph what it was in this document, as an ordinary edit that can be undone; the seq.
+
+    What people said about it stays.
+    """
+    state = await room.look(lambda replica, _: replica.doc.get_update())
+    return await room.submit(await run_in_worker(restoring, state, then), author)

@@ -1,0 +1,1 @@
+"""Yjs updates: messages, what an update brings, replicas, loading from the log."""

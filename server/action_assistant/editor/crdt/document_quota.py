@@ -1,0 +1,128 @@
+"""The quota of a document: how many actions, fields and bytes it may hold.
+
+Both limits are looked at before an update is applied, and counted anew only when what was added
+since could have reached them: counting is slow. Deletions are always taken, so that a full graph can
+be made smaller. What is brought back after it was deleted is not counted as new; the bytes bound it.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, Final
+
+from pycrdt import Doc, Map
+
+from action_assistant.editor.crdt.update_scan import UpdateOutline
+from action_assistant.editor.documents.values import ROOTS
+from action_assistant.errors import TooLarge
+from action_assistant.umrf.model import ENTRY, EXIT, Graph
+
+MOST_ACTIONS: Final = 5_000
+MOST_BYTES: Final = 32 << 20
+_WORTH: Final = 1 << 20  # bytes added since, for which measuring again is worth its time
+
+
+#: Keys of the shared maps that a graph may come with: each is a struct of its first update.
+MOST_FIELDS: Final = 200_000
+MOST_ARROWS: Final = 20_000
+#: Arrows of one action on one side: as many as there can be others.
+MOST_AT_ONE: Final = MOST_ACTIONS
+
+
+def refuse_too_much(graph: Graph, dialect: str) -> None:
+    """Refuse a graph that a document may not hold. Raises TooLarge with the place."""
+    actions = "/umrf_actions" if dialect in {"D1", "D1'"} else "/actions"
+    real = [action for action in graph.actions if not action.missing]
+    if len(graph.actions) > MOST_ACTIONS:
+        ghosts = len(graph.actions) - len(real)
+        told = f", {ghosts:,} of them only named by arrows" if ghosts else ""
+        raise TooLarge(
+            f"A graph may have {MOST_ACTIONS:,} actions; this one has {len(graph.actions):,}{told}.",
+            where={"path": actions},
+        )
+    if len(graph.relations) > MOST_ARROWS:
+        raise TooLarge(
+            f"A graph may have {MOST_ARROWS:,} arrows; this one has {len(graph.relations):,}.",
+            where={"path": actions},
+        )
+    places = {action.key: f"{actions}/{n}" for n, action in enumerate(real)}
+    for side, ends in (
+        ("children", Counter(relation.parent for relation in graph.relations)),
+        ("parents", Counter(relation.child for relation in graph.relations)),
+    ):
+        for key, count in ends.items():
+            if count > MOST_AT_ONE:
+                end = {ENTRY: "/graph_entry", EXIT: "/graph_exit"}
+                place = end.get(key) or f"{places.get(key, actions)}/{side}"
+                raise TooLarge(
+                    f"An action may have {MOST_AT_ONE:,} {side}; here are {count:,}.",
+                    where={"path": place},
+                )
+
+
+def refuse_too_wide(maps: Mapping[str, Mapping[str, object]]) -> None:
+    """Refuse a graph for what all its actions and arrows say together. Raises TooLarge."""
+    fields = sum(map(len, maps.values()))
+    if fields > MOST_FIELDS:
+        raise TooLarge(
+            f"A graph may have {MOST_FIELDS:,} fields, those of parameters and arrows among them; "
+            f"this one has {fields:,}.",
+            where={"path": ""},
+        )
+
+
+def refuse_too_long(update: bytes) -> None:
+    """Refuse the first update of a document that no room would take. Raises TooLarge."""
+    if len(update) > MOST_BYTES:
+        raise TooLarge(f"A graph may have {MOST_BYTES >> 20} MiB.", where={"path": ""})
+
+
+class QuotaExceeded(Exception):
+    """The document would hold more than one may; the message says of what."""
+
+
+class DocumentQuota:
+    """The bounds of one document: never below what it holds."""
+
+    def __init__(self, doc: "Doc[Any]") -> None:
+        self._doc = doc
+        self._bytes = 0
+        self._measured = 0
+        self._spare = 0
+        self._spare_fields = 0
+        self._fields_changed = True
+        self._changed = True  # since actions were counted
+
+    def check(self, update: bytes, read: UpdateOutline) -> None:
+        """Raises Full for an update that brings too much. Only deletions never do."""
+        if read.actions > self._spare and self._changed:
+            self._changed = False
+            self._spare = MOST_ACTIONS - actions_in(self._doc)
+        if read.actions > max(self._spare, 0):
+            raise QuotaExceeded(f"a graph may have {MOST_ACTIONS:,} actions")
+        if read.fields > self._spare_fields and self._fields_changed:
+            self._fields_changed = False
+            self._spare_fields = MOST_FIELDS - fields_in(self._doc)
+        if read.fields > max(self._spare_fields, 0):
+            raise QuotaExceeded(f"a graph may have {MOST_FIELDS:,} fields")
+        if read.brings and self._bytes + len(update) > MOST_BYTES:
+            if self._bytes - self._measured >= _WORTH:
+                self._bytes = self._measured = len(self._doc.get_update())
+            if self._bytes + len(update) > MOST_BYTES:
+                raise QuotaExceeded(f"a graph may have {MOST_BYTES >> 20} MiB")
+
+    def took(self, size: int, actions: int = 0, fields: int = 0) -> None:
+        """So many bytes were applied, with so many new actions and fields in them."""
+        self._bytes += size
+        self._spare -= actions
+        self._spare_fields -= fields
+        self._changed = self._fields_changed = True
+
+
+def actions_in(doc: "Doc[Any]") -> int:
+    """How many actions a document has: their keys are those without a field."""
+    return sum("|" not in key for key in doc.get("actions", type=Map).keys())  # noqa: SIM118
+
+
+def fields_in(doc: "Doc[Any]") -> int:
+    """How many keys the maps of a document hold."""
+    return sum(len(doc.get(root, type=Map)) for root in ROOTS)

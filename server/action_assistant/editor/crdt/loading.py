@@ -1,0 +1,123 @@
+"""Loads documents from the log: snapshot and tail, folded in a worker, piece by piece."""
+
+import logging
+from typing import Final
+
+import msgspec
+
+from action_assistant.editor.crdt.folding import StreamDamage, fold
+from action_assistant.editor.crdt.log_tail import LogTail
+from action_assistant.editor.crdt.replica import Replica, ReplicaState
+from action_assistant.errors import Unavailable
+from action_assistant.journal.events import StreamSnapshot
+from action_assistant.journal.journal import Journal
+from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+log: Final = logging.getLogger(__name__)
+
+_SMALL: Final = 32 * 1024  # bytes that are put together at once: milliseconds, as a way aside takes
+
+
+class Loaded(msgspec.Struct, frozen=True):
+    """A document read from the log, at `seq`. `kept` is the seq of the snapshot it began from.
+
+    `damaged`: the log goes on, and this is why the document does not.
+    """
+
+    replica: Replica
+    seq: int
+    kept: int
+    damaged: StreamDamage | None = None
+
+
+class Stored(msgspec.Struct, frozen=True):
+    """As `Loaded`, with the document as the bytes of a snapshot; none where nothing was stored."""
+
+    document: bytes
+    seq: int
+    kept: int
+    damaged: StreamDamage | None = None
+
+
+async def load(
+    journal: Journal,
+    stream: str,
+    upto: int | None = None,
+    *,
+    learn: bool | None = None,
+    run_in_worker: RunInWorker = run_here,
+) -> Loaded:
+    """The document of a stream, now or after its event `upto`, to go on with.
+
+    `learn`: what only editing needs; by default for a document as it is now. Raises Unavailable.
+    """
+    learn = upto is None if learn is None else learn
+    found = await stored(journal, stream, upto, learn=learn, run_in_worker=run_in_worker)
+    replica = ReplicaState.replica(found.document) if found.document else Replica()
+    if replica is None:  # a snapshot that cannot be read, and nothing after it
+        found = await _followed(
+            journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker
+        )
+        replica = ReplicaState.replica(found.document) if found.document else Replica()
+    if replica is None:
+        raise Unavailable(f"{stream} reads otherwise each time.")
+    return Loaded(replica, found.seq, found.kept, found.damaged)
+
+
+async def stored(
+    journal: Journal,
+    stream: str,
+    upto: int | None = None,
+    *,
+    learn: bool,
+    run_in_worker: RunInWorker = run_here,
+) -> Stored:
+    """The document of a stream as bytes. What depends on its size is done by `run_in_worker`.
+
+    Raises Unavailable.
+    """
+    snapshot = await _snapshot(journal, stream)
+    if snapshot is not None and (upto is None or snapshot.seq <= upto):
+        found = await _followed(
+            journal, stream, snapshot, upto, learn=learn, run_in_worker=run_in_worker
+        )
+        if ReplicaState.is_form_of(found.document):
+            return found
+    return await _followed(journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker)
+
+
+async def _followed(
+    journal: Journal,
+    stream: str,
+    snapshot: StreamSnapshot | None,
+    upto: int | None,
+    *,
+    learn: bool,
+    run_in_worker: RunInWorker,
+) -> Stored:
+    """A snapshot, or nothing, and the events after it."""
+    start, document = (0, b"") if snapshot is None else (snapshot.seq, snapshot.state)
+    tail = LogTail(journal, stream, start, upto)
+    while events := await tail.next():
+        size = len(document) + sum(len(event.body) for event in events)
+        folded = await (run_here if size <= _SMALL else run_in_worker)(
+            fold, document, events, learn
+        )
+        if folded is None:  # not a snapshot of ours
+            return await _followed(
+                journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker
+            )
+        document = folded.document
+        if folded.damaged is not None:
+            log.error("%s %d cannot be applied: %s", stream, folded.seq + 1, folded.damaged.why)
+            return Stored(document, folded.seq, start, folded.damaged)
+    return Stored(document, tail.seq, start, tail.damaged)
+
+
+async def _snapshot(journal: Journal, stream: str) -> StreamSnapshot | None:
+    """The snapshot; none where it cannot even be read, since the log says all that it could."""
+    try:
+        return await journal.snapshot(stream)
+    except Unavailable as error:
+        log.warning("%s: no use of the snapshot: %s", stream, error.detail)
+        return None

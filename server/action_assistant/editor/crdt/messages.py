@@ -1,0 +1,238 @@
+"""The messages of a room's socket: y-protocols, and our acknowledgements.
+
+See docs/room-protocol.md.
+"""
+
+from collections.abc import Iterable
+from typing import Final, TypeAlias
+
+import msgspec
+
+SYNC: Final = 0
+AWARENESS: Final = 1
+QUERY_AWARENESS: Final = 3
+ACKS: Final = 100
+COMPARE: Final = 101
+READ_ONLY: Final = 102
+EPOCH: Final = 103
+STEP_1: Final = 0
+STEP_2: Final = 1
+UPDATE: Final = 2
+
+#: Close codes of accepted sockets, by what they mean.
+UNREADABLE: Final = 1003  # a text frame
+MALFORMED: Final = 1007
+TOO_BIG: Final = 1009
+RESTARTING: Final = 1012
+TOO_SLOW: Final = 1013
+SESSION_ENDED: Final = 4401
+FORBIDDEN: Final = 4403
+NO_SUCH_GRAPH: Final = 4404
+OTHER_EPOCH: Final = 4409
+FULL: Final = 4413
+
+REASONS: Final = {
+    UNREADABLE: "only binary messages",
+    MALFORMED: "not a message of this protocol",
+    TOO_BIG: "an update may have 1 MiB",
+    RESTARTING: "restarting, come again",
+    TOO_SLOW: "too slow, come again",
+    SESSION_ENDED: "session ended",
+    FORBIDDEN: "may not change this graph",
+    NO_SUCH_GRAPH: "no such graph",
+    OTHER_EPOCH: "other epoch",
+    FULL: "the graph is full",
+}
+
+#: In the place of FORBIDDEN's: a page then takes another client id and goes on.
+OTHER_CLIENT: Final = "client id of another person"
+
+UPDATE_LIMIT: Final = 1 << 20  # bytes
+NOTHING_NEW: Final = b"\x00\x00"  # an update without structs and deletions
+
+
+class Malformed(Exception):
+    """The bytes are no message of this protocol; the message says why."""
+
+
+class Question(msgspec.Struct, frozen=True):
+    """Sync step 1: what the client has, as a state vector."""
+
+    state: bytes
+
+
+class Edit(msgspec.Struct, frozen=True):
+    """Sync step 2 or an update: something that the document may lack."""
+
+    update: bytes
+
+
+class PresenceEntry(msgspec.Struct, frozen=True):
+    """What one client says about itself. `state` is JSON text; `null` means gone."""
+
+    client: int
+    clock: int
+    state: bytes
+
+
+class Presence(msgspec.Struct, frozen=True):
+    """Awareness entries."""
+
+    entries: tuple[PresenceEntry, ...]
+
+
+class WhoIsThere(msgspec.Struct, frozen=True):
+    """Query awareness."""
+
+
+class CompareMessage(msgspec.Struct, frozen=True):
+    """What the client shows at `seq`, as a fingerprint (`sameness`)."""
+
+    seq: int
+    entries: int
+    total: int
+
+
+Message: TypeAlias = Question | Edit | Presence | WhoIsThere | CompareMessage
+
+
+class ByteReader:
+    """Reads lib0's variable-length encoding. Raises Malformed past the end."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._at = 0
+
+    def number(self) -> int:
+        """A varUint of at most 64 bit."""
+        number = shift = 0
+        while True:
+            if self._at >= len(self._data) or shift > 63:
+                raise Malformed("a number has no end")
+            byte = self._data[self._at]
+            self._at += 1
+            number |= (byte & 0x7F) << shift
+            if byte < 0x80:
+                return number
+            shift += 7
+
+    def text(self) -> bytes:
+        """A varUint8Array, or a varString as UTF-8."""
+        length = self.number()
+        if length > self.left:
+            raise Malformed("longer than the message")
+        self._at += length
+        return self._data[self._at - length : self._at]
+
+    def byte(self) -> int:
+        """One byte."""
+        if self._at >= len(self._data):
+            raise Malformed("the message ends early")
+        self._at += 1
+        return self._data[self._at - 1]
+
+    def skip(self, count: int) -> None:
+        """Pass over bytes."""
+        if count > self.left:
+            raise Malformed("the message ends early")
+        self._at += count
+
+    def skip_signed(self) -> None:
+        """Pass over a varInt."""
+        while self.byte() & 0x80:
+            pass
+
+    @property
+    def left(self) -> int:
+        """Bytes that were not read."""
+        return len(self._data) - self._at
+
+
+def parse(data: bytes) -> Message | None:
+    """A message; None for kinds that we do not know. Raises Malformed."""
+    reader = ByteReader(data)
+    kind = reader.number()
+    if kind == SYNC:
+        return _sync(reader)
+    if kind == AWARENESS:
+        return Presence(tuple(_entries(reader.text())))
+    if kind == QUERY_AWARENESS:
+        return WhoIsThere()
+    if kind == COMPARE:
+        return CompareMessage(reader.number(), reader.number(), reader.number())
+    return None
+
+
+def _sync(reader: ByteReader) -> Message:
+    step = reader.number()
+    if step == STEP_1:
+        return Question(reader.text())
+    if step in {STEP_2, UPDATE}:
+        return Edit(reader.text())
+    raise Malformed(f"there is no sync message {step}")
+
+
+def _entries(data: bytes) -> Iterable[PresenceEntry]:
+    reader = ByteReader(data)
+    for _ in range(reader.number()):
+        yield PresenceEntry(reader.number(), reader.number(), reader.text())
+
+
+def number(value: int) -> bytes:
+    """A varUint."""
+    out = bytearray()
+    while value > 0x7F:
+        out.append(0x80 | (value & 0x7F))
+        value >>= 7
+    out.append(value)
+    return bytes(out)
+
+
+def text(value: bytes) -> bytes:
+    """A varUint8Array, or a varString."""
+    return number(len(value)) + value
+
+
+def question(state: bytes) -> bytes:
+    """Sync step 1."""
+    return bytes((SYNC, STEP_1)) + text(state)
+
+
+def answer(update: bytes) -> bytes:
+    """Sync step 2."""
+    return bytes((SYNC, STEP_2)) + text(update)
+
+
+def change(update: bytes) -> bytes:
+    """An update."""
+    return bytes((SYNC, UPDATE)) + text(update)
+
+
+def presence(entries: Iterable[PresenceEntry]) -> bytes:
+    """Awareness entries."""
+    packed = [number(e.client) + number(e.clock) + text(e.state) for e in entries]
+    return bytes((AWARENESS,)) + text(number(len(packed)) + b"".join(packed))
+
+
+def acks(messages: int, seq: int) -> bytes:
+    """The first `messages` edits of this socket are durable; it was sent the log up to `seq`."""
+    return bytes((ACKS,)) + number(messages) + number(seq)
+
+
+def compared(seq: int, entries: int, total: int) -> bytes:
+    """A fingerprint of the document at `seq`."""
+    return bytes((COMPARE,)) + number(seq) + number(entries) + number(total)
+
+
+def read_only(why: str) -> bytes:
+    """Nobody may change this document; a sentence says why."""
+    return bytes((READ_ONLY,)) + text(why.encode())
+
+
+def epoch(name: str) -> bytes:
+    """Which history of the graph this is."""
+    return bytes((EPOCH,)) + text(name.encode())
+
+
+#: Says nothing; sent so that a client which drops silent sockets does not.
+BEAT: Final = presence(())

@@ -1,0 +1,312 @@
+"""A document in memory that says what each update brought."""
+
+import itertools
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from enum import Enum
+from typing import Any, Final, Literal
+
+import msgspec
+from pycrdt import Doc, get_update
+
+from action_assistant.editor.crdt.document_quota import DocumentQuota
+from action_assistant.editor.crdt.messages import NOTHING_NEW, ByteReader, Malformed
+from action_assistant.editor.crdt.nesting import Nesting
+from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
+from action_assistant.editor.log.document_events import DEFERRED, UPDATED
+from action_assistant.journal.events import Event
+
+log: Final = logging.getLogger(__name__)
+
+WAITING_BYTES: Final = 4 << 20  # of one author, for something that may never come
+WAITING_UPDATES: Final = 256
+
+
+class UpdateEffect(Enum):
+    """What an update did to a document."""
+
+    NEWS = "changed it"
+    NOTHING = "was known"
+    WAITS = "waits for an earlier one"
+
+
+class ForeignClient(Exception):
+    """An update brings something in the name of a client that belongs to another person."""
+
+
+class TooMuchWaits(Exception):
+    """Of this author so much waits for something earlier that no more is kept."""
+
+
+class Panicked(Exception):
+    """The CRDT library panicked over an update; the document may be damaged."""
+
+
+class Replica:
+    """A Yjs document. Always `close` it: a document that is observed is never freed.
+
+    What waits for an earlier update is held back here: the library loses edits when it holds several
+    that wait. So the document never has anything pending. `owners` says whose a client is: that of
+    the person who first used it.
+    """
+
+    def __init__(self) -> None:
+        self.doc: Final[Doc[Any]] = Doc()
+        self.owners: dict[int, str] = {}
+        self.nesting = Nesting()
+        self._quota = DocumentQuota(self.doc)
+        self._known: dict[int, int] = {}
+        self._fired = False
+        self._waiting: dict[bytes, tuple[UpdateOutline, str]] = {}
+        self._released: list[bytes] = []
+        self._subscription = self.doc.observe(self._observed)
+
+    def take(
+        self,
+        update: bytes,
+        author: str,
+        holder: Callable[[int], str | None] = lambda _: None,
+        read: UpdateOutline | None = None,
+    ) -> UpdateEffect:
+        """Apply an update. `holder` may know whose a client is that has written nothing yet; `read`
+        is its outline, where that is known.
+
+        Raises Malformed, Foreign, Full, TooMuchWaits, Panicked; the document is then as before.
+        """
+        if update in self._waiting:
+            return UpdateEffect.NOTHING
+        read = read or outline(update)
+        new = {client for client, _, end in read.brings if end > self._known.get(client, 0)}
+        for client in new:
+            if (self.owners.get(client) or holder(client) or author) != author:
+                raise ForeignClient(f"client {client} is not {author}'s")
+        if new:  # what is known is echoed by stock clients, and adds nothing
+            self._quota.check(update, read)
+        if not read.ready(self._known):
+            self._check_patience(update, author)
+        brought = self._took(update, read, author)
+        self.owners.update(dict.fromkeys(new, author))
+        return brought
+
+    def replay(self, events: Sequence[Event], *, learn: bool = True) -> None:
+        """Apply events of the log in their order. Raises Malformed, Panicked.
+
+        `learn`: also whose each client is and how deep things lie, for a document that goes on.
+        """
+        for kind, group in itertools.groupby(events, key=lambda event: event.kind):
+            if kind not in {UPDATED, DEFERRED}:
+                continue
+            if learn or kind == DEFERRED or self._waiting:
+                self._replay_one_by_one(list(group))
+            else:
+                self._apply(*(event.body for event in group))
+                self._known = clocks(self.doc.get_state())
+
+    def begin(self, kept: "ReplicaState") -> None:
+        """Take up where a snapshot was made. Raises Malformed, Panicked."""
+        self._apply(kept.state)
+        self._quota.took(len(kept.state))
+        self.owners, self.nesting = kept.owners, Nesting(kept.spans)
+        self._known = clocks(self.doc.get_state())
+        self._waiting = {update: (outline(update), author) for update, author in kept.waiting}
+
+    def _replay_one_by_one(self, events: list[Event]) -> None:
+        together: list[bytes] = []
+        for event in events:
+            read = outline(event.body)
+            for client, _, _ in read.brings:
+                self.owners.setdefault(client, event.author)
+            if event.kind == DEFERRED or self._waiting or not read.ready(self._known):
+                self._apply(*together)
+                together = []
+                self._took(event.body, read, event.author)
+            else:
+                self._learn(read, len(event.body))
+                together.append(event.body)
+        self._apply(*together)
+
+    def _learn(self, read: UpdateOutline, size: int) -> None:
+        """What the log holds is not judged again."""
+        with suppress(Malformed):
+            self.nesting.learn(self.nesting.depths(read.placed, self._known))
+        self._count(read, size)
+
+    def _check_patience(self, update: bytes, author: str) -> None:
+        sizes = [len(each) for each, (_, whose) in self._waiting.items() if whose == author]
+        if len(sizes) >= WAITING_UPDATES or sum(sizes) + len(update) > WAITING_BYTES:
+            raise TooMuchWaits
+
+    def _took(self, update: bytes, read: UpdateOutline, author: str) -> UpdateEffect:
+        if not read.ready(self._known):
+            self._waiting[update] = read, author
+            return UpdateEffect.WAITS
+        if not self._applied(update, read):
+            return UpdateEffect.NOTHING
+        while self._waiting and self._release():
+            pass
+        return UpdateEffect.NEWS
+
+    def released(self) -> list[bytes]:
+        """Updates that waited and do not any more, since this was asked last."""
+        released, self._released = self._released, []
+        return released
+
+    def freed_by(self, read: UpdateOutline) -> list[bytes]:
+        """What waits and would not wait any more, had this been applied."""
+        known = dict(self._known)
+        freed: dict[bytes, None] = {}
+        news = [read] if read.ready(known) else []
+        while news:
+            for each in news:
+                for client, _, end in each.brings:
+                    known[client] = max(end, known.get(client, 0))
+            ready = {
+                u: w for u, (w, _) in self._waiting.items() if u not in freed and w.ready(known)
+            }
+            freed.update(dict.fromkeys(ready))
+            news = list(ready.values())
+        return list(freed)
+
+    @property
+    def waiting_bytes(self) -> int:
+        """How much waits."""
+        return sum(map(len, self._waiting))
+
+    def held_back(self) -> list[tuple[bytes, str]]:
+        """Updates that wait for earlier ones, and who wrote them, in the order in which they came."""
+        return [(update, author) for update, (_, author) in self._waiting.items()]
+
+    @property
+    def waiting(self) -> tuple[bytes, ...]:
+        """Updates that wait for earlier ones."""
+        return tuple(self._waiting)
+
+    def _applied(self, update: bytes, read: UpdateOutline) -> bool:
+        """Apply what is ready; whether it changed anything."""
+        self._fired = False
+        depths = self.nesting.depths(read.placed, self._known)
+        self._apply(update)
+        self.nesting.learn(depths)
+        self._count(read, len(update))
+        return self._fired
+
+    def _count(self, read: UpdateOutline, size: int) -> None:
+        self._quota.took(size, read.actions, read.fields)
+        for client, _, end in read.brings:
+            self._known[client] = max(end, self._known.get(client, 0))
+
+    def _release(self) -> bool:
+        """Apply what has become ready; whether there was any."""
+        ready = [each for each, (read, _) in self._waiting.items() if read.ready(self._known)]
+        for update in ready:
+            read, _ = self._waiting.pop(update)
+            try:
+                if self._applied(update, read):
+                    self._released.append(update)
+            except Malformed as error:
+                log.warning("an update that waited brings nothing: %s", error)
+        return bool(ready)
+
+    def _apply(self, *updates: bytes) -> None:
+        if not updates:
+            return
+        with applying(), self.doc.transaction():
+            for update in updates:
+                self.doc.apply_update(update)
+
+    def adds_nothing(self, update: bytes) -> bool:
+        """Whether an update that was not applied would leave the document as it is."""
+        if update == NOTHING_NEW:
+            return True
+        outline(update)
+        with applying():
+            return bool(get_update(update, self.doc.get_state()) == NOTHING_NEW)
+
+    def lacking(self, state: bytes) -> bytes:
+        """What somebody with this state vector lacks. Raises Malformed, Panicked."""
+        if ByteReader(state).number() * 2 > len(state):
+            raise Malformed("more clients than bytes")
+        with applying():
+            return self.doc.get_update(state)
+
+    def close(self) -> None:
+        """Let the document be freed."""
+        self.doc.unobserve(self._subscription)
+
+    def _observed(self, event: object) -> None:
+        update: bytes = event.update  # type: ignore[attr-defined]
+        if update != NOTHING_NEW:
+            self._fired = True
+
+
+@contextmanager
+def applying() -> Iterator[None]:
+    """Around a call of the CRDT library with foreign bytes, and nothing else."""
+    try:
+        yield
+    except (ValueError, RuntimeError) as error:
+        raise Malformed(f"not a Yjs update: {error}") from error
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # pyo3's, derived from BaseException
+            raise
+        raise Panicked(str(error)) from error
+
+
+class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
+    """What a snapshot keeps of a document, and of what waits beside it, with who wrote that.
+
+    `form` was the number 1 before waiting updates were kept: who only knows that form does not take
+    a newer one for theirs.
+    """
+
+    form: Literal["with what waits"] | int
+    owners: dict[int, str]
+    spans: dict[int, list[tuple[int, int, int]]]
+    state: bytes
+    waiting: list[tuple[bytes, str]] = []
+
+    @classmethod
+    def of(cls, replica: Replica) -> bytes:
+        """As bytes."""
+        state = replica.doc.get_update()
+        spans, waiting = replica.nesting.spans, replica.held_back()
+        return msgspec.msgpack.encode(cls("with what waits", replica.owners, spans, state, waiting))
+
+    @classmethod
+    def replica(cls, kept: bytes) -> Replica | None:
+        """The document again; None when these bytes are none of ours."""
+        found = cls._read(kept)
+        if found is None:
+            return None
+        replica = Replica()
+        try:
+            replica.begin(found)
+        except (Malformed, Panicked):
+            replica.close()
+            return None
+        return replica
+
+    @classmethod
+    def is_form_of(cls, kept: bytes) -> bool:
+        """Whether these bytes look like a snapshot of ours."""
+        return cls._read(kept) is not None
+
+    @classmethod
+    def state_of(cls, kept: bytes) -> bytes:
+        """The document alone, as one update; nothing new for what is no snapshot."""
+        found = cls._read(kept)
+        return NOTHING_NEW if found is None else found.state
+
+    @classmethod
+    def _read(cls, kept: bytes) -> "ReplicaState | None":
+        try:
+            return msgspec.msgpack.decode(kept, type=cls)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            return None
+
+
+def clocks(state: bytes) -> dict[int, int]:
+    """A state vector as numbers: what is known of each client."""
+    reader = ByteReader(state)
+    return {reader.number(): reader.number() for _ in range(reader.number())}

@@ -1,0 +1,62 @@
+"""Applies large updates to a copy in another process before the room takes them.
+
+How long the CRDT library works on an update follows from what the update says: 80,000 values for one
+key, all written at once, are 640 kB and half a minute. And some updates end the process.
+"""
+
+import contextlib
+import multiprocessing
+import signal
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+from pycrdt import Doc
+
+from action_assistant.editor.crdt.messages import Malformed
+from action_assistant.editor.crdt.replica import applying
+from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
+
+SECONDS: Final = 0.25  # of a processor that one update may take
+_ENDS: Final = 8 * SECONDS  # of a processor, after which the process that tries it ends
+_INSIDE: Final = 5_000  # structs of an update in which something lies inside something else
+
+
+class TooSlow(Exception):
+    """An update that holds everybody up"""
+
+
+def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> UpdateOutline:
+    """The outline of an update that may be applied to a document of this state, and after it the
+    updates that waited for it. For workers: one that takes far too long ends the process. Raises Malformed, Panicked, TooSlow."""
+    read = outline(update)
+    if not any(each.inside for each in read.placed):
+        read = UpdateOutline(read.brings, read.needs, (), read.actions, read.fields)
+    elif len(read.placed) > _INSIDE:
+        raise Malformed("too much that lies inside something else")
+    doc: Doc[Any] = Doc()
+    with applying():
+        doc.apply_update(state)
+        begun = time.process_time()
+        with _ended_after(_ENDS):
+            for each in (update, *released):
+                doc.apply_update(each)
+        spent = time.process_time() - begun
+    if spent > SECONDS:
+        raise TooSlow("This change takes so long that everybody would have to wait for it")
+    return read
+
+
+@contextlib.contextmanager
+def _ended_after(seconds: float) -> Iterator[None]:
+    """A worker ends when it has worked for so long: the library cannot be interrupted."""
+    if multiprocessing.parent_process() is None:
+        yield
+        return
+    before = signal.signal(signal.SIGPROF, signal.SIG_DFL)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)

@@ -1,0 +1,1 @@
+"""Between documents and UMRF text: files, edited text, rehearsals. For workers."""

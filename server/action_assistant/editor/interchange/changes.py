@@ -1,0 +1,71 @@
+"""Edits that are made on a copy of a document, as updates (rule R9). For workers."""
+
+from collections.abc import Callable
+from typing import Any
+
+from msgspec.structs import replace
+from pycrdt import Doc, merge_updates
+
+from action_assistant.editor.crdt.messages import NOTHING_NEW
+from action_assistant.editor.documents import document
+from action_assistant.editor.documents.contents import maps_of
+from action_assistant.editor.documents.document import Maps
+from action_assistant.umrf.model import Graph
+
+
+def difference(state: bytes, edit: Callable[[Doc[Any]], None]) -> bytes:
+    """What `edit` changes in a document with this content, as one update."""
+    copy: Doc[Any] = Doc()
+    if state:
+        copy.apply_update(state)
+    made: list[bytes] = []
+    subscription = copy.observe(lambda event: made.append(event.update))
+    try:
+        edit(copy)
+    finally:
+        copy.unobserve(subscription)
+    made = [update for update in made if update != NOTHING_NEW]
+    return merge_updates(*made) if made else NOTHING_NEW
+
+
+def first(graph: Graph) -> bytes:
+    """The update that makes a document of a graph."""
+    return difference(b"", lambda doc: document.fill(doc, graph))
+
+
+def renaming(state: bytes, name: str | None, description: str | None) -> bytes:
+    """The update that gives another name or description."""
+
+    def edit(doc: Doc[Any]) -> None:
+        maps = document.maps_of(doc)
+        old = document.read_maps(maps)
+        new = replace(
+            old,
+            name=old.name if name is None else name,
+            description=old.description if description is None else description,
+        )
+        document.change(doc, changed(maps, old, new))
+
+    return difference(state, edit)
+
+
+def restoring(state: bytes, then: bytes) -> bytes:
+    """The update that goes back to another document."""
+
+    def edit(doc: Doc[Any]) -> None:
+        comments = document.maps_of(doc)["comments"]
+        document.change(doc, {**maps_of(then), "comments": comments})
+
+    return difference(state, edit)
+
+
+def changed(maps: Maps, old: Graph, new: Graph) -> Maps:
+    """The maps with the difference between two graphs applied, and nothing else touched."""
+    before, after = document.flatten(old), document.flatten(new)
+    result = {root: dict(fields) for root, fields in maps.items()}
+    for root, fields in after.items():
+        mine = result.setdefault(root, {})
+        for key in before[root].keys() - fields.keys():
+            mine.pop(key, None)
+        mine.update({k: v for k, v in fields.items() if before[root].get(k) != v})
+    return result

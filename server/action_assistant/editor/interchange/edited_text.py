@@ -1,0 +1,300 @@
+"""The edited text of a graph as changes of its document: action by action, and nothing else touched.
+
+A person edits the canonical text of one moment. Here it is read, its actions are told apart from
+those of the moment, and what differs is answered key by key. The page applies it, so that it is an
+edit of the person's own, which undo takes back; `before` lets it see what others changed meanwhile.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from typing import Final, TypeAlias
+
+import msgspec
+from msgspec import UNSET, UnsetType
+from msgspec.structs import replace
+
+from action_assistant.editor.documents import document
+from action_assistant.editor.documents.contents import GraphAtSeq, ReadGraph, read
+from action_assistant.editor.documents.document import Maps
+from action_assistant.editor.documents.values import ends_of, is_aid, number
+from action_assistant.editor.interchange import importing
+from action_assistant.errors import NotUmrf
+from action_assistant.umrf.check import check
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.places import places_of, pointer
+from action_assistant.umrf.model import Action, Graph, Key, Problem
+
+_ORDERS: Final = ("order", "po", "co")
+_WORSE: Final = 20  # problems that are told
+_Wanted: TypeAlias = dict[tuple[str, str], object]
+
+
+class KeyChange(msgspec.Struct, frozen=True):
+    """One key of the document. A value that is left out: the key is not there."""
+
+    root: str
+    key: str
+    before: object | UnsetType = UNSET
+    after: object | UnsetType = UNSET
+
+
+class TextEdit(msgspec.Struct, frozen=True):
+    """What an edited text would change after `seq`, and the errors that the graph would then have
+    and does not have yet, with their places in that text."""
+
+    seq: int
+    changes: tuple[KeyChange, ...]
+    problems: tuple[Problem, ...]
+
+
+def edited_text(sight: GraphAtSeq, text: bytes) -> bytes:
+    """What an edited text changes, as JSON of a `TextEdit`. For workers. Raises as `text_edit`."""
+    found = read(sight)
+    return msgspec.json.encode(text_edit(found.moment, text, found.problems))
+
+
+def text_edit(moment: ReadGraph, text: bytes, known: Iterable[Problem] = ()) -> TextEdit:
+    """What `text`, edited from the canonical text of `moment`, changes. `known`: the problems that
+    the graph has already.
+
+    Raises BadInput, NotUmrf, TooLarge with the place; nothing is stored either way.
+    """
+    shown = codec.read(codec.write(moment.graph))
+    wanted = importing.read(text)
+    _refuse(shown, wanted)
+    old = _under_keys(shown.graph, _keys_of(moment.graph, shown.graph))
+    new = _under_keys(wanted.graph, _aligned(old, wanted.graph))
+    _refuse_ghosts(old, new, wanted.text)
+    changes = tuple(_changes(moment.maps, old, new))
+    worse = wanted.placed(_worse(known, new)) if changes else []
+    return TextEdit(moment.seq, changes, tuple(worse))
+
+
+def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
+    """Importing reads more than an edit may say: what it would leave out or assume is refused."""
+    if wanted.dialect != "D3":
+        raise NotUmrf(
+            f"This reads as an older form of UMRF ({wanted.dialect}). Import it as a graph of its "
+            "own."
+        )
+    known = {(problem.code, problem.message) for problem in shown.problems}
+    for problem in wanted.problems:
+        if (problem.code, problem.message) not in known:
+            raise NotUmrf(problem.message, where=_place(wanted.text, problem.where.path))
+
+
+def _worse(known: Iterable[Problem], new: Graph) -> tuple[Problem, ...]:
+    """Errors that come with the edit."""
+    old = {(problem.code, problem.message) for problem in known}
+    found = [problem for problem in check(new) if problem.severity == "error"]
+    return tuple(p for p in found if (p.code, p.message) not in old)[:_WORSE]
+
+
+# Which action is which
+
+
+def _real(graph: Graph) -> list[Action]:
+    return [action for action in graph.actions if not action.missing]
+
+
+def _keys_of(moment: Graph, shown: Graph) -> dict[Key, Key]:
+    """The aids of what was written and read again: the actions by place, ghosts by name."""
+    pairs = zip(_real(shown), _real(moment), strict=True)
+    keys = {copy.key: action.key for copy, action in pairs}
+    ghosts = {action.full_name: action.key for action in moment.actions if action.missing}
+    for action in shown.actions:
+        if action.missing:
+            keys[action.key] = ghosts.get(action.full_name) or document.new_aid()
+    return keys
+
+
+def _aligned(old: Graph, wanted: Graph) -> dict[Key, Key]:
+    """The aids of the edited actions: those of the same full name, then, where one was renamed,
+    those that stand at the same place between the others; the rest are new."""
+    free: dict[tuple[str, bool], list[Key]] = defaultdict(list)
+    for action in old.actions:
+        free[action.full_name, action.missing].append(action.key)
+    keys: dict[Key, Key] = {}
+    for action in wanted.actions:
+        if same := free[action.full_name, action.missing]:
+            keys[action.key] = same.pop(0)
+    kept = set(keys.values())
+    gone = _gaps([action.key for action in _real(old)], kept)
+    fresh = _gaps([keys.get(a.key, a.key) for a in _real(wanted)], kept)
+    for after, names in fresh.items():
+        keys.update(zip(names, gone.get(after, []), strict=False))
+    return {a.key: keys.get(a.key) or document.new_aid() for a in wanted.actions}
+
+
+def _gaps(order: Sequence[Key], kept: set[Key]) -> dict[Key, list[Key]]:
+    """Those that were not kept, by the kept one before them."""
+    found: dict[Key, list[Key]] = defaultdict(list)
+    last = ""
+    for key in order:
+        if key in kept:
+            last = key
+        else:
+            found[last].append(key)
+    return found
+
+
+def _under_keys(graph: Graph, keys: Mapping[Key, Key]) -> Graph:
+    actions = tuple(replace(action, key=keys[action.key]) for action in graph.actions)
+    relations = tuple(
+        replace(r, parent=keys.get(r.parent, r.parent), child=keys.get(r.child, r.child))
+        for r in graph.relations
+    )
+    return replace(graph, actions=actions, relations=relations)
+
+
+def _refuse_ghosts(old: Graph, new: Graph, text: str) -> None:
+    """An arrow to an action that is not there is a slip here, most often half a renaming."""
+    known = {action.full_name for action in old.actions if action.missing}
+    for action in new.actions:
+        if action.missing and action.full_name not in known:
+            message = f"There is no action {action.name} with the number {action.instance_id}."
+            path = _naming(msgspec.json.decode(text.encode()), action)
+            raise NotUmrf(message, where=_place(text, path))
+
+
+def _place(text: str, path: str) -> dict[str, object] | None:
+    """A place as refusals tell it; None for the whole text."""
+    found = places_of(text, [path])[path]
+    place: dict[str, object] = {"path": found.path, "line": found.line, "column": found.column}
+    return place if found.path else None
+
+
+def _naming(file: object, ghost: Action) -> str:
+    """Where a file first names an action in a list of relations."""
+    if not isinstance(file, dict):
+        return ""
+    lists: list[tuple[tuple[str | int, ...], object]] = [
+        ((end,), file.get(end)) for end in ("graph_entry", "graph_exit")
+    ]
+    actions = file.get("actions")
+    for i, action in enumerate(actions if isinstance(actions, list) else []):
+        for side in ("parents", "children"):
+            found = action.get(side) if isinstance(action, dict) else None
+            lists.append((("actions", i, side), found))
+    for place, items in lists:
+        for i, item in enumerate(items if isinstance(items, list) else []):
+            if not isinstance(item, dict) or item.get("name") != ghost.name:
+                continue
+            if item.get("instance_id", 0) == ghost.instance_id:
+                return pointer(*place, i)
+    return ""
+
+
+# What differs
+
+
+def _changes(maps: Maps, old: Graph, new: Graph) -> list[KeyChange]:
+    wanted = _fields(old, new) | _orders(maps, old, new) | _leftovers(maps, old, new)
+    changes = []
+    for (root, key), after in sorted(wanted.items(), key=lambda item: item[0]):
+        before = maps.get(root, {}).get(key, UNSET)
+        if before is UNSET and after is UNSET:
+            continue
+        if before != after or isinstance(before, bool) != isinstance(after, bool):
+            changes.append(KeyChange(root, key, before, after))
+    return changes
+
+
+def _fields(old: Graph, new: Graph) -> _Wanted:
+    """What the two say differently; orders are another matter."""
+    before, after = document.flatten(old), document.flatten(new)
+    wanted: _Wanted = {}
+    for root, fields in after.items():
+        for key in before[root].keys() - fields.keys():
+            wanted[root, key] = UNSET
+        for key, value in fields.items():
+            if key.rpartition("|")[2] in _ORDERS and not key.startswith("x/"):
+                continue
+            if key not in before[root] or before[root][key] != value:
+                wanted[root, key] = value
+    return wanted
+
+
+def _leftovers(maps: Maps, old: Graph, new: Graph) -> _Wanted:
+    """Whatever else stands under the keys of what is gone."""
+    gone = {action.key for action in old.actions} - {action.key for action in new.actions}
+    there = {f"{r.parent}>{r.child};{r.listing}" for r in new.relations}
+    lost = {f"{r.parent}>{r.child};{r.listing}" for r in old.relations} - there
+    wanted: _Wanted = {}
+    for root in ("actions", "positions"):
+        for key in maps.get(root, {}):
+            if key.partition("|")[0] in gone:
+                wanted[root, key] = UNSET
+    for key in maps.get("relations", {}):
+        ends = ends_of(key.partition("|")[0])
+        if ends and f"{ends.parent}>{ends.child};{ends.listing}" in lost:
+            wanted["relations", key] = UNSET
+    return wanted
+
+
+def _orders(maps: Maps, old: Graph, new: Graph) -> _Wanted:
+    """Numbers for what is new or stands elsewhere, between those of its neighbours."""
+    wanted: _Wanted = {}
+    lists = [("actions", "order", _by_place(old), _by_place(new))]
+    before, after = _by_end(old), _by_end(new)
+    lists += [
+        ("relations", field, before.get((field, end), []), ids)
+        for (field, end), ids in after.items()
+    ]
+    for root, field, was, now in lists:
+        fields = maps.get(root, {})
+        numbers = {head: number(fields.get(f"{head}|{field}")) or 0.0 for head in was}
+        for head, value in _numbered(was, now, numbers).items():
+            wanted[root, f"{head}|{field}"] = value
+    return wanted
+
+
+def _by_place(graph: Graph) -> list[str]:
+    return [action.key for action in graph.actions if is_aid(action.key)]
+
+
+def _by_end(graph: Graph) -> dict[tuple[str, Key], list[str]]:
+    """The relations of every end in their order there, by `po` and `co`."""
+    flat = document.flatten(graph)["relations"]
+    found: dict[tuple[str, Key], list[tuple[float, str]]] = defaultdict(list)
+    for key, value in flat.items():
+        head, _, field = key.partition("|")
+        ends = ends_of(head)
+        if ends is not None and field in ("po", "co"):
+            end = ends.parent if field == "po" else ends.child
+            found[field, end].append((number(value) or 0.0, head))
+    return {place: [head for _, head in sorted(items)] for place, items in found.items()}
+
+
+def _numbered(
+    was: Sequence[str], now: Sequence[str], numbers: Mapping[str, float]
+) -> dict[str, float]:
+    """New numbers so that `now` is the order; those that kept their order keep their numbers."""
+    kept = [head for head in now if head in numbers]
+    there = set(now)
+    if kept == [head for head in was if head in there]:
+        if len(kept) == len(now):
+            return {}
+        values = [numbers[head] for head in kept]
+        if all(a < b for a, b in pairwise(values)):
+            return _between(now, numbers)
+    return {head: float(i) for i, head in enumerate(now)}
+
+
+def _between(now: Sequence[str], numbers: Mapping[str, float]) -> dict[str, float]:
+    """Numbers for the new ones alone, evenly between their neighbours."""
+    found: dict[str, float] = {}
+    run: list[str] = []
+    low: float | None = None
+    for head in [*now, ""]:
+        if head and head not in numbers:
+            run.append(head)
+            continue
+        high = numbers.get(head)
+        start = low if low is not None else (high if high is not None else 0.0) - len(run) - 1
+        end = high if high is not None else start + len(run) + 1
+        step = (end - start) / (len(run) + 1)
+        found.update({new: start + step * (i + 1) for i, new in enumerate(run)})
+        run, low = [], high
+    return found

@@ -1,0 +1,144 @@
+"""Files that people bring, read into what a document would hold. For workers."""
+
+from typing import Any
+
+import msgspec
+
+from action_assistant.editor.crdt.document_quota import (
+    refuse_too_long,
+    refuse_too_much,
+    refuse_too_wide,
+)
+from action_assistant.editor.documents import document
+from action_assistant.editor.documents.contents import GraphInfo, info_of
+from action_assistant.editor.interchange import changes
+from action_assistant.errors import BadInput, NotUmrf, TooLarge
+from action_assistant.umrf.check import check
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.files.action_files import ACTION_DIALECTS
+from action_assistant.umrf.model import Note, Problem
+
+
+class ImportReport(msgspec.Struct, frozen=True):
+    """What was found in an imported file: its dialect, what was translated, what is wrong.
+
+    `remarks` are the notes with their places; all places are in the file as it was sent.
+    """
+
+    dialect: str
+    notes: tuple[str, ...]
+    problems: tuple[Problem, ...]
+    remarks: tuple[Note, ...] = ()
+
+
+class Preview(msgspec.Struct, frozen=True):
+    """What a file would become. `problems`: those of the file, then those of the graph. `remarks`
+    are the notes with their places; all places are in the file as it was sent.
+    """
+
+    dialect: str
+    notes: tuple[str, ...]
+    problems: tuple[Problem, ...]
+    name: str
+    actions: int
+    remarks: tuple[Note, ...] = ()
+
+
+class Pieces(msgspec.Struct, frozen=True):
+    """A UMRF text as the keys that a document would hold. `notes`: what was translated; `remarks`
+    are the same with their places in the text."""
+
+    dialect: str
+    notes: tuple[str, ...]
+    name: str
+    actions: dict[str, Any]
+    relations: dict[str, Any]
+    positions: dict[str, Any]
+    remarks: tuple[Note, ...] = ()
+
+
+class ImportedFile(msgspec.Struct, frozen=True):
+    """A file as the first update of a document. `reading` is JSON of a `ImportReport`."""
+
+    dialect: str
+    notes: tuple[str, ...]
+    reading: bytes
+    update: bytes
+    about: GraphInfo
+
+
+def imported(body: bytes) -> ImportedFile:
+    """What is stored of a file. Raises BadInput, NotUmrf, TooLarge with the place."""
+    found = _fitting(read_graph(body))
+    update = changes.first(found.graph)
+    refuse_too_long(update)
+    told = ImportReport(found.dialect, found.notes, found.problems, found.remarks)
+    about = info_of(found.graph, check(found.graph))
+    return ImportedFile(found.dialect, found.notes, msgspec.json.encode(told), update, about)
+
+
+def preview(body: bytes) -> bytes:
+    """What importing a file would make, as JSON of a `Preview`. Raises as `imported` does."""
+    found = _fitting(read_graph(body))
+    graph = found.graph
+    problems = (*found.problems, *found.placed(check(graph)))
+    actions = sum(not action.missing for action in graph.actions)
+    return msgspec.json.encode(
+        Preview(found.dialect, found.notes, problems, graph.name, actions, found.remarks)
+    )
+
+
+def pieces(body: bytes) -> bytes:
+    """JSON of `Pieces`. Raises as `imported` does."""
+    found = _fitting(read(body))
+    maps = document.flatten(document.with_aids(found.graph))
+    return msgspec.json.encode(
+        Pieces(
+            found.dialect,
+            found.notes,
+            found.graph.name,
+            maps["actions"],
+            maps["relations"],
+            maps["positions"],
+            found.remarks,
+        )
+    )
+
+
+def read_graph(body: bytes) -> codec.Reading:
+    """The UMRF file of a graph. Raises BadInput, NotUmrf, TooLarge with the place in the text."""
+    found = read(body)
+    if found.dialect in ACTION_DIALECTS:
+        raise NotUmrf(
+            f"This is the file of one action, {found.graph.name or 'without a name'}, and not of a "
+            "graph. To draw with the action, open a graph and paste the text of the file there; "
+            "“action-assistant convert” makes a graph of this action alone.",
+            where={"code": "action-file", "line": 1, "column": 1},
+        )
+    return found
+
+
+def _fitting(found: codec.Reading) -> codec.Reading:
+    """Raises TooLarge for more than a document may hold."""
+    refuse_too_much(found.graph, found.dialect)
+    refuse_too_wide(document.flatten(document.with_aids(found.graph)))
+    return found
+
+
+def read(body: bytes) -> codec.Reading:
+    """A UMRF file, of a graph or of one action. Raises BadInput, NotUmrf, TooLarge with the place in the text."""
+    try:
+        return codec.read(body)
+    except codec.Unreadable as error:
+        where: dict[str, object] = {
+            key: value
+            for key, value in (
+                ("path", error.path),
+                ("line", error.line),
+                ("column", error.column),
+                ("code", error.code),
+            )
+            if value not in {None, ""}
+        }
+        kind = {"not-umrf": NotUmrf, "too-large": TooLarge}.get(error.code, BadInput)
+        raise kind(error.message, where=where) from error

@@ -1,0 +1,90 @@
+"""Rehearsals: what a graph would do, played by the engine's rules, and recorded nowhere."""
+
+from typing import Any, Final, Literal
+
+import msgspec
+
+from action_assistant.editor.documents.contents import GraphAtSeq, read
+from action_assistant.errors import BadInput, Conflict
+from action_assistant.umrf import semantics
+from action_assistant.umrf.check import refused_by_parser
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import Graph
+
+EVENTS: Final = 4_000  # of one rehearsal; the page shows no more
+HOUR_MS: Final = 3_600_000.0
+_SCRIPT_LIMIT: Final = 500  # behaviours
+
+
+class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a person does to the graph, and when."""
+
+    at_ms: float
+    verb: Literal["stop", "pause", "resume"]
+
+
+class Rehearsing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What to play: the graph after its change `seq` (left out: now), what its actions do as in
+    a script of `simulate`, and what people do meanwhile."""
+
+    seq: int | None = None
+    script: Any = None
+    commands: tuple[Command, ...] = ()
+    for_ms: float = HOUR_MS
+
+
+class Rehearsal(msgspec.Struct, frozen=True):
+    """Everything that would happen, in order. `cut`: there is more than is told."""
+
+    seq: int
+    trace: tuple[semantics.Trace, ...]
+    cut: bool
+
+
+def rehearsed(sight: GraphAtSeq, wanted: Rehearsing) -> bytes:
+    """Play a graph to its end, or as far as limits let it: JSON of a `Rehearsal`. For workers.
+
+    Raises BadInput, Conflict.
+    """
+    script = _script(wanted.script)
+    if not 0 < wanted.for_ms <= 24 * HOUR_MS:
+        raise BadInput("A rehearsal lasts up to a day.", where={"path": "/for_ms"})
+    if len(wanted.commands) > 100:
+        raise BadInput("A rehearsal takes up to 100 commands.", where={"path": "/commands"})
+    return msgspec.json.encode(_played(sight.seq, read(sight).moment.graph, script, wanted))
+
+
+def _script(value: Any) -> semantics.Script:
+    if value is None:
+        return semantics.Script({})
+    try:
+        script = semantics.script_from(value)
+    except ValueError as error:
+        raise BadInput(str(error), where={"path": "/script"}) from error
+    if sum(len(calls) for calls in script.behaviours.values()) > _SCRIPT_LIMIT:
+        raise BadInput(
+            f"A script for a rehearsal has up to {_SCRIPT_LIMIT} behaviours.",
+            where={"path": "/script"},
+        )
+    return script
+
+
+def _refuse_unreadable(graph: Graph) -> None:
+    """What the engine's parser refuses cannot be played by any rule."""
+    refusals = refused_by_parser(codec.Reading(graph, "D3"))
+    if refusals:
+        raise Conflict(f"The engine would refuse this graph: {refusals[0].message}")
+
+
+def _played(seq: int, graph: Graph, script: semantics.Script, wanted: Rehearsing) -> Rehearsal:
+    _refuse_unreadable(graph)
+    trace = tuple(
+        semantics.simulate(
+            graph,
+            script=script,
+            commands=[(command.at_ms, command.verb, None) for command in wanted.commands],
+            until_ms=wanted.for_ms,
+            max_events=EVENTS + 1,
+        )
+    )
+    return Rehearsal(seq, trace[:EVENTS], len(trace) > EVENTS)

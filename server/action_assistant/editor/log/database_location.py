@@ -1,0 +1,233 @@
+"""Which database holds the graphs of a data folder, as the folder remembers it.
+
+Most hold them themselves, in `editor.db`, and remember nothing. A folder that is served with
+`--database` keeps the URL, without its password, in `editor.database`, so that no command overlooks
+graphs that are elsewhere, and nobody finds an empty catalogue by leaving out an option.
+"""
+
+import asyncio
+import logging
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, TypeVar
+
+import msgspec
+from sqlalchemy import URL, Connection, func, inspect, make_url, select
+from sqlalchemy.exc import ArgumentError
+
+from action_assistant.editor.log.epochs import MARK, EpochMark
+from action_assistant.errors import CannotStart
+from action_assistant.journal.database import cause_of
+from action_assistant.journal.databases import database_of
+from action_assistant.schema import editor_tables
+
+log: Final = logging.getLogger(__name__)
+
+T = TypeVar("T")
+
+FILE: Final = "editor.database"
+#: The journal of a folder that holds its graphs itself.
+JOURNAL: Final = "editor.db"
+_SECRET: Final = "password"  # names of parameters that hold one contain this
+_event, _graph = editor_tables.editor_event.c, editor_tables.graph.c
+
+
+class StoredLocation(msgspec.Struct, frozen=True):
+    """What the file says."""
+
+    database: str
+
+
+def of(data: Path) -> str:
+    """The URL of the graphs of a folder, for commands that are not told another one. Raises
+    CannotStart when they were in a database that nobody knows any more."""
+    known = remembered(data)
+    if known is not None:
+        return known
+    if not (data / JOURNAL).exists() and (data / MARK).exists():
+        raise CannotStart(
+            f"The graphs of {data} are in a database that this folder does not remember: "
+            "name it by --database URL."
+        )
+    return _own(data)
+
+
+def journal_of(data: Path, given: str | None) -> str | None:
+    """The URL of the journal with the graphs of a folder; None when it has none. Raises CannotStart
+    when it has one that is nowhere to be found."""
+    url = given or of(data)
+    if not _is_nowhere(url):
+        return url
+    if given is None and is_own(data, url):
+        return None
+    raise CannotStart(f"There is no {make_url(url).database}, where the graphs of {data} are.")
+
+
+def is_own(data: Path, url: str) -> bool:
+    """Whether a URL names the file in the folder itself."""
+    return _same(url, _own(data))
+
+
+def remembered(data: Path) -> str | None:
+    """The URL of a database elsewhere; None when the folder holds its graphs itself, or none.
+    Raises CannotStart."""
+    try:
+        return msgspec.json.decode((data / FILE).read_bytes(), type=StoredLocation).database
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise CannotStart(f"Cannot read {data / FILE}: {error.strerror}.") from error
+    except msgspec.DecodeError as error:
+        raise CannotStart(
+            f"{data / FILE} is damaged. Name the database by --database URL --switch-database."
+        ) from error
+
+
+def check(data: Path, url: str, *, switch: bool) -> None:
+    """Refuse a database that lacks the graphs of this folder, unless told to `switch`. Raises
+    CannotStart."""
+    if switch:
+        return
+    known = remembered(data)
+    if known is None and not (data / JOURNAL).exists():
+        # An older version did not write down which one it was; that it was another one is known.
+        if (data / MARK).exists() and _same(url, _own(data)):
+            raise CannotStart(
+                f"The graphs of {data} are in a database that this folder does not remember: name "
+                "it by --database URL, or begin without them by --switch-database."
+            )
+        return
+    known = known or _own(data)
+    if _same(known, url) or (count := _graphs(known)) == 0 or _holds(url, data / MARK):
+        return
+    raise CannotStart(_refusal(data, known, url, count))
+
+
+def remember(data: Path, url: str) -> None:
+    """From now on the graphs are there."""
+    path = data / FILE
+    parsed = make_url(url)
+    if parsed.get_backend_name() == "sqlite":  # wherever commands are started
+        url = f"sqlite:///{Path(parsed.database or '').resolve()}"
+    try:
+        if _same(url, _own(data)):
+            path.unlink(missing_ok=True)
+            return
+        part = path.with_name(f".{FILE}.part")
+        descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(msgspec.json.encode(StoredLocation(shown(url))))
+            file.flush()
+            os.fsync(descriptor)
+        part.replace(path)
+    except OSError as error:  # graphs can be drawn all the same; the next start tries again
+        log.warning("cannot write %s: %s", path, error.strerror)
+
+
+def shown(url: str) -> str:
+    """A URL without what is secret in it."""
+    parsed = make_url(url)
+    query = {name: value for name, value in parsed.query.items() if _SECRET not in name}
+    return URL.create(
+        parsed.drivername,
+        username=parsed.username,
+        host=parsed.host,
+        port=parsed.port,
+        database=parsed.database,
+        query=query,
+    ).render_as_string()
+
+
+def _own(data: Path) -> str:
+    return f"sqlite:///{data / JOURNAL}"
+
+
+def _same(one: str, other: str) -> bool:
+    return _address(one) == _address(other)
+
+
+def _address(url: str) -> tuple[object, ...]:
+    try:
+        parsed = make_url(url)
+    except ArgumentError:
+        return (url,)
+    if parsed.get_backend_name() == "sqlite":
+        return "sqlite", Path(parsed.database or "").resolve()
+    return "postgresql", parsed.host, parsed.port or 5432, parsed.database, parsed.query.get("host")
+
+
+def _graphs(url: str) -> int | None:
+    """How many graphs a database holds; None when it cannot be told."""
+    counted = select(func.count()).where(_graph.deleted_at.is_(None))
+
+    def count(connection: Connection) -> int:
+        if not inspect(connection).has_table(editor_tables.graph.name):
+            return 0
+        return connection.execute(counted).scalar_one()
+
+    if _is_nowhere(url):
+        return None
+    try:
+        return _asked(url, count)
+    except CannotStart:
+        return None
+
+
+def _holds(url: str, mark: Path) -> bool:
+    """Whether a database holds the last event that this folder has seen: then it is the same one, by
+    another name, or a copy. Raises CannotStart."""
+    if _is_nowhere(url):
+        return False
+    try:
+        last = msgspec.json.decode(mark.read_bytes(), type=EpochMark)
+    except (OSError, msgspec.DecodeError):
+        return False
+    found = select(_event.chain).where(_event.position == last.position)
+
+    def look(connection: Connection) -> bool:
+        if not inspect(connection).has_table(editor_tables.editor_event.name):
+            return False
+        chain = connection.execute(found).scalar()
+        return chain is not None and bytes(chain).hex() == last.chain
+
+    return _asked(url, look)
+
+
+def _asked(url: str, question: Callable[[Connection], T]) -> T:
+    """An answer for which nothing is made or changed. Raises CannotStart."""
+    database = database_of(url)
+
+    async def ask() -> T:
+        try:
+            return await database.at_one_moment(question)
+        finally:
+            await database.close()
+
+    try:
+        return asyncio.run(ask())
+    except database.faults as error:
+        raise CannotStart(f"{database.name} cannot be read: {cause_of(error)}.") from error
+
+
+def _is_nowhere(url: str) -> bool:
+    """Whether a URL names a file that is not there. Raises CannotStart for what is no URL."""
+    database_of(url)
+    parsed = make_url(url)
+    return parsed.get_backend_name() == "sqlite" and not Path(parsed.database or "").exists()
+
+
+def _refusal(data: Path, known: str, url: str, count: int | None) -> str:
+    own = _own(data)
+    many = "The graphs" if count is None else f"{count} graph{'s' * (count != 1)}"
+    where = str(data / JOURNAL) if known == own else shown(known)
+    asked, before = (
+        "without --database" if _same(each, own) else f"with --database {shown(each)}"
+        for each in (url, known)
+    )
+    return (
+        f"{many} of {data} {'is' if count == 1 else 'are'} in {where}, and would not be seen {asked}. "
+        f"Start {before}; or take everything along: `action-assistant backup FILE`, then `restore "
+        "FILE` into the other database; or leave it there and go on with the other database: "
+        "--switch-database."
+    )

@@ -1,0 +1,125 @@
+"""Epochs: which history the log holds. One ends when the log goes back, as after a restore.
+
+Pages name the epoch they know, so that nobody's edits are merged into a history that they were not
+made on. `action-assistant restore` begins an epoch itself. Files that somebody copied back by hand
+are noticed at the next start: a mark beside the log says which event was its last.
+"""
+
+import asyncio
+import logging
+import secrets
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+from sqlalchemy import select
+
+from action_assistant.editor.log import graph_events as h
+from action_assistant.errors import Unavailable
+from action_assistant.journal.journal import Journal
+from action_assistant.private_files import opener
+from action_assistant.schema import editor_tables
+
+log: Final = logging.getLogger(__name__)
+
+MARK: Final = "editor.mark"
+_EVERY: Final = 60.0  # seconds between marks
+_STREAM: Final = "epochs"
+_event: Final = editor_tables.editor_event.c
+
+
+Why: TypeAlias = Literal["the first", "a backup was restored", "the log had gone back"]
+
+
+class EpochBegun(msgspec.Struct, frozen=True):
+    """An epoch began with the event that says so. `why` is for people who read the log."""
+
+    id: str
+    why: Why
+
+
+class EpochMark(msgspec.Struct, frozen=True):
+    """The last event that this data folder has seen, and the chain up to it as hex."""
+
+    position: int
+    chain: str
+
+
+async def begin(journal: Journal, why: Why) -> str:
+    """Begin an epoch; its id. Raises Unavailable."""
+    begun = EpochBegun(secrets.token_hex(8), why)
+    await journal.append(_STREAM, [h.draft(h.EPOCH, h.SERVER, begun)])
+    return begun.id
+
+
+@asynccontextmanager
+async def living_in(journal: Journal, data: Path) -> AsyncIterator[str]:
+    """The epoch of this log, which is begun if need be; inside, the mark is kept up."""
+    mark = data / MARK
+    try:
+        epoch = await _epoch(journal, mark)
+    except Unavailable as error:  # reading goes on; whoever comes is told another epoch next time
+        log.error("no epoch could be begun: %s", error.detail)
+        epoch = secrets.token_hex(8)
+    await _remember(journal, mark)
+    task = asyncio.create_task(_keep_up(journal, mark), name="mark")
+    try:
+        yield epoch
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
+        await _remember(journal, mark)
+
+
+async def _epoch(journal: Journal, mark: Path) -> str:
+    newest = await journal.newest(_STREAM)
+    if newest == 0:
+        return await begin(journal, "the first")
+    (event,) = await journal.read(_STREAM, after=newest - 1)
+    epoch = msgspec.json.decode(event.body, type=EpochBegun).id
+    if await _follows(journal, _marked(mark)):
+        return epoch
+    log.warning("the log lacks what was in it before: open pages are told, and begin anew")
+    return await begin(journal, "the log had gone back")
+
+
+async def _follows(journal: Journal, mark: EpochMark | None) -> bool:
+    """Whether the log still holds the event of the mark."""
+    return mark is None or await _chain(journal, mark.position) == mark.chain
+
+
+async def _chain(journal: Journal, position: int) -> str:
+    rows = await journal.query(select(_event.chain).where(_event.position == position))
+    return "".join(bytes(row.chain).hex() for row in rows)
+
+
+def _marked(mark: Path) -> EpochMark | None:
+    try:
+        return msgspec.json.decode(mark.read_bytes(), type=EpochMark)
+    except (OSError, msgspec.DecodeError):  # a new folder, or one of an older version
+        return None
+
+
+async def _keep_up(journal: Journal, mark: Path) -> None:
+    while True:
+        await asyncio.sleep(_EVERY)
+        await _remember(journal, mark)
+
+
+async def _remember(journal: Journal, mark: Path) -> None:
+    """Write the mark. Without it only less is noticed, so that nothing fails for it."""
+    try:
+        position = await journal.position()
+        text = msgspec.json.encode(EpochMark(position, await _chain(journal, position)))
+        await asyncio.to_thread(_replace, mark, text)
+    except (OSError, Unavailable) as error:
+        log.warning("cannot write %s: %s", mark, error)
+
+
+def _replace(path: Path, content: bytes) -> None:
+    part = path.with_name(f"{path.name}.part")
+    with open(part, "wb", opener=opener) as out:
+        out.write(content)
+    part.replace(path)

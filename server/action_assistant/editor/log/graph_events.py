@@ -1,0 +1,217 @@
+"""The events of graphs, versions and people: kinds, bodies, and the tables they fold into.
+
+The stream `graph/ID` holds the document and nothing else, so that its `seq` counts changes of the
+document. Everything else about a graph is in `about/ID`; names of people are in `people`.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import msgspec
+from sqlalchemy import Executable, delete, insert, update
+
+from action_assistant.editor.log.document_events import DEFERRED as DEFERRED
+from action_assistant.editor.log.document_events import UPDATED as UPDATED
+from action_assistant.editor.log.document_events import when as when
+from action_assistant.journal.events import Draft, Event
+from action_assistant.schema import editor_tables
+from action_assistant.web.auth.roles import Role
+
+CREATED: Final = "graph.created.v1"
+IMPORTED: Final = "graph.imported.v1"  # the body is the file as it came
+DESCRIBED: Final = "graph.described.v1"
+RESTORED: Final = "graph.restored.v1"
+DELETED: Final = "graph.deleted.v1"
+RECOVERED: Final = "graph.recovered.v1"
+PUBLISHED: Final = "version.published.v1"
+NAMED: Final = "person.named.v1"
+INVITED: Final = "invitation.made.v1"
+ACCEPTED: Final = "invitation.accepted.v1"
+REVOKED: Final = "invitation.revoked.v1"
+EPOCH: Final = "epoch.begun.v1"
+
+PEOPLE: Final = "people"
+INVITATIONS: Final = "invitations"
+#: Not people: what this program does by itself, and the graphs that come with it.
+SERVER: Final = "server"
+EXAMPLES: Final = "examples"
+
+
+class GraphCreated(msgspec.Struct, frozen=True):
+    """A graph came to be. `dialect` and `notes` speak of the file it was read from."""
+
+    name: str
+    description: str
+    dialect: str | None = None
+    notes: tuple[str, ...] = ()
+
+
+class GraphDescribed(msgspec.Struct, frozen=True):
+    """What the document of a graph calls itself, noticed at `seq`."""
+
+    name: str
+    description: str
+    seq: int
+
+
+class GraphRestored(msgspec.Struct, frozen=True):
+    """The graph was made again what it had been at `restored`; the edit has the number `seq`."""
+
+    restored: int
+    seq: int
+
+
+class VersionPublished(msgspec.Struct, frozen=True):
+    """A version: what a graph was at `seq`, as UMRF that never changes."""
+
+    id: str
+    label: str
+    digest: str
+    seq: int
+    author_name: str
+    umrf: msgspec.Raw
+
+
+class PersonNamed(msgspec.Struct, frozen=True):
+    """Somebody, the event's author, goes by this name."""
+
+    name: str
+
+
+class MadeInvitation(msgspec.Struct, frozen=True):
+    """A link was made. What its secret is follows from `id` and the token."""
+
+    id: str
+    role: Role
+    label: str = ""
+
+
+class AcceptedInvitation(msgspec.Struct, frozen=True):
+    """Somebody, the event's author, came in by a link for the first time."""
+
+    id: str
+    name: str
+
+
+class RevokedInvitation(msgspec.Struct, frozen=True):
+    """A link lets nobody in any more, and nobody stay."""
+
+    id: str
+
+
+def graph_stream(graph: str) -> str:
+    """The stream of a graph's document."""
+    return f"graph/{graph}"
+
+
+def about_stream(graph: str) -> str:
+    """The stream of everything else about a graph."""
+    return f"about/{graph}"
+
+
+def graph_of(stream: str) -> str | None:
+    """The graph that a stream tells of."""
+    head, _, graph = stream.partition("/")
+    return graph if head in {"graph", "about"} else None
+
+
+def draft(kind: str, author: str, body: msgspec.Struct | None = None) -> Draft:
+    """An event with a JSON body."""
+    return Draft(kind, author, msgspec.json.encode(body) if body is not None else b"")
+
+
+def fold(event: Event) -> Sequence[Executable]:
+    """What an event means for the tables."""
+    if event.kind in {UPDATED, DEFERRED}:
+        return ()
+    stream, _, name = event.stream.partition("/")
+    if stream == "about":
+        return _about(event, name)
+    if event.kind == NAMED:
+        named = msgspec.json.decode(event.body, type=PersonNamed)
+        row = {"id": event.author, "name": named.name, "seen_at": event.at}
+        return [
+            delete(editor_tables.person).where(editor_tables.person.c.id == event.author),
+            insert(editor_tables.person).values(row),
+        ]
+    if event.stream == INVITATIONS:
+        return _invitation(event)
+    return ()
+
+
+def _invitation(event: Event) -> Sequence[Executable]:
+    match event.kind:
+        case "invitation.made.v1":
+            made = msgspec.json.decode(event.body, type=MadeInvitation)
+            row: dict[str, Any] = {
+                "id": made.id,
+                "role": made.role,
+                "label": made.label,
+                "made_at": event.at,
+                "made_by": event.author,
+            }
+            return [insert(editor_tables.invitation).values(row)]
+        case "invitation.accepted.v1":
+            came = msgspec.json.decode(event.body, type=AcceptedInvitation)
+            row = {
+                "invitation": came.id,
+                "person": event.author,
+                "name": came.name,
+                "at": event.at,
+            }
+            same = (
+                editor_tables.guest.c.invitation == came.id,
+                editor_tables.guest.c.person == event.author,
+            )
+            return [
+                delete(editor_tables.guest).where(*same),
+                insert(editor_tables.guest).values(row),
+            ]
+        case "invitation.revoked.v1":
+            gone = msgspec.json.decode(event.body, type=RevokedInvitation)
+            this = update(editor_tables.invitation).where(editor_tables.invitation.c.id == gone.id)
+            return [this.values(revoked_at=event.at, revoked_by=event.author)]
+        case _:
+            return ()
+
+
+def _about(event: Event, graph: str) -> Sequence[Executable]:
+    this = update(editor_tables.graph).where(editor_tables.graph.c.id == graph)
+    match event.kind:
+        case "graph.created.v1":
+            created = msgspec.json.decode(event.body, type=GraphCreated)
+            row: dict[str, Any] = {
+                "id": graph,
+                "name": created.name,
+                "description": created.description,
+                "made_at": event.at,
+                "made_by": event.author,
+            }
+            return [insert(editor_tables.graph).values(row)]
+        case "graph.described.v1":
+            now = msgspec.json.decode(event.body, type=GraphDescribed)
+            return [this.values(name=now.name, description=now.description)]
+        case "graph.deleted.v1":
+            return [this.values(deleted_at=event.at)]
+        case "graph.recovered.v1":
+            return [this.values(deleted_at=None)]
+        case "version.published.v1":
+            return [insert(editor_tables.version).values(_version(event, graph))]
+        case _:
+            return ()
+
+
+def _version(event: Event, graph: str) -> dict[str, Any]:
+    version = msgspec.json.decode(event.body, type=VersionPublished)
+    return {
+        "id": version.id,
+        "graph": graph,
+        "label": version.label,
+        "digest": version.digest,
+        "seq": version.seq,
+        "author_id": event.author,
+        "author_name": version.author_name,
+        "at": event.at,
+        "stream": event.stream,
+        "event_seq": event.seq,
+    }

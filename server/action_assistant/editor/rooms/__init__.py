@@ -1,0 +1,1 @@
+"""Rooms: the people at one document, and how edits enter."""

@@ -1,0 +1,184 @@
+"""What enters a room, and the outcome of a batch of it."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any, Final, TypeAlias
+
+import msgspec
+from pycrdt import merge_updates
+
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.document_quota import QuotaExceeded
+from action_assistant.editor.crdt.messages import Malformed
+from action_assistant.editor.crdt.replica import ForeignClient, Panicked, Replica, TooMuchWaits
+from action_assistant.editor.crdt.trial import TooSlow, tried
+from action_assistant.editor.crdt.update_scan import UpdateOutline
+from action_assistant.editor.rooms.member import Member
+from action_assistant.errors import BadInput, Refused, TooLarge
+from action_assistant.web.auth.access import acting_for
+from action_assistant.web.workers.lanes import Crashed, RunInWorker
+
+LARGE: Final = 8 * 1024  # bytes of an update that is tried on a copy first, and by itself
+_BATCH: Final = 200  # items of one commit
+_BATCH_BYTES: Final = 512 * 1024
+_DEATHS: Final = 2  # of processes that try an update, until it is taken for the cause
+_MERGED: Final = 50  # updates merged at once; merging more costs their square
+_MERGED_BYTES: Final = 128 * 1024
+
+
+class Offer(msgspec.Struct, frozen=True):
+    """An edit on its way in: from a socket, or from the server itself (`done` is told)."""
+
+    update: bytes
+    author: str
+    member: Member | None = None
+    done: "asyncio.Future[int] | None" = None
+
+
+class Ask(msgspec.Struct, frozen=True):
+    """A socket wants what it lacks."""
+
+    member: Member
+    state: bytes
+
+
+class Compare(msgspec.Struct, frozen=True):
+    """A socket says what it shows, and wants to know whether that is right."""
+
+    member: Member
+    shown: messages.CompareMessage
+
+
+class Look(msgspec.Struct, frozen=True):
+    """Somebody wants to see the document at a moment when all of it is committed."""
+
+    see: Callable[[Replica, int], Any]
+    done: "asyncio.Future[Any]"
+
+
+Item: TypeAlias = Offer | Ask | Compare | Look
+
+
+class Taken:
+    """What became of a batch."""
+
+    def __init__(self) -> None:
+        self.news: list[tuple[Offer, str]] = []  # to be stored, as which kind
+        self.shown: list[bytes] = []  # what the others can make use of
+        self.for_all = False  # something that waited is among it
+        self.handled: list[Offer] = []
+        self.asks: list[Ask] = []
+        self.compares: list[Compare] = []
+        self.looks: list[Look] = []
+        self.panicked = False
+
+
+class NotAllowed(Exception):
+    """The edit of somebody who may only look."""
+
+
+class NotNow(Exception):
+    """The machine has no time for this edit; whoever sends it again may have more luck."""
+
+    def __init__(self, cause: Refused) -> None:
+        super().__init__(cause.detail)
+        self.cause: Final = cause
+
+
+#: Why an edit was not taken.
+Objection: TypeAlias = (
+    Malformed
+    | ForeignClient
+    | QuotaExceeded
+    | TooMuchWaits
+    | Panicked
+    | NotAllowed
+    | TooSlow
+    | NotNow
+)
+
+
+def refuse(offer: Offer, error: Objection) -> None:
+    """Take nothing of an offer: its socket is closed, or whoever waits for it is told."""
+    code, reason, said = _answer(error)
+    if offer.member is not None:
+        offer.member.refuse(code, said)
+    if offer.done is not None and not offer.done.done():
+        offer.done.set_exception(reason)
+
+
+def _answer(error: Objection) -> tuple[int, Refused, str | None]:
+    """The close code, the refusal, and what a socket is told beside the code."""
+    match error:
+        case Malformed():
+            return messages.MALFORMED, BadInput(f"The update cannot be read: {error}."), None
+        case Panicked():
+            return messages.MALFORMED, BadInput("The update cannot be read."), None
+        case ForeignClient():
+            reason = BadInput("The update speaks for somebody else.")
+            return messages.FORBIDDEN, reason, messages.OTHER_CLIENT
+        case QuotaExceeded():
+            return messages.FULL, TooLarge(f"The graph is full: {error}."), str(error)
+        case TooMuchWaits():
+            return messages.TOO_BIG, TooLarge("Too much waits for what never came."), None
+        case TooSlow():
+            return messages.TOO_BIG, TooLarge(f"{error}."), str(error)
+        case NotAllowed():
+            return messages.FORBIDDEN, BadInput("Not allowed."), None
+        case NotNow():
+            return messages.TOO_SLOW, error.cause, "the server is busy, come again"
+
+
+async def tried_for(
+    person: str,
+    run_in_worker: RunInWorker,
+    state: bytes,
+    update: bytes,
+    released: Sequence[bytes] = (),
+) -> UpdateOutline:
+    """The outline of an update that may be applied to a document of this state, and after it the
+    updates that waited for it.
+
+    Raises Malformed, Panicked, TooSlow; NotNow for what does not lie in the update.
+    """
+    died = 0
+    while True:
+        try:
+            with acting_for(person):
+                return await run_in_worker(tried, state, update, released)
+        except Crashed as error:
+            died += 1
+            if died == _DEATHS:  # one may have been for want of memory
+                raise Malformed("an update that ends the process, or takes too long") from error
+        except TooLarge as error:
+            raise TooSlow(f"This change cannot be taken: {error.detail}") from error
+        except Refused as error:
+            raise NotNow(error) from error
+
+
+def batch_of(items: list[Item], *, one: bool = False) -> tuple[list[Item], list[Item]]:
+    """What one commit takes, and the rest. Small enough for readers that keep up; a large update is
+    alone; with `one` each is."""
+    size = count = 0
+    for item in items[: 1 if one else _BATCH]:
+        own = len(item.update) if isinstance(item, Offer) else 0
+        size += own
+        if count and (size > _BATCH_BYTES or own > LARGE):
+            break
+        count += 1
+        if own > LARGE:
+            break
+    return items[:count], items[count:]
+
+
+def merged(updates: list[bytes]) -> list[bytes]:
+    """The same changes in few updates; none so large that a client that echoes would be refused."""
+    groups: list[list[bytes]] = []
+    size = 0
+    for update in updates:
+        size += len(update)
+        if not groups or len(groups[-1]) >= _MERGED or size > _MERGED_BYTES:
+            groups.append([])
+            size = len(update)
+        groups[-1].append(update)
+    return [merge_updates(*group) if len(group) > 1 else group[0] for group in groups]

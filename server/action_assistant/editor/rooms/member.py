@@ -1,0 +1,183 @@
+"""One socket in a room: what waits to be sent to it, and when it is too slow (rule R5)."""
+
+import asyncio
+from enum import Enum
+from typing import Final
+
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.rooms.presence import PresenceNews, Seat
+from action_assistant.web.auth.keys import PersonRef
+
+WAITING_FRAMES: Final = 256
+WAITING_BYTES: Final = 1 << 20
+_FREE: Final = 0.1  # seconds of work that nobody waits for
+_SHARE: Final = 4.0  # a socket keeps the editor busy for a fifth of the time, at most
+_UNHANDLED_EDITS: Final = 256  # that a socket may have sent ahead of the room
+
+
+class _Answer(Enum):
+    """Where the document is that the socket asked for."""
+
+    NONE = "nowhere"
+    WANTED = "still to be made"
+    WAITS = "waits to be taken"
+    LEFT = "is being sent"
+
+
+class Member:
+    """Someone's socket. The room posts; whoever owns the socket takes and sends."""
+
+    def __init__(self, person: PersonRef, *, edits: bool = True, acks: bool = False) -> None:
+        self.person: Final = person
+        self.seat: Final = Seat(person)
+        self.edits = edits
+        self.acks: Final = acks
+        self.synced = False  # has been sent the document
+        self.refused = False  # nothing more is taken from it
+        self.said: str | None = None  # why, where the close code does not tell enough
+        self._spent = 0.0  # seconds of everybody that edits of this socket took
+        self.handled = 0  # edits of this socket that the room has dealt with
+        self._heard = 0  # edits that the socket brought
+        self._frames: list[bytes] = []
+        self._bytes = 0
+        self._answer = _Answer.NONE
+        self._presence: PresenceNews | None = None
+        self._ack: bytes | None = None
+        self._said = -1, -1  # with the last acknowledgement
+        self._news = asyncio.Event()
+        self._room_again: asyncio.Event | None = None  # few sockets are ever far ahead
+        self._loop = asyncio.get_running_loop()
+        self._taken_at = self._loop.time()
+        self._closed: asyncio.Future[int] = self._loop.create_future()
+
+    def post(self, frame: bytes) -> None:
+        """Send a message some time soon; who has too much waiting is closed."""
+        if self.closed:
+            return
+        if len(self._frames) >= WAITING_FRAMES or self._bytes > WAITING_BYTES:
+            self.close(messages.TOO_SLOW)
+            return
+        self._frames.append(frame)
+        self._bytes += len(frame)
+        self._news.set()
+
+    def asks(self) -> bool:
+        """The socket wants the document; False when it is still on its way for an earlier wish.
+
+        What changes meanwhile is sent behind it, so that a second one would tell nothing new.
+        """
+        if self._answer is not _Answer.NONE:
+            return False
+        self._answer = _Answer.WANTED
+        return True
+
+    def post_answer(self, frame: bytes) -> None:
+        """Send the document, however large: it was asked for."""
+        self._answer = _Answer.WAITS
+        self._frames.append(frame)
+        self._news.set()
+
+    def post_epoch(self, epoch: str) -> None:
+        """Say which history this is, to those who know our own messages."""
+        if self.acks:
+            self.post(messages.epoch(epoch))
+
+    def post_read_only(self, why: str) -> None:
+        """Say that nobody may change the document, to those who know our own messages."""
+        if self.acks:
+            self.post(messages.read_only(why))
+
+    def post_presence(self, news: PresenceNews) -> None:
+        """Tell who is where; only the last word of each client waits."""
+        if news.entries:
+            waiting = self._presence
+            self._presence = news if waiting is None else waiting.followed_by(news)
+            self._news.set()
+
+    def post_ack(self, seq: int) -> None:
+        """Say what is durable, and that everything up to `seq` was sent; the last word counts."""
+        if self.acks and self.synced and (self.handled, seq) != self._said:
+            self._said = self.handled, seq
+            self._ack = messages.acks(self.handled, seq)
+            self._news.set()
+
+    async def take(self) -> list[bytes]:
+        """What is to be sent next, in order; waits until there is something."""
+        if self._answer is _Answer.LEFT:  # whoever takes again has sent what was taken before
+            self._answer = _Answer.NONE
+        await self._news.wait()
+        self._news.clear()
+        self._taken_at = self._loop.time()
+        frames, self._frames = self._frames, []
+        self._bytes = 0
+        if self._answer is _Answer.WAITS:
+            self._answer = _Answer.LEFT
+        if self._presence is not None:
+            frames.append(self._presence.frame)
+            self._presence = None
+        if self._ack is not None:
+            frames.append(self._ack)
+            self._ack = None
+        return frames
+
+    def beat(self, silence: float) -> None:
+        """Say something if nothing was said for so many seconds (rule R10)."""
+        if self._loop.time() - self._taken_at >= silence:
+            self.post(messages.BEAT)
+
+    def heard_edit(self) -> None:
+        """The socket brought an edit."""
+        self._heard += 1
+
+    def cost(self, seconds: float) -> None:
+        """An edit of this socket held the room up for so long."""
+        self._spent += seconds
+
+    def toll(self) -> float:
+        """Seconds to wait before more of this socket is read, so that others get their share."""
+        if self._spent < _FREE:
+            return 0.0
+        wait, self._spent = _SHARE * self._spent, 0.0
+        return wait
+
+    def edit_handled(self) -> None:
+        """The room has dealt with the next edit of this socket, for good."""
+        self.handled += 1
+        self._let_on()
+
+    @property
+    def far_ahead(self) -> bool:
+        """Whether the socket has said much that the room has not dealt with."""
+        return self._heard - self.handled > _UNHANDLED_EDITS and not self.closed
+
+    async def until_heard(self) -> None:
+        """Wait while this socket is far ahead of the room."""
+        while self.far_ahead:
+            again = self._room_again = asyncio.Event()
+            await again.wait()
+
+    def _let_on(self) -> None:
+        if self._room_again is not None:
+            self._room_again.set()
+
+    def close(self, code: int) -> None:
+        """End this socket. The first reason counts."""
+        if not self._closed.done():
+            self._closed.set_result(code)
+            self._let_on()
+            self._news.set()
+
+    def refuse(self, code: int, said: str | None = None) -> None:
+        """End this socket for what it did; what it sent after that is not looked at."""
+        self.refused = True
+        self.said = self.said if self.closed else said
+        self.close(code)
+
+    @property
+    def closed(self) -> bool:
+        """Whether somebody ended it."""
+        return self._closed.done()
+
+    async def ended(self) -> int:
+        """Wait for the end; the close code."""
+        return await asyncio.shield(self._closed)

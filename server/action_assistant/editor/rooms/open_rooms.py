@@ -1,0 +1,148 @@
+"""Which rooms are open: loaded once, kept while somebody needs them, let go some seconds later."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Final
+
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.loading import load
+from action_assistant.editor.rooms.batch_window import LENGTH, BatchWindow
+from action_assistant.editor.rooms.room import Room
+from action_assistant.errors import Unavailable
+from action_assistant.journal.journal import Journal
+from action_assistant.web.auth.access import done_for_person
+from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+LINGER: Final = 5.0  # seconds that a room stays after the last one left
+_TICK: Final = 2.0  # seconds
+_MOMENTS: Final = 10  # windows after which listeners hear again which moment they show
+_SILENCE: Final = 10.0  # seconds without a word after which a socket hears a beat
+
+
+class Rooms:
+    """The rooms of this process, by stream. What depends on the size of a document is done `run_in_worker`;
+    large updates are `tried` in another process before a room takes them."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        *,
+        linger: float = LINGER,
+        window: float = LENGTH,
+        run_in_worker: RunInWorker = run_here,
+        tried: RunInWorker = run_here,
+    ) -> None:
+        self._journal = journal
+        self._run_in_worker = run_in_worker
+        self._tried = tried
+        self._window = BatchWindow(window)
+        self._moments = BatchWindow(_MOMENTS * window)
+        self._linger = linger
+        self._rooms: dict[str, Room] = {}
+        self._loading: dict[str, asyncio.Task[Room]] = {}
+        self._holders: dict[str, int] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._timers: dict[str, asyncio.TimerHandle] = {}
+        self._closed = False
+        self._divergences = 0
+        self._heart = asyncio.create_task(self._beat(), name="heart")
+
+    @asynccontextmanager
+    async def enter(self, stream: str) -> AsyncIterator[Room]:
+        """The room of a stream; it is not unloaded while you are inside. Raises Unavailable."""
+        self._holders[stream] = self._holders.get(stream, 0) + 1
+        timer = self._timers.pop(stream, None)
+        if timer is not None:
+            timer.cancel()
+        try:
+            yield await self._room(stream)
+        finally:
+            self._holders[stream] -= 1
+            if self._holders[stream] == 0:
+                del self._holders[stream]
+                if stream in self._rooms and not self._closed:
+                    loop = asyncio.get_running_loop()
+                    self._timers[stream] = loop.call_later(self._linger, self._unload, stream)
+
+    def open_room(self, stream: str) -> Room | None:
+        """The room if it is open, without opening it."""
+        return self._rooms.get(stream)
+
+    def open_rooms(self) -> list[Room]:
+        """All that are open."""
+        return list(self._rooms.values())
+
+    @property
+    def divergences(self) -> int:
+        """How often a page showed something else than its room, since this process began."""
+        return self._divergences + sum(room.divergences for room in self.open_rooms())
+
+    def expel(self, stream: str) -> None:
+        """Send everyone away from a graph that is no more."""
+        room = self._rooms.get(stream)
+        for member in list(room.members) if room is not None else []:
+            member.close(messages.NO_SUCH_GRAPH)
+
+    async def close(self) -> None:
+        """Finish and let go of every room."""
+        self._closed = True
+        self._heart.cancel()
+        for timer in self._timers.values():
+            timer.cancel()
+        await asyncio.gather(*self._loading.values(), return_exceptions=True)
+        await asyncio.gather(*(room.rest(lambda: False) for room in self.open_rooms()))
+        if self._tasks:
+            await asyncio.wait(self._tasks)
+
+    async def _beat(self) -> None:
+        while True:
+            await asyncio.sleep(_TICK)
+            for room in self.open_rooms():
+                for member in room.members:
+                    member.beat(_SILENCE)
+
+    async def _room(self, stream: str) -> Room:
+        room = self._rooms.get(stream)
+        if room is not None:
+            return room
+        if self._closed:
+            raise Unavailable("The server is ending.")
+        loading = self._loading.get(stream)
+        if loading is None:
+            loading = self._loading[stream] = asyncio.create_task(self._load(stream))
+        return await asyncio.shield(loading)  # others may wait for it too
+
+    async def _load(self, stream: str) -> Room:
+        done_for_person()  # others may wait for it too, when whoever came first has left
+        try:
+            loaded = await load(self._journal, stream, run_in_worker=self._run_in_worker)
+            room = self._rooms[stream] = Room(
+                stream,
+                self._journal,
+                loaded,
+                self._forget,
+                self._window,
+                self._moments,
+                self._run_in_worker,
+                self._tried,
+            )
+            return room
+        finally:
+            del self._loading[stream]
+
+    def _forget(self, room: Room) -> None:
+        if self._rooms.get(room.stream) is room:
+            del self._rooms[room.stream]
+            self._divergences += room.divergences
+
+    def _unload(self, stream: str) -> None:
+        self._timers.pop(stream, None)
+        task = asyncio.create_task(self._unloading(stream))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _unloading(self, stream: str) -> None:
+        room = self._rooms.get(stream)
+        if room is not None:
+            await room.rest(lambda: stream in self._holders)

@@ -1,0 +1,143 @@
+"""Who is in a room, as the server vouches for it (rule R6)."""
+
+import hashlib
+from collections.abc import Iterable
+from functools import cached_property
+from typing import Final
+
+import msgspec
+
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.messages import PresenceEntry
+from action_assistant.web.auth.keys import PersonRef
+
+STATE_LIMIT: Final = 32_768  # bytes of one client's entry
+_GONE: Final = b"null"
+#: Readable on light and on dark, and apart from each other for colour-blind eyes.
+_COLOURS: Final = (
+    "#2563eb", "#d97706", "#059669", "#db2777", "#7c3aed", "#0891b2",
+    "#dc2626", "#65a30d", "#9333ea", "#0d9488", "#c2410c", "#4f46e5",
+)  # fmt: skip
+_decode: Final = msgspec.json.Decoder(dict[str, msgspec.Raw])
+
+
+class PersonStamp(msgspec.Struct, frozen=True):
+    """What the server says about a person, in the field `user` of every entry."""
+
+    id: str
+    name: str
+    color: str
+
+
+def colour_of(person_id: str) -> str:
+    """The same person has the same colour everywhere."""
+    return _COLOURS[hashlib.sha256(person_id.encode()).digest()[0] % len(_COLOURS)]
+
+
+def stamp_of(person: PersonRef) -> bytes:
+    """The stamp as JSON."""
+    return msgspec.json.encode(PersonStamp(person.id, person.name, colour_of(person.id)))
+
+
+class Seat:
+    """The one client id that a socket speaks for."""
+
+    def __init__(self, person: PersonRef) -> None:
+        self.person: Final = person
+        self.client: int | None = None
+        self._stamp: Final = msgspec.Raw(stamp_of(person))
+
+    def stamped(self, entry: PresenceEntry) -> PresenceEntry | None:
+        """The entry under the person's own name; None when it is none that can be shown."""
+        if entry.state == _GONE:
+            return entry
+        if len(entry.state) > STATE_LIMIT:
+            return None
+        try:
+            state = _decode.decode(entry.state)
+        except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+            return None
+        state["user"] = self._stamp
+        return PresenceEntry(entry.client, entry.clock, msgspec.json.encode(state))
+
+
+class PresenceNews:
+    """What many are told about who is where: put into bytes once for all of them."""
+
+    def __init__(self, entries: Iterable[PresenceEntry]) -> None:
+        self.entries: Final = {entry.client: entry for entry in entries}
+
+    @cached_property
+    def frame(self) -> bytes:
+        """As a message."""
+        return messages.presence(self.entries.values())
+
+    def followed_by(self, later: "PresenceNews") -> "PresenceNews":
+        """Both; what is later about the same client counts."""
+        return PresenceNews((self.entries | later.entries).values())
+
+
+class RoomPresence:
+    """The entries of a room. Each belongs to a seat and vanishes with it."""
+
+    def __init__(self) -> None:
+        self._entries: dict[int, PresenceEntry] = {}
+        self._seats: dict[int, Seat] = {}
+
+    def hear(self, seat: Seat, entries: tuple[PresenceEntry, ...]) -> list[PresenceEntry]:
+        """What the others are to be told; entries that are not this seat's are dropped."""
+        told: list[PresenceEntry] = []
+        for entry in entries:
+            if not self._is_own(seat, entry):
+                continue
+            stamped = seat.stamped(entry)
+            if stamped is None:
+                continue
+            if stamped.state == _GONE:
+                told += self.leave(seat, entry.clock)
+                continue
+            seat.client = entry.client
+            self._seats[entry.client] = seat
+            self._entries[entry.client] = stamped
+            told.append(stamped)
+        return told
+
+    def leave(self, seat: Seat, clock: int | None = None) -> list[PresenceEntry]:
+        """Take a seat's entry away; what the others are to be told."""
+        client, seat.client = seat.client, None
+        if client is None or self._seats.get(client) is not seat:
+            return []
+        del self._seats[client]
+        last = self._entries.pop(client)
+        # The same clock, so that the client's next word, should it come back, is newer.
+        return [PresenceEntry(client, last.clock if clock is None else clock, _GONE)]
+
+    def holder(self, client: int) -> str | None:
+        """The person whose socket speaks for a client."""
+        seat = self._seats.get(client)
+        return None if seat is None else seat.person.id
+
+    def people(self) -> tuple[PersonRef, ...]:
+        """Who is there now, each once, by name."""
+        there = {seat.person.id: seat.person for seat in self._seats.values()}
+        return tuple(
+            PersonRef(person.id, person.name)
+            for person in sorted(there.values(), key=lambda person: (person.name, person.id))
+        )
+
+    def everyone(self) -> tuple[PresenceEntry, ...]:
+        """Who is there now."""
+        return tuple(self._entries.values())
+
+    def _is_own(self, seat: Seat, entry: PresenceEntry) -> bool:
+        """Stock clients echo what they hear of others; those entries are not theirs to say.
+
+        A socket speaks for the first client id it names. If another socket of the same person
+        speaks for that one, it is what is left of the connection before this one.
+        """
+        if seat.client is not None:
+            return seat.client == entry.client
+        if entry.state == _GONE:
+            return False
+        holder = self._seats.get(entry.client)
+        return holder is None or holder.person.id == seat.person.id

@@ -1,0 +1,63 @@
+"""The services of the editor process, and the state that its routes are given."""
+
+from action_assistant.editor.catalogue.catalogue import Catalogue
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.catalogue.history import GraphHistory
+from action_assistant.editor.catalogue.invitations import Invitations
+from action_assistant.editor.catalogue.library import Library
+from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.catalogue.versions import Versions
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.rate_limits import ByteRateLimits
+from action_assistant.editor.workers import EditorWorkers
+from action_assistant.journal.journal import Journal
+from action_assistant.settings import EditorSettings
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.network.connection_limits import ConnectionLimits
+
+
+class EditorServices:
+    """The services, put together around a journal that is open."""
+
+    def __init__(
+        self,
+        settings: EditorSettings,
+        journal: Journal,
+        people: People,
+        epoch: str,
+        revoked: Revocations,
+        workers: EditorWorkers,
+    ) -> None:
+        self.settings = settings
+        self.journal = journal
+        self.epoch = epoch
+        self.people = people
+        self.workers = workers
+        self.rooms = Rooms(journal, run_in_worker=workers.graphs, tried=workers.edits)
+        self.connection_limits = ConnectionLimits(limits=settings.limits)
+        self.rate_limits = ByteRateLimits(limits=settings.limits)
+        self.graph_reader = GraphReader(journal, self.rooms, workers.graphs)
+        self.catalogue = Catalogue(journal, self.rooms, self.graph_reader, workers.files)
+        self.versions = Versions(journal, self.graph_reader)
+        self.library = Library(journal, self.graph_reader)
+        self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)
+        self.history = GraphHistory(journal, people, self.versions)
+
+
+class EditorState:
+    """Holds the services once they are open: routes are made before the journal is."""
+
+    def __init__(self) -> None:
+        self._services: EditorServices | None = None
+
+    def open(self, services: EditorServices) -> None:
+        """From here on requests can be answered."""
+        self._services = services
+
+    @property
+    def services(self) -> EditorServices:
+        """The house. Only requests ask for it, and there are none before it is open."""
+        if self._services is None:
+            raise RuntimeError("the editor is not open yet")
+        return self._services

@@ -1,0 +1,36 @@
+"""Which database a URL names, SQLite or Postgres, and bringing it to this version."""
+
+from sqlalchemy import make_url
+from sqlalchemy.exc import ArgumentError
+
+from action_assistant.errors import CannotStart
+from action_assistant.journal.database import Branch, Database
+from action_assistant.journal.migrate import recognize, upgrade_to
+
+
+def database_of(url: str) -> Database:
+    """The database that a URL names. Raises CannotStart for what we cannot open."""
+    try:
+        parsed = make_url(url)
+    except ArgumentError as error:
+        # Not quoted: a password may be what is wrong with it.
+        raise CannotStart("--database is not a URL such as sqlite:////data/editor.db.") from error
+    if parsed.drivername in {"postgresql", "postgres"} and parsed.database:
+        from action_assistant.journal.postgres import Postgres
+
+        return Postgres(parsed)
+    if parsed.get_backend_name() == "sqlite" and parsed.database:
+        from action_assistant.journal.sqlite import Sqlite
+
+        return Sqlite(parsed.database)
+    raise CannotStart(f"Databases of the kind {parsed.drivername!r} are not supported.")
+
+
+def migrate(url: str, branch: Branch, revision: str = "head") -> str:
+    """Upgrade the database and return its revision. Raises CannotStart.
+
+    All of it is one transaction: killed half-way, the database is as it was.
+    """
+    database = database_of(url)
+    database.look(recognize)
+    return database.migrate(upgrade_to(branch, revision))

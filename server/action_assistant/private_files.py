@@ -1,0 +1,86 @@
+"""Private files: folders that only this user may enter, files that only they may read."""
+
+import os
+import re
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from action_assistant.errors import CannotStart
+
+#: What this program puts into a data folder.
+_OURS: Final = re.compile(
+    r"(editor|runner)\.(database|db|mark).*|restore\.unfinished|token|\.token-.*|\.probe-.*|open\.html"
+    r"|revoked|sessions|tls|archive|recordings|before-restore-.*|\.backup-.*"
+)
+_OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
+
+
+def opener(path: str, flags: int) -> int:
+    """For `open(…, opener=opener)`: whatever is made by it, only this user may read and write."""
+    return os.open(path, flags, 0o600)
+
+
+def make_folder(path: Path) -> None:
+    """Make it if need be, and those above it. Raises OSError."""
+    if not path.is_dir():
+        make_folder(path.parent)
+        path.mkdir(mode=0o700, exist_ok=True)
+
+
+def own_folder(data: Path) -> Path:
+    """A data folder, made if need be, proven writable, and closed to other users as far as it is ours.
+    Raises CannotStart."""
+    prove_writable(data)
+    for path in open_to_others(data):
+        if path != data or holds_nothing_else(data):
+            _close(path)
+    return data
+
+
+def prove_writable(data: Path) -> None:
+    """Raises CannotStart. The folder is made if need be."""
+    try:
+        data.mkdir(mode=0o700, parents=True, exist_ok=True)
+        probe = data / f".probe-{os.getpid()}"
+        os.close(os.open(probe, os.O_WRONLY | os.O_CREAT, 0o600))
+        probe.unlink()
+    except OSError as error:
+        raise CannotStart(f"Cannot write to the data folder {data}: {error.strerror}.") from error
+
+
+def open_to_others(data: Path) -> list[Path]:
+    """What other users of this computer may read or enter: the folder first, then what is ours in it."""
+    return [path for path in (data, *_ours_in(data)) if _is_open(path)]
+
+
+def holds_nothing_else(data: Path) -> bool:
+    """A folder that somebody keeps other things in stays as they want it."""
+    return all(_OURS.fullmatch(entry.name) for entry in data.iterdir())
+
+
+def _ours_in(data: Path) -> Iterator[Path]:
+    """Files and folders, a folder before what is in it; no links, which lead elsewhere."""
+    for entry in sorted(data.iterdir()):
+        if not _OURS.fullmatch(entry.name) or entry.is_symlink():
+            continue
+        yield entry
+        if entry.is_dir():
+            for folder, folders, files in os.walk(entry):
+                yield from (Path(folder, name) for name in (*folders, *files))
+
+
+def _is_open(path: Path) -> bool:
+    try:
+        found = path.lstat()
+    except OSError:  # gone meanwhile
+        return False
+    return not stat.S_ISLNK(found.st_mode) and bool(found.st_mode & _OTHERS)
+
+
+def _close(path: Path) -> None:
+    try:
+        path.chmod(0o700 if path.is_dir() else 0o600)
+    except OSError:  # somebody else's; `doctor` tells
+        return

@@ -1,0 +1,130 @@
+"""The public URL, under which a proxy shows the product to others, and the proxies to believe."""
+
+import ipaddress
+import re
+from typing import Final
+from urllib.parse import urlsplit
+
+import msgspec
+
+from action_assistant.errors import CannotStart
+
+Network = ipaddress.IPv4Network | ipaddress.IPv6Network
+
+#: Below the public address, where the runner is.
+RUNNER: Final = "/runner"
+_PORTS: Final = {"http": 80, "https": 443}
+_PATH: Final = re.compile(r"(/[A-Za-z0-9._~-]+)*")
+#: What answers at the root of either process: an address below it would stand for two things.
+_TAKEN: Final = frozenset(
+    {
+        "api",
+        "assets",
+        "graphs",
+        "healthz",
+        "metrics",
+        "readyz",
+        "robots",
+        "runner",
+        "runs",
+        "schema",
+    }
+)
+#: Names that no public authority signs for, since each network has its own.
+_OF_A_NETWORK: Final = (".local", ".lan", ".internal", ".home.arpa", ".test", ".localhost")
+LOOPBACK_PROXIES: Final[tuple[Network, ...]] = (
+    ipaddress.ip_network("127.0.0.0/8"),
+    ipaddress.ip_network("::1"),
+)
+
+
+class PublicUrl(msgspec.Struct, frozen=True):
+    """Where the page is for whoever comes through the proxy. `path` is "" or as "/temoto"."""
+
+    scheme: str
+    host: str
+    port: int
+    path: str
+
+    @property
+    def authority(self) -> str:
+        """Name and port as an address bar shows them."""
+        shown = f"[{self.host}]" if ":" in self.host else self.host
+        return shown if self.port == _PORTS[self.scheme] else f"{shown}:{self.port}"
+
+    @property
+    def origin(self) -> str:
+        """As browsers send it."""
+        return f"{self.scheme}://{self.authority}"
+
+    @property
+    def page(self) -> str:
+        """Of the page and its API, without a slash at its end."""
+        return self.origin + self.path
+
+    @property
+    def runner(self) -> str:
+        """Of the runner, without a slash at its end."""
+        return self.page + RUNNER
+
+    @property
+    def is_secure(self) -> bool:
+        """Whether it is encrypted on its way to the proxy."""
+        return self.scheme == "https"
+
+    def is_named(self, name: str, port: int | None) -> bool:
+        """Whether a Host header means this address. Proxies leave out the port, or pass it on."""
+        return name == self.host and port in {None, self.port}
+
+
+def public_url(text: str) -> PublicUrl:
+    """The address that somebody wrote down. Raises CannotStart."""
+    try:
+        parts = urlsplit(text.strip())
+        port = parts.port
+    except ValueError as error:
+        raise CannotStart(f"The public address {text!r} cannot be read: {error}.") from error
+    path = parts.path.rstrip("/")
+    host = (parts.hostname or "").lower()
+    if parts.scheme not in _PORTS or not host or not host.isascii():
+        raise CannotStart(
+            f"The public address {text!r} is none: write it as https://robots.example.org/temoto/ "
+            "(names beyond ASCII as xn--…)."
+        )
+    if parts.username is not None or parts.query or parts.fragment or not _PATH.fullmatch(path):
+        raise CannotStart(
+            f"The public address {text!r} has more than a name, a port, and a path of letters, "
+            "digits and . _ ~ -"
+        )
+    if set(path.split("/")) & {".", ".."} or (
+        path.split("/")[1:2] and path.split("/")[1] in _TAKEN
+    ):
+        raise CannotStart(
+            f"The path of the public address {text!r} means something else here; choose another, "
+            "such as /temoto/."
+        )
+    if parts.scheme == "http" and not _is_of_a_network(host):
+        raise CannotStart(
+            f"The public address {text!r} is not encrypted: links, sessions and Stop would go "
+            "through the internet as plain text. Use https; plain http is for names and addresses "
+            "of your own network."
+        )
+    return PublicUrl(parts.scheme, host, port or _PORTS[parts.scheme], path)
+
+
+def proxies(text: str) -> tuple[Network, ...]:
+    """Addresses and networks, comma separated. Raises CannotStart."""
+    try:
+        return tuple(ipaddress.ip_network(each.strip()) for each in text.split(",") if each.strip())
+    except ValueError as error:
+        raise CannotStart(
+            f"Trusted proxies are addresses and networks such as 10.0.0.2, 172.16.0.0/12: {error}."
+        ) from error
+
+
+def _is_of_a_network(host: str) -> bool:
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return "." not in host or host.endswith(_OF_A_NETWORK)
+    return address.is_private

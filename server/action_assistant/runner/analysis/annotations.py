@@ -1,0 +1,214 @@
+"""Annotations of a run besides its own events: marks of people, and its sums after the end.
+
+It has a stream of its own, `about/RUN`: whatever people write down never mixes with what a robot
+did. The tables here are folds of these streams.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Final
+
+import msgspec
+from sqlalchemy import Executable, delete, func, insert, update
+from sqlalchemy.dialects.sqlite import insert as upsert
+
+from action_assistant.journal.events import Draft, Event
+from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.causes import causes
+from action_assistant.runner.runs.durations import Took, of_run, of_visit, took_us
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun
+from action_assistant.schema.runner_tables import action_sum, review, run_label
+from action_assistant.schema.runner_tables import run as runs
+from action_assistant.umrf.model import Graph
+
+_PREFIX: Final = "about/"
+_WORDS: Final = 8_000  # characters of messages that a search looks through
+#: Raise it when a run adds up to something else than before: older sums are made again.
+FIGURES: Final = 1
+_TOOK: Final = 100  # durations kept per action and run
+
+Label = Annotated[str, msgspec.Meta(min_length=1, max_length=60, pattern=r"^\S(.*\S)?$")]
+
+
+class Marks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What a person changes about a run: only what is given."""
+
+    pinned: bool | None = None
+    note: Annotated[str, msgspec.Meta(max_length=4_000)] | None = None
+    labels: Annotated[tuple[Label, ...], msgspec.Meta(max_length=20)] | None = None
+
+
+class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Somebody pinned a run, wrote a note or chose its labels."""
+
+    kind: ClassVar[str] = "run.marked.v1"
+
+    at: int
+    author: Author
+    marks: Marks
+
+
+class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """One action of a run that is over. `results` counts results that are known; `spans` has how long
+    visits took that have ended, the newest hundred at most. `took` is of older versions: microseconds
+    that they took at least."""
+
+    aid: str | None = None
+    visits: int = 0
+    results: dict[str, int] = {}
+    inferred: int = 0
+    took: tuple[int, ...] = ()
+    spans: tuple[Took, ...] = ()
+
+
+class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A run that is over, as lists and statistics need it: they must not read every run again.
+    `figures`: `FIGURES` when it was summed up; what is older is summed up again."""
+
+    kind: ClassVar[str] = "run.summed_up.v1"
+
+    at: int
+    actions: dict[str, ActionSum]
+    words: str = ""
+    cause: str = ""
+    took: Took | None = None
+    figures: int = 0
+
+
+class Put(msgspec.Struct, frozen=True):
+    """The events of a run were put into an archive and taken out of the journal. `file` lies in the
+    folder of archives; `by` is the number of the removal; `row` is the run as lists show it."""
+
+    kind: ClassVar[str] = "run.archived.v1"
+
+    at: int
+    file: str
+    sha256: str
+    by: int
+    row: dict[str, Any]
+
+
+def stream_about(run: str) -> str:
+    """The stream of what is told about a run."""
+    return f"{_PREFIX}{run}"
+
+
+def is_about(stream: str) -> bool:
+    """Whether this stream is one of those."""
+    return stream.startswith(_PREFIX)
+
+
+def draft(event: Marked | SummedUp | Put) -> Draft:
+    """The event before it has a place."""
+    author = event.author.id if isinstance(event, Marked) else ""
+    return Draft(event.kind, author, msgspec.json.encode(event))
+
+
+def sum_of(run: Run, graph: Graph | None, at: int) -> SummedUp:
+    """What a run of a graph adds up to."""
+    found = causes(run, graph)[:1]
+    cause = words(found[0], run) if found else ""
+    said = itertools.chain(
+        [cause, run.detail],
+        (alarm.text for alarm in run.alarms),
+        (message.text for action in run.actions.values() for message in action.messages),
+    )
+    told = "\n".join(dict.fromkeys(text for text in said if text))[:_WORDS]
+    actions = {name: _sum(each) for name, each in run.actions.items()}
+    return SummedUp(at, actions, told, cause, of_run(run), FIGURES)
+
+
+def _sum(action: ActionRun) -> ActionSum:
+    results: dict[str, int] = {}
+    for visit in action.visits:
+        if visit.result is not None:
+            results[visit.result] = results.get(visit.result, 0) + 1
+    spans = [took for visit in action.visits if (took := of_visit(visit)) is not None]
+    return ActionSum(
+        aid=action.aid,
+        visits=action.older + len(action.visits),
+        results=results,
+        inferred=sum(visit.how == "inferred" for visit in action.visits),
+        spans=tuple(spans[-_TOOK:]),
+    )
+
+
+def fold(event: Event) -> Sequence[Executable]:
+    """What an event means for the tables."""
+    run = event.stream.removeprefix(_PREFIX)
+    match event.kind:
+        case Marked.kind:
+            return _mark(run, msgspec.json.decode(event.body, type=Marked).marks)
+        case SummedUp.kind:
+            return _put_sum(run, msgspec.json.decode(event.body, type=SummedUp))
+        case Put.kind:
+            return (_put_away(run, msgspec.json.decode(event.body, type=Put)),)
+        case _:
+            return ()
+
+
+def _mark(run: str, marks: Marks) -> Sequence[Executable]:
+    given = {"pinned": marks.pinned, "note": marks.note}
+    fields = {name: value for name, value in given.items() if value is not None}
+    statements: list[Executable] = []
+    if fields:
+        statements.append(_review(run, fields))
+    if marks.labels is not None:
+        statements.append(delete(run_label).where(run_label.c.run == run))
+        rows = [{"run": run, "label": label} for label in dict.fromkeys(marks.labels)]
+        if rows:
+            statements.append(insert(run_label).values(rows))
+    return statements
+
+
+def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
+    rows = [
+        {
+            "run": run,
+            "action": name,
+            "aid": each.aid,
+            "visits": each.visits,
+            "results": each.results,
+            "inferred": each.inferred,
+            "took": [[each.least, each.most] for each in _spans(each)],
+        }
+        for name, each in summed.actions.items()
+    ]
+    return [
+        _review(run, {"words": summed.words, "summed": True}),
+        *_told(run, summed),
+        delete(action_sum).where(action_sum.c.run == run),
+        *(insert(action_sum).values(rows[i : i + 100]) for i in range(0, len(rows), 100)),
+    ]
+
+
+def _put_away(run_id: str, put: Put) -> Executable:
+    """The row stays, also when it is made again without the events."""
+    row: Mapping[str, Any] = {**put.row, "archived_at": put.at, "archived_as": put.file}
+    statement = upsert(runs).values(id=run_id, **row)
+    return statement.on_conflict_do_update(index_elements=["id"], set_=dict(row))
+
+
+def _review(run: str, fields: Mapping[str, object]) -> Executable:
+    blank: dict[str, object] = {"pinned": False, "note": "", "words": "", "summed": False}
+    statement = upsert(review).values(run=run, **{**blank, **fields})
+    return statement.on_conflict_do_update(index_elements=["run"], set_=dict(fields))
+
+
+def _told(run: str, summed: SummedUp) -> Sequence[Executable]:
+    """The sentence that the list shows, and how long it took."""
+    told: list[object] = ["$.figures", summed.figures] if summed.figures else []
+    if summed.cause:
+        told += ["$.cause", summed.cause]
+    if summed.took is not None:
+        told += ["$.took", func.json(msgspec.json.encode(summed.took).decode())]
+    if not told:
+        return ()
+    change = update(runs).where(runs.c.id == run)
+    return (change.values(summary=func.json_set(runs.c.summary, *told)),)
+
+
+def _spans(action: ActionSum) -> Sequence[Took]:
+    return action.spans or tuple(took_us(each, None) for each in action.took)

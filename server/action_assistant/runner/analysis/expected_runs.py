@@ -1,0 +1,238 @@
+"""Expected courses: a run as a script for the simulator, and the steps it has to repeat.
+
+A recorded run becomes a script in which every action does what it was seen to do. An expectation is
+a graph, such a script and the course they took; simulating them later, with a newer graph or a newer
+product, must take the same course.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias
+
+import msgspec
+from sqlalchemy import Executable
+from sqlalchemy.dialects.sqlite import insert as upsert
+
+from action_assistant.journal.events import Event
+from action_assistant.runner.runs.durations import of_visit
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun, Visit
+from action_assistant.schema.runner_tables import expectation
+from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics import (
+    CUT_OFF,
+    Dispatch,
+    GraphResultEvent,
+    GraphStateEvent,
+    HazardEvent,
+    NodeResultEvent,
+    Script,
+    Trace,
+    simulate,
+)
+
+#: The stream of all expectations.
+STREAM: Final = "expectations"
+_MOST: Final = 20_000  # steps of a course
+_DAY_MS: Final = 86_400_000.0
+
+Fault: TypeAlias = Literal["error", "false", "hang", "init_error"]
+
+
+class Doubt(msgspec.Struct, frozen=True):
+    """Something that the run does not tell, so that the script had to choose."""
+
+    action: str
+    text: str
+
+
+class Recorded(msgspec.Struct, frozen=True):
+    """A run as a script (`behaviours`, docs/contracts.md 5.2), and what in it is a guess."""
+
+    behaviours: dict[str, list[dict[str, Any]]]
+    doubts: list[Doubt]
+
+
+class ExpectedStep(msgspec.Struct, frozen=True):
+    """One step of a course: `what` happened to `node` (empty: the graph), and how."""
+
+    graph: str
+    node: str
+    what: Literal["runs", "result", "state", "ends", "hazard"]
+    how: str
+
+
+class Expected(msgspec.Struct, frozen=True, kw_only=True):
+    """Somebody expects a graph under a script to take this course for ever."""
+
+    kind: ClassVar[str] = "expectation.saved.v1"
+
+    at: int
+    name: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
+    author: Author
+    run: str
+    graph: str | None
+    graph_name: str
+    umrf: str
+    script: str
+    course: tuple[ExpectedStep, ...]
+
+
+class Retired(msgspec.Struct, frozen=True):
+    """Nobody expects this any more."""
+
+    kind: ClassVar[str] = "expectation.retired.v1"
+
+    at: int
+    name: str
+    author: Author
+
+
+class Departure(msgspec.Struct, frozen=True):
+    """The first step in which a course is another one. None where a course has ended."""
+
+    place: int
+    expected: ExpectedStep | None
+    found: ExpectedStep | None
+
+
+def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
+    """What the actions of a run did, as a script. `fault` makes one action (full name) fail at its
+    last visit instead."""
+    behaviours: dict[str, list[dict[str, Any]]] = {}
+    doubts: list[Doubt] = []
+    for name, action in run.actions.items():
+        if not action.visits:
+            continue
+        if action.older:
+            doubts.append(Doubt(name, f"Its first {action.older} visits are not kept singly."))
+        said = iter(_spread(action))
+        behaviours[name] = [
+            _behaviour(name, visit, next(said, ""), doubts) for visit in action.visits
+        ]
+    if fault is not None:
+        name, how = fault
+        behaviours[name] = [*behaviours.get(name, [])[:-1], _failing(how)]
+    return Recorded(behaviours, doubts)
+
+
+def fitted(found: Recorded, run: Run, graph: Graph) -> Recorded:
+    """The same script for another version of the graph: an action keeps what it did under a new
+    name. Actions that the run did not have, or never came to, do what the simulator takes for usual."""
+    by_aid = {action.aid: name for name, action in run.actions.items() if action.aid is not None}
+    behaviours: dict[str, list[dict[str, Any]]] = {}
+    used: set[str] = set()
+    doubts: list[Doubt] = []
+    for action in graph.actions:
+        if action.missing:
+            continue
+        name = by_aid.get(action.key, action.full_name)
+        if name in found.behaviours:
+            used.add(name)
+            behaviours[action.full_name] = found.behaviours[name]
+        else:
+            why = "It never ran in that run" if name in run.actions else "That run did not have it"
+            doubts.append(Doubt(action.full_name, f"{why}; it ends true after a second."))
+    inside = {name: calls for name, calls in found.behaviours.items() if "/" in name}
+    gone = sorted(found.behaviours.keys() - used - inside.keys())
+    doubts += [Doubt(name, "This version does not have it any more.") for name in gone]
+    kept = [doubt for doubt in found.doubts if doubt.action in used | inside.keys()]
+    return Recorded(behaviours | inside, [*kept, *doubts])
+
+
+def _spread(action: ActionRun) -> Iterable[str]:
+    """Messages by visit: an action says one thing per visit at most that a script can repeat."""
+    for visit in action.visits:
+        until = visit.not_after
+        yield next(
+            (
+                each.text
+                for each in action.messages
+                if each.at >= visit.not_before and (until is None or each.at <= until)
+            ),
+            "",
+        )
+
+
+def _behaviour(name: str, visit: Visit, said: str, doubts: list[Doubt]) -> dict[str, Any]:
+    span = of_visit(visit)
+    if span is None or visit.result == "stopped":
+        return {"never": True}
+    if span.most is None:
+        doubts.append(Doubt(name, "No end of its code was seen; in the script it never ends."))
+        return {"never": True, "ignores_stop": True}
+    took = round((span.least + span.most) / 2, 3) if span.exact is None else span.exact
+    if visit.result is None:
+        doubts.append(Doubt(name, "Its result was not seen; the script says true."))
+    if span.exact is None:
+        told = (
+            f"It took between {span.least:.1f} and {span.most:.1f} s; the script says {took:.1f} s."
+        )
+        doubts.append(Doubt(name, told))
+    found: dict[str, Any] = {"after_s": took, "result": f"on_{visit.result or 'true'}"}
+    return found | ({"message": said} if said else {})
+
+
+def _failing(how: Fault) -> dict[str, Any]:
+    match how:
+        case "hang":
+            return {"never": True, "ignores_stop": True}
+        case "init_error":
+            return {"init_error": True}
+        case "error" | "false":
+            return {"after_s": 0.1, "result": f"on_{how}"}
+
+
+def course(graph: Graph, script: Script) -> tuple[ExpectedStep, ...]:
+    """What happens when this graph runs under this script, without times. Deterministic."""
+    traces = simulate(graph, script=script, facts=SIMULATED, until_ms=_DAY_MS, max_events=_MOST)
+    return tuple(step for trace in traces if (step := _step(trace)) is not None)
+
+
+def _step(trace: Trace) -> ExpectedStep | None:
+    match trace:
+        case NodeResultEvent():
+            return ExpectedStep(trace.graph, trace.node, "result", trace.result)
+        case Dispatch():
+            return ExpectedStep(trace.graph, trace.node, "runs", trace.response)
+        case GraphResultEvent():
+            return ExpectedStep(trace.graph, "", "ends", trace.value)
+        case GraphStateEvent():
+            return ExpectedStep(trace.graph, "", "state", trace.state)
+        case HazardEvent(code=code):  # that it was cut off is no part of what was expected before
+            is_cut = code == CUT_OFF
+            return None if is_cut else ExpectedStep(trace.graph, trace.node or "", "hazard", code)
+        case _:
+            return None
+
+
+def departure(expected: Sequence[ExpectedStep], found: Sequence[ExpectedStep]) -> Departure | None:
+    """Where the second course first differs from the first; None when they are the same."""
+    for place in range(max(len(expected), len(found))):
+        one = expected[place] if place < len(expected) else None
+        other = found[place] if place < len(found) else None
+        if one != other:
+            return Departure(place, one, other)
+    return None
+
+
+def fold(event: Event) -> Sequence[Executable]:
+    """What an event of the stream of expectations means for the table."""
+    match event.kind:
+        case Expected.kind:
+            saved = msgspec.json.decode(event.body, type=Expected)
+            fields = {
+                "graph": saved.graph,
+                "graph_name": saved.graph_name,
+                "run": saved.run,
+                "at": saved.at,
+                "seq": event.seq,
+            }
+            statement = upsert(expectation).values(name=saved.name, **fields)
+            return (statement.on_conflict_do_update(index_elements=["name"], set_=fields),)
+        case Retired.kind:
+            gone = msgspec.json.decode(event.body, type=Retired)
+            return (expectation.delete().where(expectation.c.name == gone.name),)
+        case _:
+            return ()

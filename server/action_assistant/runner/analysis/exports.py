@@ -1,0 +1,195 @@
+"""Runs as files for other programs: JSON lines, CSV of intervals, and MCAP for Foxglove."""
+
+import csv
+import io
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Final
+
+import msgspec
+from mcap.writer import CompressionType, Writer
+
+from action_assistant.journal.events import Event
+from action_assistant.runner.analysis.keyframes import fold
+from action_assistant.runner.links.observations import NodeResult, NodeState, Snapshot
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.durations import of_visit
+from action_assistant.runner.runs.events import Observed
+from action_assistant.runner.runs.run import Run
+from action_assistant.version import VERSION
+
+#: A cell that begins so would be a formula to a spreadsheet.
+_FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
+_COLUMNS: Final = (
+    "action",
+    "visit",
+    "from",
+    "until",
+    "not_before",
+    "not_after",
+    "seconds",
+    "result",
+    "how",
+    "seconds_least",
+    "seconds_most",
+)
+_ANY: Final = b'{"type":"object"}'
+#: Of foxglove.Log, so that its panel shows what actions and engines say.
+_LOG: Final = msgspec.json.encode(
+    {
+        "type": "object",
+        "properties": {
+            "timestamp": {
+                "type": "object",
+                "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}},
+            },
+            "level": {"type": "integer"},
+            "message": {"type": "string"},
+            "name": {"type": "string"},
+        },
+    }
+)
+_INFO, _ERROR = 2, 4  # levels of foxglove.Log
+
+
+class EventLine(msgspec.Struct, frozen=True):
+    """One stored event on a line of its own."""
+
+    run: str
+    seq: int
+    kind: str
+    author: str
+    at: str
+    body: msgspec.Raw
+
+
+def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
+    """JSON lines: every event as it is stored."""
+    for each in events:
+        at = views.time(each.at).isoformat().replace("+00:00", "Z")
+        line = EventLine(run, each.seq, each.kind, each.author, at, msgspec.Raw(each.body))
+        yield msgspec.json.encode(line) + b"\n"
+
+
+def intervals(run: Run) -> bytes:
+    """CSV: a line per visit, in the order they began. Empty where nothing is known, so is `seconds`
+    where only its bounds are, which follow at the end."""
+    text = io.StringIO()
+    sheet = csv.writer(text)
+    sheet.writerow(_COLUMNS)
+    rows = [
+        (visit.start, name, number, visit)
+        for name, action in run.actions.items()
+        for number, visit in enumerate(action.visits, action.older + 1)
+    ]
+    for _, name, number, visit in sorted(rows, key=lambda row: row[:3]):
+        took = of_visit(visit)
+        seconds, *bounds = (
+            (None, None, None) if took is None else (took.exact, took.least, took.most)
+        )
+        moments = (visit.start, visit.until, visit.not_before, visit.not_after)
+        shown = ("" if each is None else views.time(each).isoformat() for each in moments)
+        told = [_cell(name), number, *shown, _figure(seconds), visit.result or "", visit.how]
+        sheet.writerow([*told, *map(_figure, bounds)])
+    return text.getvalue().encode()
+
+
+def _figure(seconds: float | None) -> str:
+    return "" if seconds is None else f"{seconds:.3f}"
+
+
+def _cell(text: str) -> str:
+    return f"'{text}" if text.startswith(_FORMULA) else text
+
+
+def mcap(events: Iterable[Event]) -> bytes:
+    """MCAP with JSON messages: `/run` (state), `/actions/NAME` (state and result, when they were shown),
+    `/visits/NAME` (a visit that has ended, between its bounds, when that was known), `/log`."""
+    out = io.BytesIO()
+    writer = Writer(out, compression=CompressionType.NONE)
+    writer.start(profile="", library=f"temoto-action-assistant {VERSION}")
+    track = _Track(writer)
+    fold(None, list(events), track.see)
+    finish: Callable[[], None] = writer.finish
+    finish()
+    return out.getvalue()
+
+
+class _Track:
+    """Writes what every event showed, at the time when it was shown."""
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        self._channels: dict[str, int] = {}
+        self._schemas = {
+            "run": writer.register_schema("action_assistant.Run", "jsonschema", _ANY),
+            "action": writer.register_schema("action_assistant.Action", "jsonschema", _ANY),
+            "visit": writer.register_schema("action_assistant.Visit", "jsonschema", _ANY),
+            "log": writer.register_schema("foxglove.Log", "jsonschema", _LOG),
+        }
+        self._count = 0
+
+    def see(self, event: Event, told: Any, before: Run | None, after: Run) -> None:
+        """One event."""
+        at = getattr(told, "at", event.at)
+        if before is None or before.state != after.state or before.desired != after.desired:
+            body = {"state": after.state, "desired": after.desired, "result": after.result}
+            self._write("run", "/run", at, {**body, "event": event.kind})
+        if isinstance(told, Observed):
+            for item in told.seen:
+                self._seen(item)
+        self._ended(at, before, after)
+        self._said(before, after)
+
+    def _ended(self, at: int, before: Run | None, after: Run) -> None:
+        for name, action in after.actions.items():
+            was = before.actions.get(name) if before is not None else None
+            if was is action:
+                continue
+            known = () if was is None else was.visits
+            for number, visit in enumerate(action.visits, action.older + 1):
+                if visit.until is not None and visit not in known:
+                    shown = msgspec.to_builtins(views.visit(visit))
+                    body = {"visit": number, **shown, "took": of_visit(visit)}
+                    self._write("visit", f"/visits/{name}", at, body)
+
+    def _seen(self, item: object) -> None:
+        match item:
+            case NodeState():
+                topic = f"/actions/{item.graph}/{item.node}"
+                self._write("action", topic, item.at, {"state": item.state, "how": "observed"})
+            case NodeResult():
+                topic = f"/actions/{item.graph}/{item.node}"
+                self._write("action", topic, item.at, {"result": item.result, "how": "observed"})
+            case Snapshot():
+                for node, state in item.nodes.items():
+                    shown = {"state": state, "how": item.source}
+                    self._write("action", f"/actions/{item.graph}/{node}", item.at, shown)
+            case _:
+                return
+
+    def _said(self, before: Run | None, after: Run) -> None:
+        old_alarms = before.alarms if before is not None else ()
+        for alarm in after.alarms:
+            if alarm not in old_alarms:
+                self._log(alarm.at, _ERROR, alarm.code, alarm.text)
+        for name, action in after.actions.items():
+            was = before.actions.get(name) if before is not None else None
+            if was is action:
+                continue
+            for message in action.messages:
+                if was is None or message not in was.messages:
+                    self._log(message.at, _INFO, name, message.text)
+
+    def _log(self, at: int, level: int, name: str, text: str) -> None:
+        stamp = {"sec": at // 1_000_000, "nsec": at % 1_000_000 * 1000}
+        body = {"timestamp": stamp, "level": level, "message": text, "name": name}
+        self._write("log", "/log", at, body)
+
+    def _write(self, schema: str, topic: str, at: int, body: Mapping[str, Any]) -> None:
+        channel = self._channels.get(topic)
+        if channel is None:
+            channel = self._writer.register_channel(topic, "json", self._schemas[schema])
+            self._channels[topic] = channel
+        self._count += 1
+        data = msgspec.json.encode(body)
+        self._writer.add_message(channel, at * 1000, data, at * 1000, sequence=self._count)

@@ -1,0 +1,262 @@
+"""Keyframes of a run: its fold at every so many events, and the marks between them.
+
+Folding a long run anew for every question would cost seconds, so the fold is kept at every
+`APART`th event. Keyframes are a cache in the journal: they may vanish at any time.
+"""
+
+import asyncio
+import bisect
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
+
+import msgspec
+
+from action_assistant.errors import BadInput, NotFound, Refused
+from action_assistant.journal.events import Event, StreamSnapshot
+from action_assistant.runner.runs.events import (
+    AlarmRaised,
+    Ended,
+    ModifyRefused,
+    ModifyRequested,
+    MovesAgain,
+    Observed,
+    PauseRequested,
+    Requested,
+    ResumeRequested,
+    RunEvent,
+    Silent,
+    StopRequested,
+    StopSent,
+    decode,
+)
+from action_assistant.runner.runs.fold import begin, follow
+from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.runs.run import Run
+from action_assistant.web.workers.lanes import RunInWorker
+
+#: Raise it when `runs.follow` tells something else of the same events: older keyframes are void then.
+FOLD: Final = 3
+#: Events between two keyframes, and in one page of a film.
+APART: Final = 2_000
+#: Marks that are kept of one run.
+MARKS: Final = 2_000
+#: Shorter runs are folded anew; that takes less time than looking for keyframes.
+_WORTH: Final = 500
+_KEPT: Final = 8  # runs whose keyframes stay in memory
+
+
+class Keyframe(msgspec.Struct, frozen=True):
+    """A run after its first `seq` events, the last of which happened at `at` (microseconds UTC)."""
+
+    seq: int
+    at: int
+    run: Run
+
+
+class ReplayMark(msgspec.Struct, frozen=True):
+    """An event that shows nothing of the engine: a wish, a message sent, a silence, a proof, an
+    alarm. `at` and `since` are microseconds UTC; `by` is a person's name."""
+
+    seq: int
+    at: int
+    kind: str
+    by: str = ""
+    text: str = ""
+    since: int | None = None
+
+
+class RunKeyframes(msgspec.Struct, frozen=True):
+    """Keyframes in order; the last one is the newest that was folded. `marks`: the first
+    `MARKS` of the run."""
+
+    fold: int
+    keys: tuple[Keyframe, ...]
+    marks: tuple[ReplayMark, ...] = ()
+
+    def before(self, seq: int) -> Keyframe | None:
+        """The last keyframe at or before `seq`."""
+        place = bisect.bisect_right(self.keys, seq, key=lambda key: key.seq)
+        return self.keys[place - 1] if place else None
+
+    def until(self, at: int) -> Keyframe | None:
+        """The last keyframe of what had happened by `at`."""
+        place = bisect.bisect_right(self.keys, at, key=lambda key: key.at)
+        return self.keys[place - 1] if place else None
+
+
+class SnapshotJournal(Ledger, Protocol):
+    """A ledger that also keeps what a stream adds up to."""
+
+    async def snapshot(self, stream: str) -> StreamSnapshot | None:
+        """What was kept, if it still fits the stream."""
+        ...
+
+    async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
+        """Keep what a stream adds up to at `seq`. Raises Unavailable."""
+        ...
+
+
+class KeyframeStore:
+    """The keyframes of all runs."""
+
+    def __init__(self, ledger: SnapshotJournal, run_in_worker: RunInWorker) -> None:
+        self.run_in_worker = run_in_worker
+        self._ledger = ledger
+        self._known: OrderedDict[str, RunKeyframes] = OrderedDict()
+        self._asking: dict[str, asyncio.Lock] = {}
+
+    async def keyframes(self, run: str) -> RunKeyframes:
+        """The keyframes of a run, up to its newest event. Raises NotFound, Unavailable."""
+        lock = self._asking.setdefault(run, asyncio.Lock())
+        async with lock:
+            found = await self._wound(run)
+        self._asking.pop(run, None)
+        return found
+
+    async def at(self, run: str, seq: int) -> Run:
+        """The run as its first `seq` events tell it. Raises NotFound, BadInput."""
+        if seq < 1:
+            raise BadInput("A run begins with its first event.", where={"path": "/seq"})
+        key = (await self.keyframes(run)).before(seq)
+        if key is not None and key.seq == seq:
+            return key.run
+        events = await self._ledger.read(stream_of(run), after=key.seq if key else 0, upto=seq)
+        return (await self.run_in_worker(lambda: _next(key, events))).run
+
+    async def seq_at(self, run: str, at: int) -> int:
+        """The first event by which this moment had come. Raises NotFound, Unavailable."""
+        key = (await self.keyframes(run)).until(at - 1)
+        events = await self.page(run, key.seq if key else 0)
+
+        def found() -> int:
+            for event in events:
+                if getattr(decode(event.kind, event.body), "at", event.at) >= at:
+                    return event.seq
+            return events[-1].seq if events else key.seq if key else 1
+
+        return await self.run_in_worker(found)
+
+    async def page(self, run: str, after: int) -> Sequence[Event]:
+        """Events of one page, those with `seq > after`."""
+        return await self._ledger.read(stream_of(run), after=after, limit=APART)
+
+    async def _wound(self, run: str) -> RunKeyframes:
+        stream = stream_of(run)
+        newest = await self._ledger.newest(stream)
+        if not newest:
+            raise NotFound("There is no such run.")
+        keyframes = self._known.get(run) or await self._kept(stream)
+        keys = list(keyframes.keys) if keyframes is not None else []
+        marks = list(keyframes.marks) if keyframes is not None else []
+        had = keys[-1].seq if keys else 0
+        while not keys or keys[-1].seq < newest:
+            last = keys[-1] if keys else None
+            after = last.seq if last else 0
+            room = APART - after % APART  # keyframes stand at whole multiples, and at the end
+            events = await self._ledger.read(stream, after=after, limit=room)
+            if not events:
+                break
+            key = await self.run_in_worker(lambda last=last, events=events: _next(last, events))
+            marks += marks_of(events)
+            if last is not None and last.seq % APART:
+                keys.pop()  # an end that has gone on is no keyframe
+            keys.append(key)
+        if not keys:
+            raise NotFound("There is no such run.")
+        found = RunKeyframes(FOLD, tuple(keys), tuple(marks[:MARKS]))
+        self._remember(run, found)
+        if keys[-1].run.end is not None and keys[-1].seq > max(had, _WORTH):
+            await self._keep(stream, found)
+        return found
+
+    async def _kept(self, stream: str) -> RunKeyframes | None:
+        kept = await self._ledger.snapshot(stream)
+        if kept is None:
+            return None
+        try:
+            keyframes = await self.run_in_worker(
+                lambda: msgspec.msgpack.decode(kept.state, type=RunKeyframes)
+            )
+        except msgspec.DecodeError:
+            return None
+        return keyframes if keyframes.fold == FOLD and keyframes.keys else None
+
+    async def _keep(self, stream: str, keyframes: RunKeyframes) -> None:
+        state = await self.run_in_worker(lambda: msgspec.msgpack.encode(keyframes))
+        try:
+            await self._ledger.keep_snapshot(stream, keyframes.keys[-1].seq, state)
+        except Refused:
+            return  # a cache: it is made again when the journal can be written
+
+    def _remember(self, run: str, keyframes: RunKeyframes) -> None:
+        self._known[run] = keyframes
+        self._known.move_to_end(run)
+        while len(self._known) > _KEPT:
+            self._known.popitem(last=False)
+
+
+def fold(
+    run: Run | None,
+    events: Sequence[Event],
+    see: "Callable[[Event, RunEvent, Run | None, Run], None]",
+) -> Run | None:
+    """Go on from `run`; `see` is shown every step: event, what it says, the run before and after."""
+    for event in events:
+        told = decode(event.kind, event.body)
+        before = run
+        if run is not None:
+            run = follow(run, told)
+        elif isinstance(told, Requested):
+            run = begin(told)
+        if run is not None:
+            see(event, told, before, run)
+    return run
+
+
+def marks_of(events: Sequence[Event]) -> list[ReplayMark]:
+    """The marks among these events."""
+    marks: list[ReplayMark] = []
+    for event in events:
+        if event.kind == Observed.kind:
+            continue
+        told = decode(event.kind, event.body)
+        by, text = words(told)
+        since = told.since if isinstance(told, Silent) else None
+        marks.append(
+            ReplayMark(event.seq, getattr(told, "at", event.at), event.kind, by, text, since)
+        )
+    return marks
+
+
+def words(told: RunEvent) -> tuple[str, str]:
+    """Who, and what an event says beside its effect."""
+    match told:
+        case Requested():
+            return told.author.name, told.override.reason if told.override else ""
+        case PauseRequested() | ResumeRequested() | ModifyRequested() | StopRequested():
+            return told.author.name, ""
+        case StopSent():
+            return "", told.failed or f"attempt {told.attempt}"
+        case Silent() | ModifyRefused():
+            return "", told.why
+        case AlarmRaised() | MovesAgain():
+            return "", told.text
+        case Ended():
+            return "", told.detail
+        case _:
+            return "", ""
+
+
+def _next(last: Keyframe | None, events: Sequence[Event]) -> Keyframe:
+    at = last.at if last is not None else 0
+
+    def see(event: Event, told: RunEvent, _: Run | None, __: Run) -> None:
+        nonlocal at
+        at = max(at, getattr(told, "at", event.at))
+
+    run = fold(last.run if last is not None else None, events, see)
+    if run is None:
+        raise NotFound("There is no such run.")
+    return Keyframe(events[-1].seq, at, run)

@@ -1,0 +1,209 @@
+"""The replay of a run: what every event changed in what was known, page by page.
+
+A frame carries only what differs from the one before, so the page shows at every moment exactly
+what the live view showed then: later knowledge never leaks into the past.
+"""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any, Final
+
+import msgspec
+
+from action_assistant.journal.events import Event
+from action_assistant.runner.analysis.keyframes import APART, KeyframeStore, ReplayMark, fold, words
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import RunEvent
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun
+
+_HEAD: Final = (
+    "state",
+    "desired",
+    "result",
+    "proof_at",
+    "unknown_since",
+    "moves_again_at",
+    "started_at",
+    "ended_at",
+    "detail",
+)
+
+
+class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """What became of an action. From the visit number `first` on (counted from 0, over all its
+    visits) they are now `visits`; `messages` are new."""
+
+    state: str
+    first: int
+    visits: list[views.VisitShown] = []
+    messages: list[views.MessageShown] = []
+    aid: str | None = None
+
+
+class ReplayFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """One event: `head` has the fields of the run that changed, `actions` those that did."""
+
+    seq: int
+    at: datetime
+    kind: str
+    by: str = ""
+    text: str = ""
+    head: dict[str, Any] = {}
+    actions: dict[str, ActionFrame] = {}
+    alarms: list[views.AlarmShown] = []
+
+
+class Chapter(msgspec.Struct, frozen=True):
+    """Where a page of the film begins: after `after` events, at `at`."""
+
+    after: int
+    at: datetime
+
+
+class MarkShown(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Something that happened around the actions; `since`: from when on nothing was known."""
+
+    seq: int
+    at: datetime
+    kind: str
+    by: str = ""
+    text: str = ""
+    since: datetime | None = None
+
+
+class RunReplay(msgspec.Struct, frozen=True, kw_only=True):
+    """A page of a run's film. `base` is the run after `after` events, null at the very beginning;
+    `newest` is the last event there is."""
+
+    run: str
+    after: int
+    newest: int
+    base: views.RunShown | None
+    frames: list[ReplayFrame]
+    chapters: list[Chapter]
+    marks: list[MarkShown]
+
+
+async def run_replay(keyframe_store: KeyframeStore, run: str, *, after: int) -> RunReplay:
+    """The page that begins after `after` events, which is rounded down to a keyframe of the run.
+
+    Raises NotFound, Unavailable.
+    """
+    keyframes = await keyframe_store.keyframes(run)
+    start = after - after % APART
+    base = keyframes.before(start) if start else None
+    events = await keyframe_store.page(run, base.seq if base else 0)
+    frames = await keyframe_store.run_in_worker(lambda: _frames(base.run if base else None, events))
+    chapters = [Chapter(0, views.time(keyframes.keys[0].run.requested_at))]
+    chapters += [Chapter(key.seq, views.time(key.at)) for key in keyframes.keys[:-1]]
+    return RunReplay(
+        run=run,
+        after=base.seq if base else 0,
+        newest=keyframes.keys[-1].seq,
+        base=views.shown(base.run) if base else None,
+        frames=frames,
+        chapters=chapters,
+        marks=[_shown(mark) for mark in keyframes.marks],
+    )
+
+
+def _shown(mark: ReplayMark) -> MarkShown:
+    return MarkShown(
+        seq=mark.seq,
+        at=views.time(mark.at),
+        kind=mark.kind,
+        by=mark.by,
+        text=mark.text,
+        since=views.time(mark.since) if mark.since is not None else None,
+    )
+
+
+def _frames(run: Run | None, events: Sequence[Event]) -> list[ReplayFrame]:
+    frames: list[ReplayFrame] = []
+    at = 0
+
+    def see(event: Event, told: RunEvent, before: Run | None, after: Run) -> None:
+        nonlocal at
+        at = max(at, getattr(told, "at", event.at))  # clocks may be set back; replay never is
+        frames.append(frame(event, told, before, after, at))
+
+    fold(run, events, see)
+    return frames
+
+
+def frame(event: Event, told: RunEvent, before: Run | None, after: Run, at: int) -> ReplayFrame:
+    """What one event changed."""
+    by, text = words(told)
+    old = before.alarms if before is not None else ()
+    return ReplayFrame(
+        seq=event.seq,
+        at=views.time(at),
+        kind=event.kind,
+        by=by,
+        text=text,
+        head=_head(before, after),
+        actions=_actions(before, after),
+        alarms=[
+            views.AlarmShown(each.code, views.time(each.at), each.text)
+            for each in after.alarms
+            if each not in old
+        ],
+    )
+
+
+def _head(before: Run | None, after: Run) -> dict[str, Any]:
+    changed: dict[str, Any] = {}
+    for name in _HEAD:
+        now = getattr(after, name)
+        if before is None or getattr(before, name) != now:
+            changed[name] = views.time(now) if name.endswith(("_at", "_since")) and now else now
+    if after.stopped_by is not None and (before is None or before.stopped_by is None):
+        changed["stopped_by"] = after.stopped_by
+    return changed
+
+
+def _actions(before: Run | None, after: Run) -> dict[str, ActionFrame]:
+    old = before.actions if before is not None else {}
+    return {
+        name: _changed(old.get(name), action)
+        for name, action in after.actions.items()
+        if _looks_new(old.get(name), action)
+    }
+
+
+def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
+    """Whether anybody would see a difference; when it was seen last nobody does."""
+    if before is None:
+        return True
+    return before is not after and (
+        before.state != after.state
+        or before.aid != after.aid
+        or before.visits != after.visits
+        or before.messages != after.messages
+    )
+
+
+def _changed(before: ActionRun | None, after: ActionRun) -> ActionFrame:
+    """Visits change at their end only: the first that differs is looked for from there."""
+    total = after.older + len(after.visits)
+    known = before.older + len(before.visits) if before is not None else 0
+    first = total
+    while first > after.older:
+        place = first - 1
+        if (
+            before is not None
+            and before.older <= place < known
+            and before.visits[place - before.older] == after.visits[place - after.older]
+        ):
+            break
+        first = place
+    heard = before.messages if before is not None else ()
+    fresh = [each for each in after.messages if each not in heard]
+    return ActionFrame(
+        aid=after.aid,
+        state=after.state,
+        first=first,
+        visits=[views.visit(each) for each in after.visits[first - after.older :]],
+        messages=[views.MessageShown(views.time(each.at), each.text) for each in fresh],
+    )

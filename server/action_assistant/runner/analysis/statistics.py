@@ -1,0 +1,204 @@
+"""Many runs of one graph at once: how often it succeeds, how long actions take, what never happens."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
+
+import msgspec
+from sqlalchemy import Row, Select, select, union_all
+
+from action_assistant.runner.runs.durations import Took, at_rank, took_us
+from action_assistant.schema.runner_tables import action_sum, run
+from action_assistant.umrf.model import EXIT, PRECONDITIONS, Graph, Relation
+
+_OUTCOMES: Final = ("true", "false", "error", "stopped")
+
+
+class RunPoint(msgspec.Struct, frozen=True):
+    """One run in a row of runs. `took` in seconds where that is known exactly; `span` is between which
+    bounds, None where nothing is known."""
+
+    id: str
+    number: int
+    state: str
+    result: str | None
+    took: float | None
+    span: Took | None
+
+
+class Spans(msgspec.Struct, frozen=True, kw_only=True):
+    """Durations of an action, each between its bounds."""
+
+    p50: Took | None
+    p90: Took | None
+    p99: Took | None
+    longest: Took | None
+
+
+class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
+    """One action over all these runs. Durations are seconds over `timed` visits, those that have ended,
+    and stand where they are known exactly; `spans` has all of them between their bounds. `unknown`
+    counts visits whose result is not known."""
+
+    action: str
+    aid: str | None
+    runs: int
+    visits: int
+    results: dict[str, int]
+    unknown: int
+    inferred: int
+    timed: int
+    p50: float | None
+    p90: float | None
+    p99: float | None
+    longest: float | None
+    spans: Spans
+
+
+class NeverTaken(msgspec.Struct, frozen=True):
+    """An arrow whose parent ran, and is known never to have ended as the arrow waits for
+    (`outcomes`)."""
+
+    parent: str
+    child: str
+    outcomes: list[str]
+
+
+class Statistics(msgspec.Struct, frozen=True, kw_only=True):
+    """What the newest `runs` of a graph have in common. `judged` are those whose result is known, and
+    says something about the graph (neither refused, lost nor stopped); `succeeded` are those of them
+    that finished true. `unknown` have finished, and nobody knows with which result: robots do not tell.
+    Of `untold` arrows it is not known whether they were ever taken."""
+
+    runs: list[RunPoint]
+    judged: int
+    succeeded: int
+    unknown: int
+    actions: list[ActionStatistics]
+    never_taken: list[NeverTaken]
+    untold: int
+
+
+def runs_of(graph: str, engine: str | None, last: int) -> Select[Any]:
+    """The newest runs of a graph (id or name) that are over."""
+    newest = [
+        select(run.c.id)
+        .where(column == graph, run.c.ended_at.is_not(None))
+        .where(*([] if engine is None else [run.c.engine == engine]))
+        .order_by(run.c.number.desc())
+        .limit(last)
+        .subquery()
+        for column in (run.c.graph, run.c.graph_name)
+    ]
+    wanted = (run.c.id, run.c.number, run.c.state, run.c.result, run.c.summary)
+    named = union_all(*(select(each) for each in newest))
+    return select(*wanted).where(run.c.id.in_(named)).order_by(run.c.number.desc()).limit(last)
+
+
+def sums_of(runs: Sequence[str]) -> Select[Any]:
+    """The sums of these runs' actions."""
+    return select(action_sum).where(action_sum.c.run.in_(runs))
+
+
+def statistics(
+    runs: Sequence[Row[Any]], sums: Iterable[Row[Any]], newest: Graph | None
+) -> Statistics:
+    """Put it together. `newest` is the graph of the newest run, for its arrows."""
+    ended = [row for row in runs if row.state in {"finished", "error", "halted"}]
+    judged = [row for row in ended if row.state != "finished" or row.result is not None]
+    by_action: dict[str, list[Row[Any]]] = {}
+    for row in sums:
+        by_action.setdefault(row.action, []).append(row)
+    actions = [_action(name, rows) for name, rows in sorted(by_action.items())]
+    never, untold = _never_taken(newest, {each.action: each for each in actions})
+    return Statistics(
+        runs=[_point(row) for row in runs],
+        judged=len(judged),
+        succeeded=sum(row.result == "on_true" and row.state == "finished" for row in judged),
+        unknown=len(ended) - len(judged),
+        actions=actions,
+        never_taken=never,
+        untold=untold,
+    )
+
+
+def _point(row: Row[Any]) -> RunPoint:
+    kept = row.summary.get("took")
+    span = None if kept is None else Took(least=kept["least"], most=kept["most"])
+    took = None if span is None else span.exact
+    return RunPoint(row.id, row.number, row.state, row.result, took, span)
+
+
+def _action(name: str, rows: Sequence[Row[Any]]) -> ActionStatistics:
+    took = [_took(each) for row in rows for each in row.took]
+    spans = Spans(
+        p50=at_rank(took, 0.5),
+        p90=at_rank(took, 0.9),
+        p99=at_rank(took, 0.99),
+        longest=at_rank(took, 1),
+    )
+    results = {
+        outcome: total
+        for outcome in _OUTCOMES
+        if (total := sum(row.results.get(outcome, 0) for row in rows))
+    }
+    visits = sum(row.visits for row in rows)
+    return ActionStatistics(
+        action=name,
+        aid=next((row.aid for row in rows if row.aid), None),
+        runs=sum(row.visits > 0 for row in rows),
+        visits=visits,
+        results=results,
+        unknown=visits - sum(results.values()),
+        inferred=sum(row.inferred for row in rows),
+        timed=len(took),
+        p50=_exact(spans.p50),
+        p90=_exact(spans.p90),
+        p99=_exact(spans.p99),
+        longest=_exact(spans.longest),
+        spans=spans,
+    )
+
+
+def _took(kept: Any) -> Took:
+    """Rows of older versions have the microseconds that it took at least."""
+    if isinstance(kept, list):
+        return Took(least=kept[0], most=kept[1])
+    return took_us(kept, None)
+
+
+def _exact(span: Took | None) -> float | None:
+    return None if span is None else span.exact
+
+
+def _never_taken(
+    graph: Graph | None, actions: Mapping[str, ActionStatistics]
+) -> tuple[list[NeverTaken], int]:
+    """Those that are known never to have been taken, and of how many others nothing is known."""
+    if graph is None:
+        return [], 0
+    names = {each.key: each.full_name for each in graph.actions} | {EXIT: EXIT}
+    found: list[NeverTaken] = []
+    untold = 0
+    for arrow in graph.relations:
+        parent = actions.get(names.get(arrow.parent, ""))
+        if parent is None or parent.visits == 0 or arrow.child not in names:
+            continue
+        outcomes = _outcomes(arrow)
+        if not outcomes or any(parent.results.get(each) for each in outcomes):
+            continue
+        if parent.unknown == 0:
+            found.append(NeverTaken(parent.action, names[arrow.child], outcomes))
+        elif not _must_have_been(arrow, graph, actions.get(names[arrow.child])):
+            untold += 1
+    return found, untold
+
+
+def _outcomes(arrow: Relation) -> list[str]:
+    live = [each for each in PRECONDITIONS if arrow.conditions.answer(each) != "ignore"]
+    return [each.removeprefix("on_") for each in live]
+
+
+def _must_have_been(arrow: Relation, graph: Graph, child: ActionStatistics | None) -> bool:
+    """Whether its child has run, and nothing else leads there."""
+    ways = [each for each in graph.relations if each.child == arrow.child and _outcomes(each)]
+    return child is not None and child.visits > 0 and len(ways) == 1

@@ -1,0 +1,67 @@
+"""The caller of a route: who asks the runner, from where, and the body they send."""
+
+import ipaddress
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any, Final
+
+import anyio
+from litestar import Request
+from litestar.connection import ASGIConnection
+
+from action_assistant.errors import Unavailable
+from action_assistant.runner.runs.events import Author
+from action_assistant.web.auth.access import person_of, session_of
+from action_assistant.web.network.connection_limits import ConcurrencyLimit
+
+#: Bytes of a body that carries a graph: 5,000 actions, the most that the editor takes, are 1.2 MB.
+LARGE: Final = 2_000_000
+#: Bytes of any other body.
+SMALL: Final = 100_000
+_BODY_S: Final = 60.0
+
+
+def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
+    """The person behind a request or a socket. Programs send the token, browsers have a session."""
+    person = person_of(connection)
+    return Author(
+        person.id,
+        person.name,
+        by="program" if session_of(connection) is None else "browser",
+        address=_address(connection.client.host if connection.client else ""),
+    )
+
+
+@asynccontextmanager
+async def body_of(
+    request: Request[Any, Any, Any], body_limit: ConcurrencyLimit
+) -> AsyncIterator[bytes]:
+    """A body that may be large: of one person few are in memory at a time, and it has to come in
+    time. Raises TooLarge, Unavailable."""
+    async with body_limit.turn(person_of(request).id):
+        try:
+            with anyio.fail_after(_BODY_S):
+                body = await request.body()
+        except TimeoutError as late:
+            raise Unavailable(f"The body did not come within {_BODY_S:.0f} s.") from late
+        yield body
+
+
+async def start_of(request: Request[Any, Any, Any], most: int, seconds: float) -> bytes:
+    """What comes of a body soon, `most` bytes of it at most."""
+    found = b""
+    with anyio.move_on_after(seconds):
+        async for part in request.stream():
+            found += part[: most - len(found)]
+            if len(found) >= most:
+                break
+    return found
+
+
+def _address(host: str) -> str:
+    """An address on the network; "" for this computer itself, and for what is no address."""
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return ""
+    return "" if address.is_loopback else str(address)

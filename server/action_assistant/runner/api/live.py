@@ -1,0 +1,326 @@
+"""The live socket: the state of runs and engines to every page; Stop, from any of them.
+
+Nothing queues up behind a slow page: of each run only the newest state waits, and the answer to a
+Stop goes before it.
+"""
+
+import logging
+import math
+from collections import deque
+from collections.abc import Awaitable, Callable
+from datetime import datetime
+from typing import Any, Final
+from weakref import WeakKeyDictionary
+
+import anyio
+import anyio.lowlevel
+import msgspec
+from litestar import WebSocket
+from litestar.exceptions import WebSocketDisconnect, WebSocketException
+
+from action_assistant.errors import Refused
+from action_assistant.runner.api.caller import author_of
+from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.robots.registration import Robot
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.run import Run
+from action_assistant.web.auth.access import session_of
+
+log: Final = logging.getLogger(__name__)
+
+_GAP_S: Final = 0.05  # between two states of one run
+_SHARE: Final = 20  # at most one part in so many of the time goes into encoding one run
+_BEAT_S: Final = 1.0
+_SEND_S: Final = 15.0
+_AT_ONCE: Final = 250  # actions that are put together without letting go
+_ENGINES_GAP_S: Final = 0.25  # between two lists of engines
+_LETTERS: Final = 64
+_TOO_SLOW: Final = 1013
+_LONGEST: Final = 10_000  # characters of a message from the page
+
+
+class StopMessage(msgspec.Struct, frozen=True, tag="stop", tag_field="type"):
+    """The one thing that a page may say."""
+
+    run: str
+    stop_id: str = ""
+
+
+class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
+    """The runs that a Stop concerns."""
+
+    stop_id: str
+    runs: list[str]
+
+
+class RefusedMessage(msgspec.Struct, frozen=True, tag="refused", tag_field="type"):
+    """Why a message was not followed."""
+
+    stop_id: str
+    detail: str
+
+
+class Hello(msgspec.Struct, frozen=True, tag="hello", tag_field="type"):
+    """The first message."""
+
+    engines: list[Robot]
+    runs: list[views.RunShown]
+
+
+class RunMessage(msgspec.Struct, frozen=True, tag="run", tag_field="type"):
+    """A run as it is now."""
+
+    run: views.RunShown
+
+
+class EnginesMessage(msgspec.Struct, frozen=True, tag="engines", tag_field="type"):
+    """All engines, since one is not as it was."""
+
+    engines: list[Robot]
+
+
+class Beat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
+    """Once a second: the link is alive. `seen`: when each open run was last shown by its engine;
+    `heard`: when each robot last answered."""
+
+    at: datetime
+    seen: dict[str, datetime]
+    heard: dict[str, datetime]
+
+
+class EncodedRun(msgspec.Struct, frozen=True):
+    """An encoded run, what encoding it took (seconds), and when it may be encoded again."""
+
+    revision: int
+    text: str
+    cost: float
+    next: float
+
+
+class Hub:
+    """Everybody who watches."""
+
+    def __init__(self, control: ExecutionService, clock_us: ClockUs) -> None:
+        self.control = control
+        self.clock_us = clock_us
+        self.boxes: set[Outbox] = set()
+        self._frames: WeakKeyDictionary[OpenRun, EncodedRun] = WeakKeyDictionary()
+        self._memos: WeakKeyDictionary[OpenRun, views.Memo] = WeakKeyDictionary()
+        self._engines: str | None = None
+        control.watch(self._changed)
+        control.watch_robots(self._robots_changed)
+
+    def _robots_changed(self) -> None:
+        self._engines = None
+        for box in self.boxes:
+            box.mark_engines()
+
+    def engines(self) -> str:
+        """All engines as text; encoded once for everybody."""
+        if self._engines is None:
+            message = EnginesMessage(list(self.control.robots.all()))
+            self._engines = msgspec.json.encode(message).decode()
+        return self._engines
+
+    def beat(self) -> str:
+        """A sign of life."""
+        seen = {
+            run: views.time(opened.watch.seen_at)
+            for run, opened in self.control.open.items()
+            if opened.watch.seen_at is not None
+        }
+        heard = {name: views.time(at) for name, at in self.control.robots.heard().items()}
+        return _text(Beat(views.time(self.clock_us()), seen, heard))
+
+    def _changed(self, opened: OpenRun) -> None:
+        for box in self.boxes:
+            box.mark(opened)
+
+    def frame(self, opened: OpenRun) -> EncodedRun:
+        """A run as text; encoded once for everybody."""
+        frame = self._frames.get(opened)
+        if frame is None or frame.revision != opened.revision:
+            began = anyio.current_time()
+            text = msgspec.json.encode(RunMessage(self.shown(opened))).decode()
+            now = anyio.current_time()
+            frame = EncodedRun(opened.revision, text, now - began, now + _SHARE * (now - began))
+            self._frames[opened] = frame
+        return frame
+
+    def due(self, opened: OpenRun) -> float:
+        """When a run may be encoded again: however many watch, it takes a share of the time."""
+        frame = self._frames.get(opened)
+        return 0.0 if frame is None or frame.revision == opened.revision else frame.next
+
+    async def hello(self) -> str:
+        """All that goes on now. Nobody waits while many large runs are put together."""
+        for opened in tuple(self.control.open.values()):
+            await self.work_out(opened)
+        runs = [self.shown(opened) for opened in self.control.open.values()]
+        return msgspec.json.encode(Hello(list(self.control.robots.all()), runs)).decode()
+
+    async def work_out(self, opened: OpenRun) -> None:
+        """Make sure that showing a run takes little time now."""
+        await work_out(opened.run, self.memo(opened))
+
+    def memo(self, opened: OpenRun) -> views.Memo:
+        """What was shown of a run so far."""
+        return self._memos.setdefault(opened, views.Memo())
+
+    def shown(self, opened: OpenRun) -> views.RunShown:
+        """A run as it is now."""
+        recorded = opened.recorder.recorded
+        return views.shown(opened.run, recorded=recorded, memo=self.memo(opened))
+
+    async def follow(self, text: str, author: Author) -> str:
+        """Do what a page says; the answer."""
+        stop_id = ""
+        try:
+            if len(text) > _LONGEST:
+                raise msgspec.ValidationError("too long")
+            message = msgspec.json.decode(text, type=StopMessage)
+            stop_id = message.stop_id
+            if message.run == "all":
+                runs = self.control.stop_all(author, stop_id)
+            else:
+                runs = await self.control.stop(message.run, author, stop_id)
+        except msgspec.DecodeError as wrong:
+            return _text(RefusedMessage(stop_id, f"Not understood: {wrong}"))
+        except Refused as refused:
+            return _text(RefusedMessage(stop_id, refused.detail))
+        return _text(Stopping(stop_id, runs))
+
+
+async def work_out(run: Run, memo: views.Memo) -> None:
+    """Know how a run is shown, without doing nothing else meanwhile."""
+    for _ in memo.work_out(run, _AT_ONCE):
+        await anyio.lowlevel.checkpoint()
+
+
+class Outbox:
+    """What waits for one page: answers in order, and which runs have changed."""
+
+    def __init__(self, hub: Hub, is_allowed: Callable[[], bool]) -> None:
+        self._hub = hub
+        self._is_allowed = is_allowed
+        self._letters: deque[str] = deque()
+        self._changed: dict[str, OpenRun] = {}
+        self._next: dict[str, float] = {}  # run -> when it may be sent again
+        self._engines_at = math.inf  # when the engines are to be sent
+        self._engines_next = 0.0  # not before
+        self._news = anyio.Event()
+
+    def mark(self, opened: OpenRun) -> None:
+        """A run has changed."""
+        if self._changed.get(opened.run.id) is not opened:
+            self._changed[opened.run.id] = opened
+            self._news.set()
+
+    def mark_engines(self) -> None:
+        """A robot has changed."""
+        if self._engines_at == math.inf:
+            self._engines_at = self._engines_next
+            self._news.set()
+
+    def post(self, text: str) -> bool:
+        """An answer; false when the page has left too many unread."""
+        self._letters.append(text)
+        self._news.set()
+        return len(self._letters) <= _LETTERS
+
+    async def deliver(self, send: Callable[[str], Awaitable[None]]) -> None:
+        """Send until cancelled. `TimeoutError` when the page does not read."""
+        beat = anyio.current_time() + _BEAT_S
+        while True:
+            self._news = anyio.Event()
+            while (text := self._pick(beat)) is not None:
+                with anyio.fail_after(_SEND_S):
+                    await send(text)
+                if text.startswith('{"type":"beat"'):
+                    beat = anyio.current_time() + _BEAT_S
+            runs = (self._due(run, opened) for run, opened in self._changed.items())
+            due = min([beat, self._engines_at, *runs])
+            with anyio.move_on_after(max(0.0, due - anyio.current_time())):
+                await self._news.wait()
+
+    def _due(self, run: str, opened: OpenRun) -> float:
+        return max(self._next.get(run, 0.0), self._hub.due(opened))
+
+    def _pick(self, beat: float) -> str | None:
+        """The next thing to send: answers, then a beat, then runs whose turn has come."""
+        now = anyio.current_time()
+        if self._letters:
+            return self._letters.popleft()
+        if now >= beat:
+            return self._hub.beat()
+        if not self._is_allowed():
+            self._changed.clear()
+            self._engines_at = math.inf
+            return None
+        if now >= self._engines_at:
+            self._engines_at = math.inf
+            self._engines_next = now + _ENGINES_GAP_S
+            return self._hub.engines()
+        for run, opened in self._changed.items():
+            if self._due(run, opened) <= now:
+                del self._changed[run]
+                frame = self._hub.frame(opened)
+                self._next[run] = now + max(_GAP_S, _SHARE * frame.cost)
+                if opened.run.end is not None and opened.recorder.idle:
+                    self._next.pop(run)
+                return frame.text
+        return None
+
+
+async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
+    """Serve one page until it goes away. The Stop of an expired session is followed, but it is
+    shown nothing more."""
+    session = session_of(socket)
+    author = author_of(socket)
+    box = Outbox(hub, lambda: session is None or not session.expired)
+    await socket.accept()
+    box.post(await hub.hello())
+    hub.boxes.add(box)
+    try:
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(_read, socket, hub, box, author, tasks.cancel_scope)
+            await _write(socket, box)
+            tasks.cancel_scope.cancel()
+    finally:
+        hub.boxes.discard(box)
+
+
+async def _read(
+    socket: WebSocket[Any, Any, Any],
+    hub: Hub,
+    box: Outbox,
+    author: Author,
+    scope: anyio.CancelScope,
+) -> None:
+    try:
+        while True:
+            text = await socket.receive_text()
+            if not box.post(await hub.follow(text, author)):
+                await socket.close(code=_TOO_SLOW, reason="too slow")
+                break
+    except (WebSocketDisconnect, WebSocketException, OSError):
+        pass  # the page has gone; nothing of it is kept
+    scope.cancel()
+
+
+async def _write(socket: WebSocket[Any, Any, Any], box: Outbox) -> None:
+    try:
+        await box.deliver(socket.send_text)
+    except TimeoutError:
+        log.info("a page does not read; its live socket is closed")
+        with anyio.move_on_after(1):
+            await socket.close(code=_TOO_SLOW, reason="too slow")
+    except (WebSocketDisconnect, WebSocketException, OSError):
+        pass
+
+
+def _text(message: Stopping | RefusedMessage | Beat) -> str:
+    return msgspec.json.encode(message).decode()

@@ -1,0 +1,222 @@
+"""The routes of review: replays, marks, comparisons, statistics, files, expectations."""
+
+import time
+from collections.abc import AsyncIterator
+from typing import Annotated, Any, Final, Protocol
+
+import msgspec
+from anyio import to_thread
+from litestar import Request, Response, delete, get, patch, post
+from litestar.params import Parameter
+from litestar.response import Stream
+from litestar.types import ControllerRouterHandler
+
+from action_assistant import paths
+from action_assistant.errors import BadInput
+from action_assistant.runner.analysis import annotations, expected_runs
+from action_assistant.runner.analysis.comparison import RunComparison
+from action_assistant.runner.analysis.replay import RunReplay
+from action_assistant.runner.analysis.statistics import Statistics
+from action_assistant.runner.api.caller import LARGE, author_of, body_of
+from action_assistant.runner.api.openapi import FitOperation
+from action_assistant.runner.archives import examples
+from action_assistant.runner.archives.raw_messages import RawMessages
+from action_assistant.runner.archives.retention import Retention, Swept
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.review.service import (
+    CauseShown,
+    Expectation,
+    Format,
+    ReviewService,
+    RunMarks,
+)
+from action_assistant.runner.review.worker_queries import WorkerQueries, json_of
+from action_assistant.runner.start.admission import decoded
+from action_assistant.web.auth.access import Needs
+from action_assistant.web.network.connection_limits import ConcurrencyLimit
+
+_Asking = Request[Any, Any, Any]
+_TYPES: Final[dict[str, str]] = {
+    "jsonl": "application/x-ndjson",
+    "csv": "text/csv; charset=utf-8",
+    "mcap": "application/octet-stream",
+}
+
+
+class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A run whose course shall be expected from now on, under a name."""
+
+    run: str
+    name: str
+
+
+class Fit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Another version of the graph of a run; `action` (a name of the run) may have a `fault`."""
+
+    umrf: msgspec.Raw
+    action: str | None = None
+    fault: expected_runs.Fault | None = None
+
+
+class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Put away what is older than so many days; null leaves it here."""
+
+    runs: Annotated[float, msgspec.Meta(ge=0)] | None = None
+    raw: Annotated[float, msgspec.Meta(ge=0)] | None = None
+
+
+class ReviewServices(Protocol):
+    """What these routes work on; all of it is there before the first request. What only reads is
+    `asked` of a worker."""
+
+    control: ExecutionService
+    review_service: ReviewService
+    asked: WorkerQueries
+    retention: Retention
+    body_limit: ConcurrencyLimit
+
+
+def routes(services: ReviewServices) -> list[ControllerRouterHandler]:
+    """All routes."""
+    return [*_of_one(services), *_of_many(services), *_expecting(services), _archiving(services)]
+
+
+def _archiving(services: ReviewServices) -> ControllerRouterHandler:
+    @post(
+        "/api/archive",
+        status_code=200,
+        summary="Put some of what is old into archives; ask again while there is more",
+        guards=[Needs("restore")],
+    )
+    async def archive(data: Sweep) -> Swept:
+        return await services.retention.sweep(data.runs, data.raw)
+
+    return archive
+
+
+def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
+    @get("/api/runs/{run:str}/film", summary="What every event of a run changed, a page at a time")
+    async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Response[RunReplay]:
+        return json_of(await services.asked.text(ReviewService.replay, run, after), RunReplay)
+
+    @get("/api/runs/{run:str}/causes", summary="What is proven to be behind the end of a run")
+    async def found_causes(run: str) -> Response[list[CauseShown]]:
+        return json_of(await services.asked.text(ReviewService.causes, run), list[CauseShown])
+
+    @get("/api/runs/{run:str}/umrf", summary="The graph of a run as it was sent")
+    async def umrf(run: str) -> Response[bytes]:
+        return json_of(await services.asked.value(ReviewService.umrf, run), bytes)
+
+    @get("/api/runs/{run:str}/marks", summary="What people noted about a run")
+    async def marks(run: str) -> RunMarks:
+        return await services.review_service.marks(run)
+
+    @patch("/api/runs/{run:str}/marks", summary="Pin, note or label a run", guards=[Needs("edit")])
+    async def mark(run: str, data: annotations.Marks, request: _Asking) -> RunMarks:
+        return await services.review_service.mark(run, data, author_of(request))
+
+    @get("/api/runs/{run:str}/script", summary="What a run did, as a script for the simulator")
+    async def script(
+        run: str, action: str | None = None, fault: expected_runs.Fault | None = None
+    ) -> Response[expected_runs.Recorded]:
+        text = await services.asked.text(ReviewService.script, run, _fault(action, fault))
+        return json_of(text, expected_runs.Recorded)
+
+    @post(
+        "/api/runs/{run:str}/script",
+        status_code=200,
+        summary="What a run did, as a script for another version of its graph",
+        operation_class=FitOperation,
+        guards=[Needs("see")],
+        request_max_body_size=LARGE,
+    )
+    async def fit(run: str, request: _Asking) -> Response[expected_runs.Recorded]:
+        async with body_of(request, services.body_limit) as body:
+            asked = decoded(body, Fit)
+            fault = _fault(asked.action, asked.fault)
+            text = await services.asked.text(ReviewService.script, run, fault, bytes(asked.umrf))
+        return json_of(text, expected_runs.Recorded)
+
+    @get("/api/runs/{run:str}/export", summary="A run as a file: jsonl, csv or mcap")
+    async def export(
+        run: str, form: Annotated[Format, Parameter(query="format")]
+    ) -> Response[bytes] | Stream:
+        head = {"content-disposition": f'attachment; filename="run.{form}"'}
+        if form == "jsonl":
+            seq, first = await services.asked.value(ReviewService.lines, run, 0)
+            lines = _lines(services.asked, run, seq, first)
+            return Stream(lines, media_type=_TYPES[form], headers=head)
+        content = await services.asked.value(ReviewService.export, run, form)
+        return Response(content, media_type=_TYPES[form], headers=head)
+
+    @get("/api/runs/{run:str}/raw", summary="Where the raw messages from the time of a run are")
+    async def raw(run: str) -> Response[RawMessages]:
+        found = await services.control.find(run)
+        kept = services.control.robots.recordings
+        here = [] if found.simulated or kept is None else await kept.listed(found.engine)
+        text = await services.asked.text(ReviewService.raw, run, here, time.time_ns() // 1000)
+        return json_of(text, RawMessages)
+
+    return [film, found_causes, umrf, marks, mark, script, fit, export, raw]
+
+
+async def _lines(asked: WorkerQueries, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
+    while page:
+        yield page
+        seq, page = await asked.value(ReviewService.lines, run, seq)
+
+
+def _of_many(services: ReviewServices) -> list[ControllerRouterHandler]:
+    @get("/api/comparison", summary="Two runs side by side, and where they part")
+    async def comparison(a: str, b: str) -> Response[RunComparison]:
+        return json_of(await services.asked.text(ReviewService.compare, a, b), RunComparison)
+
+    @get("/api/statistics", summary="The newest runs of a graph together")
+    async def statistics(
+        graph: str,
+        robot: str | None = None,
+        last: Annotated[int, Parameter(ge=1, le=1000)] = 200,
+    ) -> Response[Statistics]:
+        return json_of(
+            await services.asked.text(ReviewService.statistics, graph, robot, last), Statistics
+        )
+
+    @post(
+        "/api/examples",
+        summary="Take in recorded runs that failed, as examples; each is there once",
+        status_code=200,
+        guards=[Needs("edit")],
+    )
+    async def take_in_examples(request: _Asking) -> list[str]:
+        texts = await to_thread.run_sync(examples.shipped, paths.examples())
+        return await services.review_service.take_in(texts, author_of(request))
+
+    return [comparison, statistics, take_in_examples]
+
+
+def _expecting(services: ReviewServices) -> list[ControllerRouterHandler]:
+    @get("/api/expectations", summary="Runs that shall go the same for ever")
+    async def listed() -> Response[list[Expectation]]:
+        return json_of(await services.asked.text(ReviewService.expectations), list[Expectation])
+
+    @post(
+        "/api/expectations",
+        summary="Save the course of a run as what is expected",
+        guards=[Needs("edit")],
+    )
+    async def expect(data: Expect, request: _Asking) -> Expectation:
+        return await services.review_service.expect(data.run, data.name, author_of(request))
+
+    @delete("/api/expectations/{name:str}", summary="Expect it no more", guards=[Needs("edit")])
+    async def retire(name: str, request: _Asking) -> None:
+        await services.review_service.retire(name, author_of(request))
+
+    return [listed, expect, retire]
+
+
+def _fault(
+    action: str | None, fault: expected_runs.Fault | None
+) -> tuple[str, expected_runs.Fault] | None:
+    if (action is None) != (fault is None):
+        raise BadInput("A fault belongs to an action: give both, or none.")
+    return (action, fault) if action and fault else None

@@ -1,0 +1,279 @@
+"""The routes of robots: the registry, their state, commands of others, checks before starts."""
+
+from datetime import datetime
+from typing import Any, Final, Protocol, assert_never
+
+import msgspec
+from litestar import Request, Response, delete, get, patch, post
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.errors import BadInput, NotFound
+from action_assistant.runner.api.caller import LARGE, author_of, body_of
+from action_assistant.runner.api.openapi import GroupOperation, LookOperation
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
+from action_assistant.runner.robots.recordings import Recording
+from action_assistant.runner.robots.registration import Robot
+from action_assistant.runner.robots.robot_events import (
+    Commanded,
+    EngineBecame,
+    RobotEvent,
+    StopAsked,
+    StopUnproven,
+    StopWasProven,
+)
+from action_assistant.runner.runs import views
+from action_assistant.runner.start.preflight import Preflight
+from action_assistant.runner.start.start_checks import read_group
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import Signature
+from action_assistant.web.auth.access import Needs
+from action_assistant.web.network.connection_limits import ConcurrencyLimit
+from action_assistant.web.workers.lanes import RunInWorker
+
+_EVENTS: Final = 200
+_Asking = Request[Any, Any, Any]
+
+
+class RobotServices(Protocol):
+    """What these routes work on."""
+
+    control: ExecutionService
+    body_limit: ConcurrencyLimit
+    run_in_worker: RunInWorker
+
+
+class ReachStatus(msgspec.Struct, frozen=True):
+    """All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can."""
+
+    engines: list[Robot]
+    no_reach: str
+
+
+class RobotChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What shall be different about a robot."""
+
+    domain: int | None = None
+    rmw: str | None = None
+    get_service: str | None = None
+    profile: dict[str, object] | None = None
+
+
+class KnownAction(msgspec.Struct, frozen=True):
+    """An action that a robot has indexed."""
+
+    name: str
+    inputs: dict[str, str]
+    outputs: dict[str, str]
+
+
+class RobotKnowledge(msgspec.Struct, frozen=True):
+    """What a robot can do. `unread`: files of its index that cannot be read."""
+
+    actions: list[KnownAction]
+    graphs: list[str]
+    unread: int
+
+
+class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
+    """A line of a robot's flight record. `has_graph`: its graph can be fetched."""
+
+    seq: int
+    at: datetime
+    kind: str
+    command: str = ""
+    graph: str = ""
+    sender: str = ""
+    state: str = ""
+    why: str = ""
+    run: str | None = None
+    number: int | None = None
+    has_graph: bool = False
+
+
+class RobotStopped(msgspec.Struct, frozen=True):
+    """What a Stop of a robot concerns: runs of ours, and graphs that others started."""
+
+    runs: list[str]
+    graphs: list[str]
+
+
+class GroupShown(msgspec.Struct, frozen=True, kw_only=True):
+    """Runs that were started together. `failed`: robots that nothing was sent to, and why."""
+
+    id: str
+    runs: list[views.RunShown]
+    failed: dict[str, str]
+
+
+def routes(services: RobotServices) -> list[ControllerRouterHandler]:
+    """All of them."""
+    return [*_registry(services), *_one_robot(services), *_starts(services)]
+
+
+def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
+    @get("/api/robots", summary="Engines that runs can go to")
+    async def robots() -> list[Robot]:
+        return list(services.control.robots.all())
+
+    @get("/api/reach", summary="Whether robots can be reached over ROS 2 from here")
+    async def reach() -> ReachStatus:
+        return ReachStatus(list(services.control.robots.all()), services.control.robots.no_reach)
+
+    @get("/api/candidates", summary="Engines in sight that nobody registered yet")
+    async def candidates() -> list[Candidate]:
+        return list(await services.control.robots.candidates())
+
+    @post("/api/robots", summary="Register a robot", guards=[Needs("register")])
+    async def register(data: Registration, request: _Asking) -> Response[Robot]:
+        robot = await services.control.register(data, author_of(request))
+        return Response(robot, status_code=201, headers={"location": f"/api/robots/{robot.name}"})
+
+    @patch("/api/robots/{name:str}", summary="Change a robot", guards=[Needs("register")])
+    async def change(name: str, data: RobotChange, request: _Asking) -> Robot:
+        known = services.control.robots.registration(name)
+        fields = {k: v for k, v in msgspec.structs.asdict(data).items() if v is not None}
+        changed = msgspec.structs.asdict(known) | fields
+        try:
+            asked = msgspec.convert(changed, Registration)
+        except msgspec.ValidationError as wrong:
+            raise BadInput(str(wrong)) from wrong
+        return await services.control.register(asked, author_of(request))
+
+    @delete("/api/robots/{name:str}", summary="Forget a robot", guards=[Needs("register")])
+    async def remove(name: str, request: _Asking) -> None:
+        await services.control.remove(name, author_of(request))
+
+    return [robots, reach, candidates, register, change, remove]
+
+
+def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
+    @get("/api/robots/{name:str}", summary="One engine")
+    async def robot(name: str) -> Robot:
+        if name == SIMULATOR:
+            return next(services.control.robots.all())
+        return services.control.robots.robot(name)
+
+    @get("/api/robots/{name:str}/known", summary="Actions and graphs that a robot has indexed")
+    async def known(name: str) -> RobotKnowledge:
+        index = await services.control.robots.index(name)
+        actions = [_action(action, index.actions[action]) for action in sorted(index.actions)]
+        return RobotKnowledge(actions, sorted(index.graphs), index.unread)
+
+    @get("/api/robots/{name:str}/events", summary="What others told a robot, newest first")
+    async def events(name: str) -> list[RobotLogLine]:
+        services.control.robots.registration(name)
+        found = await services.control.robots.robot_log.newest(name, _EVENTS)
+        return [_told(seq, event) for seq, event in reversed(found)]
+
+    @get("/api/robots/{name:str}/events/{seq:int}/umrf", summary="The graph of a command, as UMRF")
+    async def commanded(name: str, seq: int) -> Response[bytes]:
+        services.control.robots.registration(name)
+        return await _umrf(services, await services.control.robots.robot_log.graph(name, seq))
+
+    @get("/api/robots/{name:str}/umrf", summary="A graph that a robot holds, as UMRF")
+    async def held(name: str, graph: str) -> Response[bytes]:
+        """Without its run state: a graph that carries one must not be sent again."""
+        return await _umrf(services, services.control.robots.held(name, graph))
+
+    @get("/api/robots/{name:str}/recordings", summary="What an engine said, hour by hour")
+    async def recorded(name: str) -> list[Recording]:
+        services.control.robots.registration(name)
+        kept = services.control.robots.recordings
+        return [] if kept is None else await kept.listed(name)
+
+    @get("/api/robots/{name:str}/recordings/{file:str}", summary="An hour, as JSON lines, gzipped")
+    async def recording(name: str, file: str) -> Response[bytes]:
+        services.control.robots.registration(name)
+        kept = services.control.robots.recordings
+        if kept is None:
+            raise NotFound("Nothing is recorded here.")
+        return Response(await kept.file(name, file), media_type="application/gzip")
+
+    @post(
+        "/api/robots/{name:str}/stop",
+        status_code=202,
+        summary="Stop whatever a robot runs",
+        guards=[Needs("stop")],
+    )
+    async def stop(name: str, request: _Asking) -> RobotStopped:
+        return RobotStopped(*services.control.stop_robot(name, author_of(request)))
+
+    return [robot, known, events, commanded, held, recorded, recording, stop]
+
+
+def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/preflight",
+        status_code=200,
+        summary="What stands between a graph and its start, engine by engine",
+        operation_class=LookOperation,
+        guards=[Needs("simulate")],
+        request_max_body_size=LARGE,
+    )
+    async def look(request: _Asking) -> list[Preflight]:
+        async with body_of(request, services.body_limit) as body:
+            return await services.control.look(read_group(body))
+
+    @post(
+        "/api/groups",
+        summary="Start a version on several robots",
+        operation_class=GroupOperation,
+        guards=[Needs("operate")],
+        request_max_body_size=LARGE,
+    )
+    async def start(request: _Asking) -> Response[GroupShown]:
+        async with body_of(request, services.body_limit) as body:
+            grouped = await services.control.start_group(read_group(body), author_of(request))
+        runs = [views.shown(run) for run in grouped.runs]
+        shown = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
+        return Response(shown, status_code=201 if grouped.fresh else 200)
+
+    return [look, start]
+
+
+def _action(name: str, signature: Signature) -> KnownAction:
+    return KnownAction(name, signature.inputs, signature.outputs)
+
+
+def _told(seq: int, event: RobotEvent) -> RobotLogLine:
+    at = views.time(event.at)
+    match event:
+        case Commanded():
+            return RobotLogLine(
+                seq=seq,
+                at=at,
+                kind="commanded",
+                command=event.command,
+                graph=event.graph,
+                sender=event.sender,
+                run=event.run,
+                number=event.number,
+                has_graph=event.umrf != "",
+            )
+        case EngineBecame():
+            return RobotLogLine(seq=seq, at=at, kind="became", state=event.state, why=event.why)
+        case StopAsked():
+            by = event.author.name
+            return RobotLogLine(seq=seq, at=at, kind="stop_asked", graph=event.graph, sender=by)
+        case StopWasProven():
+            return RobotLogLine(seq=seq, at=at, kind="stop_proven", graph=event.graph)
+        case StopUnproven():
+            return RobotLogLine(
+                seq=seq, at=at, kind="stop_unproven", graph=event.graph, why=event.why
+            )
+        case _:
+            assert_never(event)
+
+
+async def _umrf(services: RobotServices, text: str) -> Response[bytes]:
+    return Response(await services.run_in_worker(canonical, text), media_type="application/json")
+
+
+def canonical(text: str) -> bytes:
+    """A graph as it can be imported. Raises NotFound when it cannot be read at all. For workers."""
+    try:
+        graph = codec.read(text).graph
+    except codec.Unreadable as wrong:
+        raise NotFound(f"What was sent is no UMRF graph: {wrong.message}") from wrong
+    return codec.write(graph).encode()

@@ -1,0 +1,319 @@
+"""The routes of the runner."""
+
+from collections.abc import AsyncIterator
+from datetime import UTC, datetime
+from typing import Annotated, Any, Final, get_args
+
+import anyio
+import msgspec
+from litestar import Request, Response, WebSocket, get, post, websocket
+from litestar.exceptions import HTTPException
+from litestar.params import Parameter
+from litestar.response import Stream
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.errors import BadInput, NotFound, TooMany
+from action_assistant.runner.api import review as review
+from action_assistant.runner.api import robots
+from action_assistant.runner.api.caller import LARGE, author_of, body_of, start_of
+from action_assistant.runner.api.live import Stopping, attend, work_out
+from action_assistant.runner.api.openapi import (
+    ModifyOperation,
+    RestOperation,
+    StartOperation,
+    StopOperation,
+)
+from action_assistant.runner.api.services import RunnerServices
+from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.runner.review import listing
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.worker_queries import json_of
+from action_assistant.runner.runs import queries, views
+from action_assistant.runner.runs.run import Run, State
+from action_assistant.runner.start.admission import decoded, read_request
+from action_assistant.web.auth.access import Needs, person_of, refuse, require
+
+_PAGE: Final = 500  # events read at once
+_STOP_BYTES: Final = 4_096  # of the body of a Stop; whatever comes after them is not read
+_STOP_S: Final = 1.0  # that a Stop waits for its body
+_ALIVE_S: Final = 15.0  # between two signs of life of an event stream
+_Asking = Request[Any, Any, Any]
+
+
+class StopBody(msgspec.Struct, frozen=True):
+    """`stop_id` is made by the page, once per press; the same press may come by several ways."""
+
+    stop_id: str = ""
+
+
+def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
+    """All routes."""
+    return [
+        *_starts(services),
+        *_moves(services),
+        *_reads(services),
+        *robots.routes(services),
+        *review.routes(services),
+        _live(services),
+    ]
+
+
+def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/runs",
+        summary="Start a version, at most once per request_id",
+        operation_class=StartOperation,
+        guards=[Needs("simulate")],
+        request_max_body_size=LARGE,
+    )
+    async def start(request: _Asking) -> Response[views.RunShown]:
+        async with body_of(request, services.body_limit) as body:
+            asked = read_request(body)
+            if asked.engine != SIMULATOR:
+                require(request, "operate")
+            started = await services.control.start(asked, author_of(request))
+        return Response(
+            await _shown(services, started.run),
+            status_code=201 if started.fresh else 200,
+            headers={"location": f"/api/runs/{started.run.id}"},
+        )
+
+    @get("/api/starts/{request_id:str}", summary="What has become of a start, by its request_id")
+    async def started(request_id: str) -> views.StartShown:
+        under_way = services.control.under_way(
+            request_id
+        )  # before: what it becomes is stored by then
+        rows = await services.control.history.rows(queries.of_start(request_id))
+        runs = [await services.control.find(row.id) for row in rows]
+        found = [await _shown(services, run) for run in runs]
+        return views.StartShown(request_id=request_id, under_way=under_way, runs=found)
+
+    return [start, started]
+
+
+def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/stop",
+        status_code=202,
+        summary="Stop everything",
+        operation_class=StopOperation,
+        guards=[Needs("stop")],
+    )
+    async def stop_all(request: _Asking) -> Stopping:
+        stop_id = await _stop_id(request)
+        return Stopping(stop_id, services.control.stop_all(author_of(request), stop_id))
+
+    @post(
+        "/api/runs/{run:str}/stop",
+        status_code=202,
+        summary="Stop a run",
+        operation_class=StopOperation,
+        guards=[Needs("stop")],
+    )
+    async def stop(run: str, request: _Asking) -> Stopping:
+        stop_id = await _stop_id(request)
+        return Stopping(stop_id, await services.control.stop(run, author_of(request), stop_id))
+
+    @post(
+        "/api/runs/{run:str}/pause",
+        status_code=202,
+        summary="Pause a run",
+        guards=[Needs("simulate")],
+    )
+    async def pause(run: str, request: _Asking) -> views.RunShown:
+        await _require_hand_on(services, run, request)
+        return views.shown(await services.control.pause(run, author_of(request)))
+
+    @post(
+        "/api/runs/{run:str}/resume",
+        status_code=202,
+        summary="Let a paused run go on",
+        guards=[Needs("simulate")],
+    )
+    async def resume(run: str, request: _Asking) -> views.RunShown:
+        await _require_hand_on(services, run, request)
+        return views.shown(await services.control.resume(run, author_of(request)))
+
+    @post(
+        "/api/runs/{run:str}/modify",
+        status_code=202,
+        summary="Change a running graph, where its engine makes that safe",
+        operation_class=ModifyOperation,
+        guards=[Needs("simulate")],
+        request_max_body_size=LARGE,
+    )
+    async def modify(run: str, request: _Asking) -> views.RunShown:
+        await _require_hand_on(services, run, request)
+        async with body_of(request, services.body_limit) as body:
+            return views.shown(await services.control.modify(run, body, author_of(request)))
+
+    @post(
+        "/api/runs/{run:str}/at_rest",
+        status_code=200,
+        summary="Confirm that a run is at rest which no answer of its engine can prove so",
+        operation_class=RestOperation,
+        guards=[Needs("operate")],
+    )
+    async def at_rest(run: str, request: _Asking) -> views.RunShown:
+        asked = decoded(await request.body(), RestRequest)
+        return views.shown(await services.control.confirm_rest(run, asked, author_of(request)))
+
+    return [stop_all, stop, pause, resume, modify, at_rest]
+
+
+def _reads(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @get("/api/runs", summary="Runs, newest first")
+    async def listed(
+        graph: str | None = None,
+        robot: str | None = None,
+        run_state: Annotated[str | None, Parameter(query="state")] = None,
+        failed: bool | None = None,
+        version: str | None = None,
+        person: str | None = None,
+        text: str | None = None,
+        label: str | None = None,
+        pinned: bool | None = None,
+        since: datetime | None = None,
+        until: datetime | None = None,
+        before: str | None = None,
+        limit: Annotated[int, Parameter(ge=1, le=1000)] = 200,
+    ) -> Response[list[views.Listed]]:
+        states = _states(run_state)
+        wanted = queries.Filter(
+            graph=graph,
+            engine=robot,
+            states=states,
+            failed=failed,
+            version=version,
+            person=person,
+            text=text.strip() or None if text is not None else None,
+            label=label,
+            pinned=pinned,
+            since=_us(since),
+            until=_us(until),
+            before=before,
+        )
+        going = {
+            run: views.summary(opened.run, recorded=opened.recorder.recorded)
+            for run, opened in services.control.open.items()
+        }
+        found = await services.asked.text(listing.listed, wanted, limit, going)
+        return json_of(found, list[views.Listed])
+
+    @get("/api/labels", summary="Labels of runs, the most used first")
+    async def every_label() -> list[str]:
+        rows = await services.control.history.rows(queries.all_labels())
+        return [row.label for row in rows]
+
+    @get("/api/runs/{run:str}", summary="A run, and the graph as it was sent")
+    async def one(run: str) -> Response[views.RunWhole]:
+        opened = services.control.open.get(run)
+        if opened is None:
+            return json_of(await services.asked.text(ReviewService.whole, run), views.RunWhole)
+        if opened not in services.sent:
+            services.sent[opened] = await services.asked.value(ReviewService.sent, run)
+        opened = services.control.open.get(run, opened)
+        await services.hub.work_out(opened)
+        whole = views.whole(
+            opened.run,
+            services.sent[opened],
+            recorded=opened.recorder.recorded,
+            memo=services.hub.memo(opened),
+        )
+        return json_of(msgspec.json.encode(whole), views.RunWhole)
+
+    @get("/api/runs/{run:str}/events", summary="A run's events as they are stored (SSE)")
+    async def events(run: str, request: _Asking) -> Stream | Response[None]:
+        after = _last_event_id(request)
+        opened = services.control.open.get(run)
+        newest = await services.asked.newest(run)
+        if not newest:
+            raise NotFound("There is no such run.")
+        if newest <= after and (opened is None or opened.run.end is not None):
+            return Response(None, status_code=204)  # tells an EventSource not to come again
+        return Stream(
+            _tail(services, run, after),
+            media_type="text/event-stream",
+            headers={"cache-control": "no-store"},
+        )
+
+    return [listed, every_label, one, events]
+
+
+def _live(services: RunnerServices) -> ControllerRouterHandler:
+    @websocket("/api/live")
+    async def live(socket: WebSocket[Any, Any, Any]) -> None:
+        address = socket.client.host if socket.client is not None else ""
+        try:
+            with services.connection_limits.admitted(person_of(socket).id, address):
+                await attend(socket, services.hub)
+        except TooMany as refused:
+            await refuse(socket.scope, socket.receive, socket.send, refused)
+
+    return live
+
+
+async def _require_hand_on(services: RunnerServices, run: str, request: _Asking) -> None:
+    """Who may steer this run: more is needed for one on a robot. Raises Forbidden, NotFound."""
+    if not await services.control.simulates(run):
+        require(request, "operate")
+
+
+async def _stop_id(request: _Asking) -> str:
+    """Whatever the body is: a Stop is never refused for its form."""
+    try:
+        body = await start_of(request, _STOP_BYTES, _STOP_S)
+        return msgspec.json.decode(body, type=StopBody).stop_id[:100]
+    except (msgspec.DecodeError, HTTPException, RecursionError):
+        return ""
+
+
+async def _shown(services: RunnerServices, run: Run) -> views.RunShown:
+    """As it is now, put together without holding up others."""
+    opened = services.control.open.get(run.id)
+    if opened is not None:
+        await services.hub.work_out(opened)
+        return services.hub.shown(opened)
+    memo = views.Memo()
+    await work_out(run, memo)
+    return views.shown(run, memo=memo)
+
+
+def _states(asked: str | None) -> tuple[str, ...]:
+    """States, separated by commas. Raises BadInput."""
+    states = tuple(each.strip() for each in (asked or "").split(",") if each.strip())
+    if unknown := [each for each in states if each not in get_args(State)]:
+        raise BadInput(f"No run is ever {unknown[0]!r}.", where={"path": "/state"})
+    return states
+
+
+def _us(moment: datetime | None) -> int | None:
+    if moment is None:
+        return None
+    whole = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
+    return round(whole.timestamp() * 1_000_000)
+
+
+def _last_event_id(request: _Asking) -> int:
+    asked = request.headers.get("last-event-id", "0")
+    if not asked.isascii() or not asked.isdigit():
+        raise BadInput("Last-Event-ID is the seq of the last event that was read.")
+    return int(asked)
+
+
+async def _tail(services: RunnerServices, run: str, after: int) -> AsyncIterator[bytes]:
+    """Stored events, then those that come, until the run is over."""
+    while True:
+        opened = services.control.open.get(run)
+        revision = opened.revision if opened is not None else 0
+        if await services.asked.newest(run) > after:
+            after, page = await services.asked.value(listing.streamed, run, after)
+            yield page
+            continue
+        if opened is None:
+            return
+        with anyio.move_on_after(_ALIVE_S) as waited:
+            await services.control.change(run, revision)
+        if waited.cancelled_caught:
+            yield b": alive\n\n"

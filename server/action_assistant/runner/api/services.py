@@ -1,0 +1,36 @@
+"""What the routes of the runner work on."""
+
+from typing import Final
+from weakref import WeakKeyDictionary
+
+from action_assistant.journal.journal import Journal
+from action_assistant.runner.api.live import Hub
+from action_assistant.runner.archives.retention import Retention
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.worker_queries import WorkerQueries
+from action_assistant.runner.runs import views
+from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
+from action_assistant.web.workers.lanes import RunInWorker
+
+_BODIES: Final = 4  # large ones of a person at a time
+
+
+class RunnerServices:
+    """What the routes work on; filled when the process is up, before the first request."""
+
+    control: ExecutionService
+    hub: Hub
+    connection_limits: ConnectionLimits
+    journal: Journal
+    review_service: ReviewService
+    asked: WorkerQueries
+    retention: Retention
+    body_limit: ConcurrencyLimit
+    run_in_worker: RunInWorker
+    sent: WeakKeyDictionary[OpenRun, views.Sent]
+
+    def __init__(self) -> None:
+        self.sent = WeakKeyDictionary()
+        self.body_limit = ConcurrencyLimit(_BODIES)

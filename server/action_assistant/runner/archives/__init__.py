@@ -1,0 +1,1 @@
+"""Runs in files: archives, retention, raw messages, shipped examples."""

@@ -1,0 +1,120 @@
+"""The store of runs, of which older ones may be in archives: read as if they were in the
+journal.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from sqlalchemy import Row, Select, select
+
+from action_assistant.errors import Refused
+from action_assistant.journal.chain import Head
+from action_assistant.journal.events import Addition, Draft, Event, StreamSnapshot
+from action_assistant.journal.removal import StreamRemoved
+from action_assistant.runner.analysis.keyframes import SnapshotJournal
+from action_assistant.runner.archives import archive_file
+from action_assistant.runner.runs import views
+from action_assistant.schema.runner_tables import run
+from action_assistant.web.workers.lanes import RunInWorker
+
+_PREFIX: Final = "run/"
+_KEPT: Final = 64 << 20  # bytes of events from archives in memory
+
+
+class Archived(Refused):
+    """The run is in an archive that is not here"""
+
+    status = 410
+
+
+class Journaled(SnapshotJournal, Protocol):
+    """The journal itself."""
+
+    async def end(self, stream: str) -> Head:
+        """The last event of a stream, and the chain up to it."""
+        ...
+
+    async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
+        """Say that a stream is kept elsewhere from now on. Raises Conflict, Unavailable."""
+        ...
+
+    async def delete_some(self, stream: str, by: int) -> bool:
+        """Delete some of its events; whether any are left."""
+        ...
+
+
+class ArchiveStore:
+    """Reads a run from its archive in `folder` once it stands there. Everything else is the
+    journal's."""
+
+    def __init__(self, journal: SnapshotJournal, folder: Path, run_in_worker: RunInWorker) -> None:
+        self.folder = folder
+        self._journal = journal
+        self._run_in_worker = run_in_worker
+        self._read: OrderedDict[str, tuple[list[Event], int]] = OrderedDict()
+
+    async def append(
+        self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
+    ) -> int:
+        """As the journal's."""
+        return await self._journal.append(stream, drafts, expected=expected)
+
+    async def newest(self, stream: str) -> int:
+        """As the journal's, which knows the end of what was taken out."""
+        return await self._journal.newest(stream)
+
+    async def query(self, statement: Select[Any]) -> list[Row[Any]]:
+        """As the journal's."""
+        return await self._journal.query(statement)
+
+    async def snapshot(self, stream: str) -> StreamSnapshot | None:
+        """None for a run in an archive: its keyframes went with it."""
+        return None if await self.place(stream) else await self._journal.snapshot(stream)
+
+    async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
+        """Not for a run in an archive."""
+        if await self.place(stream) is None:
+            await self._journal.keep_snapshot(stream, seq, state)
+
+    async def read(
+        self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
+    ) -> list[Event]:
+        """Events of a stream in order. Raises Archived when its archive is not here, Damaged."""
+        place = await self.place(stream)
+        if place is None:
+            return await self._journal.read(stream, after=after, upto=upto, limit=limit)
+        events = await self._events(stream, place)
+        last = len(events) if upto is None else min(upto, len(events))
+        return list(islice(events, after, last if limit is None else min(last, after + limit)))
+
+    async def place(self, stream: str) -> Row[Any] | None:
+        """Number of a run, when it was archived and as which file; None when it is here."""
+        if not stream.startswith(_PREFIX):
+            return None
+        wanted = select(run.c.number, run.c.archived_at, run.c.archived_as).where(
+            run.c.id == stream.removeprefix(_PREFIX), run.c.archived_at.is_not(None)
+        )
+        rows = await self._journal.query(wanted)
+        return rows[0] if rows else None
+
+    async def _events(self, stream: str, place: Row[Any]) -> list[Event]:
+        if stream not in self._read:
+            path = self.folder / place.archived_as
+            try:
+                events = await self._run_in_worker(lambda: list(archive_file.read(path)))
+            except OSError as error:
+                raise Archived(
+                    f"Run {place.number} was archived on {views.time(place.archived_at):%Y-%m-%d} "
+                    f"as {place.archived_as}, which is not in {self.folder} ({error.strerror}). "
+                    "`action-assistant runs restore FILE` puts it back."
+                ) from error
+            if not events or events[0].stream != stream:
+                raise archive_file.Damaged(f"{place.archived_as} holds another run.")
+            self._read[stream] = events, sum(len(each.body) + 200 for each in events)
+        self._read.move_to_end(stream)
+        while len(self._read) > 1 and sum(size for _, size in self._read.values()) > _KEPT:
+            self._read.popitem(last=False)
+        return self._read[stream][0]

@@ -1,0 +1,59 @@
+"""Runs as files that can be imported: the examples that the product ships.
+
+One JSON object per line and event: `kind`, `author`, `at` (microseconds UTC) and `body`. What is taken
+in was recorded elsewhere, so it is marked: no robot of this place moved.
+"""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.errors import BadInput
+from action_assistant.journal.events import Draft, Event
+from action_assistant.runner.runs.events import Requested, decode, encode
+
+ENDING: Final = ".run.jsonl"
+#: The label that examples carry.
+LABEL: Final = "example"
+
+
+class _Line(msgspec.Struct, frozen=True):
+    kind: str
+    author: str
+    at: int
+    body: msgspec.Raw
+
+
+def written(events: Iterable[Event]) -> bytes:
+    """A stream as a file."""
+    lines = (_Line(each.kind, each.author, each.at, msgspec.Raw(each.body)) for each in events)
+    return b"".join(msgspec.json.encode(line) + b"\n" for line in lines)
+
+
+def read(text: bytes) -> tuple[Requested, tuple[Draft, ...]]:
+    """The first event of a file, and those that follow. Raises BadInput."""
+    try:
+        lines = [msgspec.json.decode(each, type=_Line) for each in text.splitlines() if each]
+        first = decode(lines[0].kind, bytes(lines[0].body)) if lines else None
+    except msgspec.DecodeError as wrong:
+        raise BadInput(f"This is no recorded run: {wrong}") from wrong
+    if not isinstance(first, Requested):
+        raise BadInput("This is no recorded run: it does not begin with a start.")
+    rest = tuple(Draft(each.kind, each.author, bytes(each.body)) for each in lines[1:])
+    return first, rest
+
+
+def numbered(first: Requested, number: int) -> Draft:
+    """The first event as it is stored here, under the next free number."""
+    here = msgspec.structs.replace(
+        first, number=number, simulated=True, graph=None, request_id=f"example/{first.run}"
+    )
+    return Draft(here.kind, here.author.id, encode(here))
+
+
+def shipped(folder: Path) -> Sequence[bytes]:
+    """The examples, in the order of their beginning."""
+    texts = [path.read_bytes() for path in folder.glob(f"*{ENDING}")]
+    return sorted(texts, key=lambda text: read(text)[0].at)

@@ -1,0 +1,79 @@
+"""The raw messages of a robot from the time of a run: here, in an archive, or nowhere."""
+
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+from typing import ClassVar
+
+import msgspec
+
+from action_assistant.runner.robots.recordings import Recording, hours
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.run import Run
+
+
+class RawPut(msgspec.Struct, frozen=True):
+    """An hour of raw messages of a robot was put into an archive and deleted here."""
+
+    kind: ClassVar[str] = "raw.archived.v1"
+
+    at: int
+    robot: str
+    name: str
+    file: str
+    bytes: int
+    sha256: str
+
+
+def stream_of_raw(robot: str) -> str:
+    """The stream that tells where raw messages of a robot are kept."""
+    return f"raw/{robot}"
+
+
+class RawHour(msgspec.Struct, frozen=True):
+    """An hour of raw messages: its name, bytes (gzipped), and, when it is not here any more, since
+    when it is archived and in which file of the folder of archives."""
+
+    name: str
+    bytes: int
+    archived_at: datetime | None = None
+    file: str | None = None
+
+
+class RawMessages(msgspec.Struct, frozen=True):
+    """The raw messages of `robot` from the hours of a run, the oldest first. `text`: what there is to
+    say about it."""
+
+    robot: str
+    hours: list[RawHour]
+    text: str
+
+
+def raw_of(run: Run, here: Sequence[Recording], gone: Iterable[RawPut], until: int) -> RawMessages:
+    """What there is. `here` and `gone` are of its robot, `here` of its time alone."""
+    if run.simulated:
+        return RawMessages(run.engine, [], "A simulated engine sends no messages.")
+    first, last = hours(run.started_at or run.requested_at, until)
+    found = {
+        put.name: RawHour(put.name, put.bytes, views.time(put.at), put.file)
+        for put in gone
+        if first <= put.name[: len(first)] <= last
+    }
+    found |= {each.name: RawHour(each.name, each.bytes) for each in here}
+    listed = [found[name] for name in sorted(found)]
+    return RawMessages(run.engine, listed, _text(listed))
+
+
+def _text(found: Sequence[RawHour]) -> str:
+    if not found:
+        return "No raw messages of that time are kept."
+    archived = [each for each in found if each.archived_at is not None]
+    if not archived:
+        return ""
+    last = archived[-1]
+    day = f"{last.archived_at:%Y-%m-%d}"
+    many = (
+        f"Raw messages of {len(archived)} of {len(found)} hours were"
+        if len(found) > 1
+        else ("Raw messages were")
+    )
+    return f"{many} archived on {day} to {last.file}."

@@ -1,0 +1,226 @@
+"""Keeps what is old in archives: written, read back and proven before anything is deleted.
+
+A run goes in four steps, each of which may be the last one: its archive is written under another name;
+it is proven and renamed; the log says where the events are kept; they are deleted, some at a time. So
+every event is in the log, or in an archive that is complete.
+"""
+
+import logging
+from collections.abc import Callable
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import anyio
+import msgspec
+from sqlalchemy import Row, Select, exists, literal, or_, select
+
+from action_assistant.errors import Conflict, Refused
+from action_assistant.journal.events import Addition, Draft
+from action_assistant.journal.removal import StreamRemoved
+from action_assistant.runner.analysis import annotations
+from action_assistant.runner.archives import archive_file
+from action_assistant.runner.archives.archive_store import Journaled
+from action_assistant.runner.archives.raw_messages import RawPut, stream_of_raw
+from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.robots.recordings import Recordings
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.schema.runner_tables import review, run, runner_event
+from action_assistant.settings import Keep
+from action_assistant.web.workers.lanes import RunInWorker
+
+log: Final = logging.getLogger(__name__)
+
+_DAY_US: Final = 86_400_000_000
+_EVERY_S: Final = 3_600.0
+_BREATH_S: Final = 0.02  # between two steps: others come first
+_PAGE: Final = 500
+_AT_ONCE: Final = 20
+
+
+class Swept(msgspec.Struct, frozen=True, kw_only=True):
+    """What was put away: runs, hours of raw messages; `more`: there is more to do; `problems`: what
+    stays here, and why."""
+
+    runs: int = 0
+    raw: int = 0
+    more: bool = False
+    problems: list[str] = []
+
+
+class Retention:
+    """Puts away what is old. Nothing here waits for a run or is waited for by one."""
+
+    def __init__(
+        self,
+        journal: Journaled,
+        recordings: Recordings | None,
+        keep: Keep,
+        *,
+        is_open: Callable[[str], bool],
+        clock_us: ClockUs,
+        run_in_worker: RunInWorker,
+    ) -> None:
+        self.keep = keep
+        self._journal = journal
+        self._recordings = recordings
+        self._is_open = is_open
+        self._clock_us = clock_us
+        self._run_in_worker = run_in_worker
+        self._one = anyio.Lock()
+        self._left_over = True  # an earlier process may have ended between two steps
+
+    async def run(self) -> None:
+        """Now and then, until cancelled."""
+        while True:
+            try:
+                swept = await self.sweep(self.keep.runs, self.keep.raw)
+            except Refused as refused:
+                swept = Swept(problems=[refused.detail])
+            except Exception as error:  # whatever lies in its folders, runs go on
+                log.exception("what is old cannot be put away")
+                swept = Swept(problems=[str(error)])
+            for problem in swept.problems:
+                log.warning("%s", problem)
+            if not swept.more or swept.problems:
+                await anyio.sleep(_EVERY_S)
+
+    async def sweep(self, run_days: float | None, raw_days: float | None) -> Swept:
+        """Put away some of what is older than so many days. Raises Unavailable."""
+        async with self._one:
+            await self._finish()
+            found = Swept()
+            if raw_days is not None:
+                found = await self._sweep_raw(raw_days)
+            if run_days is None:
+                return found
+            before = self._clock_us() - round(run_days * _DAY_US)
+            rows = await self._journal.query(_due(before, _AT_ONCE + 1))
+            problems = list(found.problems)
+            done = 0
+            for row in rows[:_AT_ONCE]:
+                if self._is_open(row.id):
+                    continue
+                try:
+                    await self._put_away(row)
+                    done += 1
+                except (Refused, OSError) as why:
+                    detail = why.detail if isinstance(why, Refused) else str(why)
+                    problems.append(f"Run {row.number} stays here: {detail}")
+            more = len(rows) > _AT_ONCE and done > 0
+            return Swept(runs=done, raw=found.raw, more=more, problems=problems)
+
+    async def _put_away(self, row: Row[Any]) -> None:
+        """One run. Raises Refused, OSError; then it is here as before."""
+        stream = stream_of(row.id)
+        end = await self._journal.end(stream)
+        place = _place(row)
+        path = self.keep.folder / place
+        written = await self._run_in_worker(
+            lambda: archive_file.ArchiveFile(path, stream, place, end)
+        )
+        try:
+            after = 0
+            while events := await self._journal.read(stream, after=after, limit=_PAGE):
+                await self._run_in_worker(partial(written.add, events))
+                after = events[-1].seq
+                await anyio.sleep(_BREATH_S)
+            digest = await self._run_in_worker(written.close)
+        finally:
+            written.abandon()
+        at = self._clock_us()
+        removed = StreamRemoved(stream, end.seq, end.chain.hex(), place, digest)
+
+        def told(by: int) -> Addition:
+            put = annotations.Put(at, place, digest, by, _fields(row))
+            return Addition(annotations.stream_about(row.id), (annotations.draft(put),))
+
+        if await self._journal.query(_pinned(row.id)):
+            raise Conflict("Somebody has pinned it meanwhile.")
+        self._left_over = True
+        by = await self._journal.take_out(removed, told)
+        await self._clear(stream, by)
+        self._left_over = False
+
+    async def _clear(self, stream: str, by: int) -> None:
+        left = True
+        while left:
+            left = await self._journal.delete_some(stream, by)
+            await anyio.sleep(_BREATH_S)
+
+    async def _finish(self) -> None:
+        """Delete what an earlier process had said to be kept elsewhere, and then not deleted."""
+        if not self._left_over:
+            return
+        for row in await self._journal.query(_unfinished()):
+            told = await self._journal.read(annotations.stream_about(row.id))
+            put = next(event for event in reversed(told) if event.kind == annotations.Put.kind)
+            by = msgspec.json.decode(put.body, type=annotations.Put).by
+            await self._clear(stream_of(row.id), by)
+        self._left_over = False
+
+    # --- raw messages -------------------------------------------------------------------------
+
+    async def _sweep_raw(self, days: float) -> Swept:
+        kept = self._recordings
+        if kept is None:
+            return Swept()
+        problems: list[str] = []
+        done = 0
+        for path in await self._run_in_worker(lambda: kept.due(days)):
+            try:
+                await self._put_raw_away(path)
+                done += 1
+            except (Refused, OSError) as why:
+                detail = why.detail if isinstance(why, Refused) else str(why)
+                problems.append(f"Raw messages {path.parent.name}/{path.name} stay here: {detail}")
+            await anyio.sleep(_BREATH_S)
+        return Swept(raw=done, problems=problems)
+
+    async def _put_raw_away(self, path: Path) -> None:
+        robot = path.parent.name
+        file = f"raw/{robot}/{path.name}"
+        target = self.keep.folder / file
+        size = (await anyio.Path(path).stat()).st_size
+        digest = await self._run_in_worker(lambda: archive_file.put(path, target))
+        put = RawPut(self._clock_us(), robot, path.name, file, size, digest)
+        draft = Draft(put.kind, "", msgspec.json.encode(put))
+        await self._journal.append(stream_of_raw(robot), [draft])
+        await self._run_in_worker(path.unlink)
+
+
+def _due(before: int, most: int) -> Select[Any]:
+    """Runs that are over and summed up for so long, pinned ones left out; the oldest first."""
+    return (
+        select(run)
+        .join(review, review.c.run == run.c.id)
+        .where(
+            run.c.archived_at.is_(None),
+            run.c.ended_at < before,
+            review.c.summed,
+            or_(review.c.pinned.is_(None), ~review.c.pinned),
+        )
+        .order_by(run.c.ended_at)
+        .limit(most)
+    )
+
+
+def _pinned(run_id: str) -> Select[Any]:
+    return select(review.c.run).where(review.c.run == run_id, review.c.pinned)
+
+
+def _unfinished() -> Select[Any]:
+    here = exists().where(runner_event.c.stream == literal("run/") + run.c.id)
+    return select(run.c.id).where(run.c.archived_at.is_not(None), here)
+
+
+def _place(row: Row[Any]) -> str:
+    ended: datetime = views.time(row.ended_at)
+    return f"runs/{ended:%Y-%m}/run-{row.number:06d}-{row.id}.jsonl.gz"
+
+
+def _fields(row: Row[Any]) -> dict[str, Any]:
+    kept = set(run.c.keys()) - {"id", "archived_at", "archived_as"}
+    return {name: value for name, value in row._asdict().items() if name in kept}

@@ -1,0 +1,11 @@
+"""The clock of the runner, in microseconds UTC."""
+
+import time
+from collections.abc import Callable
+
+ClockUs = Callable[[], int]
+
+
+def utc_us() -> int:
+    """Microseconds UTC."""
+    return time.time_ns() // 1000

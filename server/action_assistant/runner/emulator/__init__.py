@@ -1,0 +1,1 @@
+"""The robot emulator: an engine node without an engine."""

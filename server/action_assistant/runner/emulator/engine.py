@@ -1,0 +1,404 @@
+"""The emulated engine: messages in, messages out, at times that its caller counts.
+
+No ROS, no clock, no I/O: the same seed and the same messages give the same answers. What graphs do is
+`umrf.semantics`; here is what the node around it makes of that: one thread that a slow command holds
+up, topics on which the newest message wins, a ring of snapshots that is emptied twice a second, and
+refusals that only its log knows (docs/umrf-and-the-engine.md 4, and recordings of real nodes).
+"""
+
+import random
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
+from heapq import heappop, heappush
+from itertools import count
+from math import inf
+from typing import Final, TypeAlias, assert_never
+
+from action_assistant.runner.emulator.messages import (
+    TOPICS,
+    EmulatedIndex,
+    EngineTraits,
+    FeedbackMessage,
+    GetResponse,
+    Gone,
+    LogMessage,
+    Message,
+    Modify,
+    Pause,
+    Refusal,
+    Resume,
+    Said,
+    Start,
+    Stop,
+    active,
+    asked_for,
+    graph_plan_of,
+    refusal,
+    unknown,
+)
+from action_assistant.runner.emulator.view import PublishedGraphs
+from action_assistant.umrf.facts import PINNED, EngineFacts
+from action_assistant.umrf.semantics import Engine, Execution, GraphRefused, Script, Trace
+
+_NEXT_MS: Final = 0.2  # between two messages that wait
+_TOLD_MS: Final = 10.0  # from the end of a stop to the line that says so
+_GETS: Final = 10  # requests that wait, by the depth of a service
+_TAIL_MS: Final = 1_500.0  # an idle engine that was told to quit takes so long
+_FORWARD: Final = "   fwd [in modifyGraph]: forwarding\n"
+_BUSY: Final = frozenset({"RUNNING", "PAUSED", "STOPPING", "CLEARING"})
+_Deed: TypeAlias = Callable[[str, float], list[Trace]]
+
+
+class EmulatedEngine:
+    """One life of one engine. `hear` and `ask` bring messages, `advance` gives what it has to say.
+
+    `born_ms` is the moment of its start, which its feedback keeps time with; `epoch_ms` is 0 ms as
+    milliseconds since 1970.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        index: EmulatedIndex = EmulatedIndex(),  # noqa: B008 - frozen
+        script: Script = Script(),  # noqa: B008 - frozen
+        facts: EngineFacts = PINNED,
+        quirks: EngineTraits = EngineTraits(),  # noqa: B008 - frozen
+        extra_wake_words: Sequence[str] = (),
+        seed: int = 0,
+        born_ms: float = 0.0,
+        epoch_ms: int = 0,
+    ) -> None:
+        self.wake_words = frozenset({name, *extra_wake_words})
+        first = extra_wake_words[0] if extra_wake_words and quirks.extra_is_actor else name
+        self.actor = first
+        self.quirks = quirks
+        self.gone = ""  # why its process has ended
+        self._facts = facts
+        self._index = index
+        self._engine = Engine(
+            facts=facts,
+            script=script,
+            library={name: plan.graph for name, plan in index.graphs.items()},
+            actor=first,
+            signatures=index.actions if index.actions and quirks.checks_actions else None,
+            loading_ms=quirks.loading_ms,
+        )
+        self._now = self._tick = born_ms
+        self._out: list[Said] = []
+        self._tasks: list[tuple[float, int, Callable[[], None]]] = []
+        self._order = count()
+        self._view = PublishedGraphs(self._engine, index, quirks, random.Random(seed), epoch_ms)
+        self._drains = False
+        self._waiting: dict[str, deque[Message]] = {topic: deque() for topic in TOPICS}
+        self._gets: deque[int] = deque(maxlen=_GETS)
+        self._works = False  # a turn of its thread is planned
+        self._under_way: list[Callable[[], None]] = []
+        self._lingers = 0
+        self._frozen = False
+        self._frozen_ms = born_ms
+        self._deaf = False
+        self._log("The Action Engine is initialized.")
+
+    # --- what callers do ----------------------------------------------------------------------
+
+    @property
+    def due(self) -> float | None:
+        """When it does something next by itself, in ms; None if nothing is planned."""
+        if self._out:
+            return self._now
+        if self._frozen or self.gone:
+            return None
+        found = min(self._next())
+        return found if found < inf else None
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """The truth: running names of graphs in which the code of an action goes on, whatever is
+        said of it."""
+        return tuple(dict.fromkeys(each.graph for each in self.executing))
+
+    @property
+    def executing(self) -> tuple[Execution, ...]:
+        """The calls of actions' code that have not returned. A frozen one goes on when it wakes."""
+        return () if self.gone else tuple(self._engine.executing(self._awake_ms))
+
+    def hear(self, message: Message, at_ms: float) -> None:
+        """A command has arrived; it may wait, and be overwritten while it does."""
+        self._pass(at_ms)
+        if isinstance(message, Start) and self.quirks.late_ms:
+            self._later(self.quirks.late_ms, partial(self._arrive, message))
+        else:
+            self._arrive(message)
+
+    def _arrive(self, message: Message) -> None:
+        if self._deaf or self.gone:
+            return
+        waiting = self._waiting[message.topic]
+        if self.quirks.depth and len(waiting) >= self.quirks.depth:
+            waiting.popleft()
+        waiting.append(message)
+        self._plan_work(self.quirks.reaction_ms)
+
+    def ask(self, ticket: int, at_ms: float) -> None:
+        """A get has arrived; its answer carries the ticket, if one ever comes."""
+        self._pass(at_ms)
+        if not self._deaf and not self.gone:
+            self._gets.append(ticket)
+            self._plan_work(self.quirks.reaction_ms)
+
+    def advance(self, to_ms: float) -> list[Said]:
+        """Everything that it says up to and including this moment, in order."""
+        self._pass(to_ms)
+        said, self._out = self._out, []
+        return said
+
+    def freeze(self, at_ms: float) -> None:
+        """Its process is stopped (SIGSTOP): it does nothing, and messages wait."""
+        self._pass(at_ms)
+        self._frozen, self._frozen_ms = True, self._now
+
+    def thaw(self, at_ms: float) -> None:
+        """Its process goes on; what was due meanwhile happens now."""
+        self._frozen = False
+        self._now = self._engine.now = self._tick = at_ms
+        self._take(self._engine.advance(at_ms))  # threads of actions wake before the one that hears
+        self._pass(at_ms)
+
+    def quit(self, at_ms: float) -> None:
+        """It is told to end (SIGINT): deaf and mute from now on, it drives its graphs to their end."""
+        self._pass(at_ms)
+        self._deaf = True
+        for waiting in self._waiting.values():
+            waiting.clear()
+        self._gets.clear()
+        self._view.drained()
+        self._leave_if_idle()
+
+    def kill(self, why: str = "killed") -> None:
+        """Its process ends without a word, and everything that it moved stops being driven."""
+        self.gone = self.gone or why
+
+    # --- time ---------------------------------------------------------------------------------
+
+    def _pass(self, to_ms: float) -> None:
+        while not self._frozen and not self.gone:
+            own, engine = self._next()
+            at = min(own, engine)
+            if at > to_ms:
+                break
+            self._now = max(self._now, at)
+            if own <= at:
+                heappop(self._tasks)[2]()
+            else:
+                self._take(self._engine.advance(self._now))
+        self._now = max(self._now, to_ms)
+
+    def _next(self) -> tuple[float, float]:
+        """When the node and when the engine in it do something next."""
+        engine = self._engine.due
+        return self._tasks[0][0] if self._tasks else inf, inf if engine is None else engine
+
+    @property
+    def _awake_ms(self) -> float:
+        return self._frozen_ms if self._frozen else self._now
+
+    def _later(self, wait_ms: float, task: Callable[[], None]) -> None:
+        heappush(self._tasks, (self._now + wait_ms, next(self._order), task))
+
+    # --- its one thread -----------------------------------------------------------------------
+
+    @property
+    def _blocked(self) -> bool:
+        return self._engine.locked or (
+            self.quirks.blocks and bool(self._under_way or self._lingers)
+        )
+
+    def _plan_work(self, wait_ms: float) -> None:
+        if not self._works:
+            self._works = True
+            self._later(wait_ms, self._work)
+
+    def _work(self) -> None:
+        """Take up what waits: commands in the order of their topics, then gets."""
+        self._works = False
+        if self._blocked or self._deaf:
+            return
+        waiting = next((each for each in self._waiting.values() if each), None)
+        if waiting:
+            self._obey(waiting.popleft())
+        elif self._gets:
+            self._answer(self._gets.popleft())
+        else:
+            return
+        self._plan_work(_NEXT_MS)
+
+    def _hold(self, then: Callable[[], None]) -> None:
+        """The command is under way until the engine has done it."""
+        self._under_way.append(then)
+        self._see_to_it()
+
+    def _see_to_it(self) -> None:
+        if self._engine.busy or self._engine.locked or self._engine.crashed:
+            return
+        done, self._under_way = self._under_way, []
+        for then in done:
+            then()
+        if done:
+            self._plan_work(_NEXT_MS)
+
+    def _linger(self, wait_ms: float, then: Callable[[], None]) -> None:
+        """The thread stays with a command a little longer."""
+        self._lingers += 1
+
+        def leave() -> None:
+            self._lingers -= 1
+            then()
+            self._plan_work(_NEXT_MS)
+
+        self._later(wait_ms, leave)
+
+    # --- commands -----------------------------------------------------------------------------
+
+    def _obey(self, message: Message) -> None:
+        self._log(f"Received request to {message.topic} UMRF graph: {message.graph_name}")
+        if not self.wake_words & set(message.targets):
+            what = "UMRF graph" if isinstance(message, Start) else message.topic
+            self._log(f"The {what} message was not targeted at this Action Engine.")
+            return
+        match message:
+            case Start():
+                self._start(message)
+            case Stop(graph_name=name):
+                self._command(name, "Stopping", "stop", self._engine.stop, "stopped", _TOLD_MS)
+            case Pause(graph_name=name):
+                self._command(name, "Pausing", "pause", self._engine.pause, "paused", _TOLD_MS)
+            case Resume(graph_name=name):
+                self._command(name, "Resuming", "resume", self._engine.resume, "resumed", 0.0)
+            case Modify():
+                self._modify(message)
+            case _:
+                assert_never(message)
+
+    def _start(self, message: Start) -> None:
+        name = message.graph_name
+        try:
+            plan = asked_for(message, self._index, self._engine.graphs)
+        except Refusal as refused:
+            self._log(str(refused))
+            return
+        name, held = plan.graph.name, self._engine.graphs.get(plan.graph.name)
+        if held is not None and held.state in _BUSY and not self.quirks.restart_stops:
+            self._log(refusal(active(name, held.state), message))
+            return
+        self._view.plans[name] = plan
+        try:
+            by_name = not message.graph_json
+            self._take(self._engine.start(plan.graph, self._now, plan.states, by_name=by_name))
+        except GraphRefused as refused:
+            self._view.taken = True
+            self._take(self._engine.advance(self._now))
+            why = refused.message
+            stops = "Cannot execute" in why
+
+            def then() -> None:
+                self._view.taken = False
+                if stops:
+                    self._snapshot(name)
+                self._log(refusal(why, message))
+
+            self._hold(then)
+        else:
+            self._hold(lambda: None)
+
+    def _command(
+        self, name: str, doing: str, verb: str, deed: _Deed, done: str, told_ms: float
+    ) -> None:
+        self._log(f"{doing} UMRF graph '{name}' ...")
+        if name not in self._engine.graphs:
+            self._log(unknown(verb, name))
+            return
+        self._take(deed(name, self._now))
+
+        def tell() -> None:
+            if verb == "stop" or not self.quirks.quiet_pause:
+                self._snapshot(name)
+            self._log(f"UMRF graph '{name}' {done}.")
+
+        self._hold(lambda: self._linger(told_ms, tell))
+
+    def _modify(self, message: Modify) -> None:
+        self._log(f"Modifying UMRF graph '{message.graph_name}' ...")
+        why = ""
+        try:
+            plan = graph_plan_of(message.modified_graph)
+            name = plan.graph.name
+            self._take(self._engine.modify(plan.graph, self._now, message.continue_from))
+        except Refusal as refused:
+            self._log(str(refused))
+            return
+        except GraphRefused as refused:
+            why = refused.message
+            self._take(self._engine.advance(self._now))
+
+        def then() -> None:
+            if not why:
+                self._view.modified(name, plan)
+            told = f"UMRF graph '{message.graph_name}' modified."
+            text = f"origin [in modifyGraph]: {why}\n{_FORWARD}" if why else told
+            self._linger(_TOLD_MS, lambda: self._log(text))
+
+        self._hold(then)
+
+    def _answer(self, ticket: int) -> None:
+        view = self._view
+        self._take(self._engine.asked())
+        self._say(GetResponse(self._now, ticket, self._index.texts, view.indexed, view.running()))
+
+    # --- what its graphs do -------------------------------------------------------------------
+
+    def _take(self, traces: Sequence[Trace]) -> None:
+        for name in self._view.take(traces, self._now):
+            self._log(f"Graph '{name}' finished.")
+        if self._engine.crashed:
+            self._leave(f"crashed ({self._engine.crashed})")
+        self._keep_time()
+        self._see_to_it()
+        self._leave_if_idle()
+
+    def _snapshot(self, name: str) -> None:
+        self._view.snapshot(name)
+        self._keep_time()
+
+    def _keep_time(self) -> None:
+        """Feedback goes out at the next beat, if there is any."""
+        if self._view.waiting and not self._drains:
+            self._drains = True
+            period = self._facts.feedback_period_ms
+            passed = (self._now - self._tick) // period + 1
+            self._later(self._tick + passed * period - self._now, self._drain)
+
+    def _drain(self) -> None:
+        self._drains = False
+        if history := self._view.drained():
+            self._say(FeedbackMessage(self._now, self.actor, history))
+
+    # --- words --------------------------------------------------------------------------------
+
+    def _say(self, said: Said) -> None:
+        if not self._deaf and not self.gone:
+            self._out.append(said)
+
+    def _log(self, text: str) -> None:
+        if self.quirks.narrates:
+            self._say(LogMessage(self._now, text))
+
+    def _leave_if_idle(self) -> None:
+        if self._deaf and not self.gone and not any(g.active for g in self._engine.graphs.values()):
+            self._later(_TAIL_MS, lambda: self._leave("it was told to end"))
+
+    def _leave(self, why: str) -> None:
+        if not self.gone:
+            self._out.append(Gone(self._now, why))
+            self.gone = why

@@ -1,0 +1,1 @@
+"""Runs that are not over: the loop, the monitor, the service of all."""

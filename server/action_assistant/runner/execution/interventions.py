@@ -1,0 +1,157 @@
+"""Interventions in a run besides Stop: pause, resume, modify, confirm rest; where that is safe."""
+
+from typing import Annotated, Final
+
+import msgspec
+
+from action_assistant.errors import BadInput, Conflict, Unavailable
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.links.port import (
+    SIMULATOR,
+    EngineRefused,
+    GraphOutline,
+    NotSent,
+    Order,
+)
+from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.runs.events import Author, Override
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.start.admission import StartRequest, decoded, prepared
+from action_assistant.runner.start.preflight import not_matched_in
+from action_assistant.umrf.facts import SIMULATED
+from action_assistant.web.workers.lanes import RunInWorker
+
+_MOVING: Final = frozenset({"running", "paused"})
+
+
+class ModifyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Another version of the graph of a run, by value. `continue_from`: the full name of an action
+    that shall be started when the graph goes on."""
+
+    version: str
+    digest: str
+    umrf: msgspec.Raw
+    continue_from: str = ""
+    override: Override | None = None
+
+
+async def pause(opened: OpenRun, author: Author) -> Run:
+    """Pause a run. Raises Conflict, Unavailable."""
+    run = opened.run
+    if run.state != "running" or run.desired != "running":
+        raise Conflict(f"Only a running run can be paused; this one is {_condition(run)}.")
+    if not opened.pauses:
+        raise Conflict(f"Pausing is not safe on {run.engine}; use Stop.")
+    try:
+        await opened.pause(author)
+    except NotSent as why:
+        raise Unavailable(f"The pause could not be sent: {why}") from why
+    return opened.run
+
+
+async def resume(opened: OpenRun, author: Author) -> Run:
+    """Let a paused run go on. Raises Conflict, Unavailable."""
+    if opened.run.desired != "paused":
+        raise Conflict(f"Only a paused run can go on; this one is {_condition(opened.run)}.")
+    try:
+        await opened.resume(author)
+    except NotSent as why:
+        raise Unavailable(f"The resume could not be sent: {why}") from why
+    return opened.run
+
+
+async def modify(
+    opened: OpenRun,
+    body: bytes,
+    author: Author,
+    *,
+    engine: KnownEngine | None,
+    run_in_worker: RunInWorker,
+) -> Run:
+    """Give a running graph another structure; `body` is a ModifyRequest, `engine` None that of a
+    simulated run. Raises BadInput, Conflict, Unavailable."""
+    run = opened.run
+    _require_moving(run)
+    if not opened.pauses:
+        raise Conflict(
+            f"A running graph is paused to be changed, and pausing is not safe on {run.engine}; "
+            "stop it and start the new version."
+        )
+    asked = decoded(body, ModifyRequest)
+    start = StartRequest(
+        version=asked.version,
+        digest=asked.digest,
+        umrf=asked.umrf,
+        engine=SIMULATOR if run.simulated else run.engine,
+        request_id=run.request_id,
+        graph=run.graph,
+        override=asked.override,
+    )
+    facts = SIMULATED if engine is None else engine.facts
+    ready = await run_in_worker(prepared, start, facts, run.id)
+    if engine is not None:
+        await _require_matched(engine, ready.umrf, run_in_worker)
+    _require_moving(opened.run)  # somebody may have stopped it meanwhile
+    if ready.name != run.graph_name:
+        raise Conflict(
+            f"The run is of {run.graph_name}; a graph called {ready.name} cannot take its place.",
+            where={"path": "/umrf/graph_name"},
+        )
+    targets = () if run.simulated else (run.engine,)
+    graph = GraphOutline(ready.name, ready.actions)
+    order = Order(run=run.id, graph=graph, umrf=ready.umrf, targets=targets)
+    try:
+        await opened.modify(author, order, asked.version, ready.digest, asked.continue_from)
+    except NotSent as why:
+        raise Unavailable(f"The change could not be sent: {why}") from why
+    except EngineRefused as why:
+        raise Conflict(f"The engine refuses the change: {why}") from why
+    return opened.run
+
+
+async def _require_matched(engine: KnownEngine, umrf: str, run_in_worker: RunInWorker) -> None:
+    """A change is taken without looking anything up. Raises Conflict."""
+    held = {each.graph for each in engine.answer.graphs} if engine.answer is not None else set()
+    index = await engine.index(run_in_worker)
+    lost = await run_in_worker(not_matched_in, umrf, engine.facts, index, held)
+    if lost:
+        raise Conflict(
+            f"{engine.registration.name} does not look up {', '.join(lost[:3])} in a change, and would "
+            "abort with every running graph. Stop the run and start the new version under another name.",
+            where={"path": "/umrf/actions"},
+        )
+
+
+class RestRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Somebody has seen that a run is at rest. `how`: by what."""
+
+    how: Annotated[str, msgspec.Meta(min_length=3, max_length=500)]
+
+
+def confirm_rest(opened: OpenRun, asked: RestRequest, author: Author) -> Run:
+    """End a run of which nothing that its engine says can prove rest. Raises BadInput, Conflict."""
+    run, how = opened.run, asked.how.strip()
+    if len(how) < 3:
+        raise BadInput("Say how it was seen that nothing moves.", where={"path": "/how"})
+    if run.simulated:
+        raise Conflict("A simulation moves nothing; use Stop.")
+    is_silent = bool(run.lost) or run.unknown_since is not None
+    if not is_silent and not run.unconfirmed:
+        raise Conflict(
+            f"{run.engine} answers for this run, so its answers have to show rest; use Stop."
+        )
+    if run.active and not is_silent:
+        raise Conflict(
+            f"{run.engine} shows {', '.join(run.active)} moving; that cannot be confirmed away."
+        )
+    opened.confirm_rest(author, how)
+    return opened.run
+
+
+def _require_moving(run: Run) -> None:
+    if run.state not in _MOVING or run.desired == "stopped":
+        raise Conflict(f"Only a running run can be changed; this one is {_condition(run)}.")
+
+
+def _condition(run: Run) -> str:
+    return "being paused" if (run.state, run.desired) == ("running", "paused") else run.state

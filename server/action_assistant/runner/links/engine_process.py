@@ -1,0 +1,125 @@
+"""The operating system's process of an engine on this computer, identified beyond doubt.
+
+All threads of a process end with it, so that the code of an action is known to have ended when its
+engine's process is seen to. That can only be seen here: on another computer, in another container
+or after a reboot nothing is known.
+"""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+_PROC: Final = Path("/proc")
+_FAST_DDS: Final = "010f"  # vendor id at the beginning of a GUID prefix
+_FIRST_PORT: Final = 7400  # of DDS; each domain has the next 250
+_PORTS: Final = 250
+
+
+class EngineProcess(msgspec.Struct, frozen=True):
+    """`boot`: the kernel's boot id; `namespace`: of process ids; `started`: clock ticks after boot.
+    Together they never name another process."""
+
+    boot: str
+    namespace: str
+    pid: int
+    started: int
+
+
+def process(pid: int) -> EngineProcess | None:
+    """The process of this number, if there is one and the kernel tells."""
+    try:
+        started = _started(pid)
+        return None if started is None else EngineProcess(*_here(), pid, started)
+    except OSError:
+        return None
+
+
+def has_ended(known: EngineProcess) -> bool:
+    """Whether the process is certainly over: same boot, same numbering, and not there any more."""
+    try:
+        if _here() != (known.boot, known.namespace):
+            return False
+        return _started(known.pid) != known.started
+    except OSError:
+        return False
+
+
+def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProcess | None:
+    """The process behind a DDS participant, when it certainly is one of this computer.
+
+    `prefix` and `ours` are GUID prefixes in hex, of the engine and of this process. Fast DDS puts two
+    bytes of the host and the low two of the process id into them. Containers on one network share the
+    former and count processes anew, so the process must also hold a port of that domain and have been
+    started with the engine's name. None wherever that leaves a doubt, and for every other middleware.
+    """
+    if len(prefix) < 24 or prefix[:8] != ours[:8] or not prefix.startswith(_FAST_DDS):
+        return None
+    low = int.from_bytes(bytes.fromhex(prefix[8:12]), "little")
+    try:
+        found = [
+            pid
+            for pid in _pids()
+            if pid & 0xFFFF == low and _is_called(pid, name) and _speaks_dds(pid, domain)
+        ]
+    except OSError:
+        return None
+    return process(found[0]) if len(found) == 1 else None
+
+
+def _here() -> tuple[str, str]:
+    boot = (_PROC / "sys/kernel/random/boot_id").read_text().strip()
+    return boot, str((_PROC / "self/ns/pid").readlink())
+
+
+def _started(pid: int) -> int | None:
+    """When a process began; None when it is over, also while its parent has not taken note of it."""
+    folder = _PROC / str(pid)
+    try:
+        fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        is_dead = fields[0] in "ZX" and len(list((folder / "task").iterdir())) <= 1
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+    return None if is_dead else int(fields[19])
+
+
+def _pids() -> Iterator[int]:
+    return (int(each.name) for each in _PROC.iterdir() if each.name.isdigit())
+
+
+def _is_called(pid: int, name: str) -> bool:
+    """Whether a word of its command line is the name."""
+    try:
+        line = (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace")
+    except OSError:
+        return False
+    return name in re.split(r"[\0=,]", line)
+
+
+def _speaks_dds(pid: int, domain: int) -> bool:
+    """Whether a process has a socket on a port of this domain. False where that cannot be seen."""
+    folder = _PROC / str(pid)
+    try:
+        inodes = {_socket(each) for each in (folder / "fd").iterdir()}
+        rows = [
+            line.split()
+            for name in ("udp", "udp6")
+            for line in (folder / "net" / name).read_text().splitlines()[1:]
+        ]
+    except OSError:
+        return False
+    first = _FIRST_PORT + _PORTS * domain
+    return any(
+        row[9] in inodes and first <= int(row[1].rpartition(":")[2], 16) < first + _PORTS
+        for row in rows
+    )
+
+
+def _socket(descriptor: Path) -> str:
+    try:
+        target = str(descriptor.readlink())
+    except OSError:  # closed meanwhile
+        return ""
+    return target[8:-1] if target.startswith("socket:[") else ""

@@ -1,0 +1,28 @@
+"""Listeners of a link, told in the order in which they were added."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Generic, TypeVar
+
+_News = TypeVar("_News")
+
+
+class Listeners(Generic[_News]):
+    """Listeners of a link or of a domain. They are called at once and must not wait."""
+
+    def __init__(self) -> None:
+        self._all: list[Callable[[_News], None]] = []
+
+    def tell(self, news: _News) -> None:
+        """Everybody who listens now hears it, also whoever ends listening because of it."""
+        for hear in tuple(self._all):
+            hear(news)
+
+    @contextmanager
+    def listening(self, hear: Callable[[_News], None]) -> Iterator[None]:
+        """Hear everything from now until the end of the block."""
+        self._all.append(hear)
+        try:
+            yield
+        finally:
+            self._all.remove(hear)

@@ -1,0 +1,69 @@
+"""Values of parameters as texts: those that were sent, and those that an engine reported.
+
+Both are written the same way, so that `5` and `5.0`, which are one double to the engine, are one text.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+import msgspec
+
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.text import MAX_DEPTH, Unreadable, parse
+from action_assistant.umrf.parameters import flatten
+from action_assistant.umrf.semantics.values import Opaque, Slot, slots_of
+
+#: Characters of one value. A longer one is cut and ends with an ellipsis: it is for people.
+LONGEST: Final = 300
+#: Parameters of one action; engines are machines that anybody may own.
+MOST: Final = 100
+
+#: Flat name (`pose::x`) → JSON text of the value.
+Values = dict[str, str]
+
+
+def values_of(slots: Iterable[Slot]) -> Values:
+    """What these parameters hold; those without a value are left out."""
+    found: Values = {}
+    for slot in slots:
+        if slot.has_value() and not isinstance(slot.value, Opaque) and len(found) < MOST:
+            found[slot.name[:LONGEST]] = _text(slot.value)
+    return found
+
+
+def reported(text: bytes) -> Values | None:
+    """The values in `input_parameters` as an engine wrote them; None when they cannot be read."""
+    try:
+        group = parse(text)
+    except Unreadable:
+        return None
+    return values_of(slots_of(flatten(group)).values()) if isinstance(group, dict) else None
+
+
+def sent(umrf: str) -> dict[str, Values]:
+    """The values of every action, by full name, in a graph as it was sent."""
+    try:
+        graph = codec.read(umrf.encode()).graph
+    except codec.Unreadable:
+        return {}
+    found = {
+        action.full_name: values_of(slots_of(action.inputs).values()) for action in graph.actions
+    }
+    return {name: values for name, values in found.items() if values}
+
+
+def _text(value: Any) -> str:
+    text = msgspec.json.encode(_whole(value, MAX_DEPTH)).decode(errors="replace")
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
+
+
+def _whole(value: Any, depth: int) -> Any:
+    match value:
+        case float() if value.is_integer() and abs(value) < 1e15:
+            return int(value)
+        case list() if depth:
+            return [_whole(member, depth - 1) for member in value]
+        case Mapping() if depth:
+            return {key: _whole(member, depth - 1) for key, member in value.items()}
+        case _:
+            return value

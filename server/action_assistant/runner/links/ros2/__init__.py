@@ -1,0 +1,1 @@
+"""The link to engines over ROS 2, through rclpy."""

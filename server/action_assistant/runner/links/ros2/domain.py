@@ -1,0 +1,313 @@
+"""One ROS 2 domain as this process sees it: a context, a node, a thread, and what all links share.
+
+The thread waits for messages, reads them and hands them to the event loop. Publishing and looking
+at who is there happen on the event loop itself, since neither waits for anybody. Entities are
+destroyed after the thread has ended: taking one from under a waiting executor breaks it.
+"""
+
+import asyncio
+import logging
+import secrets
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Final, TypeAlias, TypeVar
+
+import rclpy
+from rcl_interfaces.msg import Log
+from rclpy.client import Client
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.task import Future
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+from temoto_msgs.msg import (
+    UmrfGraphFeedback,
+    UmrfGraphModify,
+    UmrfGraphPause,
+    UmrfGraphResume,
+    UmrfGraphStart,
+    UmrfGraphStop,
+)
+from temoto_msgs.srv import UmrfGraphGet
+
+from action_assistant.runner.links.engine_text import NotAGraph, name_of, snapshot
+from action_assistant.runner.links.listeners import Listeners
+from action_assistant.runner.links.port import Command, Feedback
+from action_assistant.runner.links.ros2.outlets import Message, Outlet, Outlets, Topics, qos
+from action_assistant.runner.links.ros2.ros_values import (
+    Endpoint,
+    GetResult,
+    LogLine,
+    OverheardCommand,
+    RosValue,
+)
+
+log: Final = logging.getLogger(__name__)
+
+#: Seconds until who has joined a domain sees everybody there: Fast DDS announces itself every three,
+#: and of two engines the second was seen up to two seconds after the first (measured, loaded machine).
+DISCOVERY_S: Final = 3.5
+_KEPT: Final = 512  # sounds that may wait for the event loop; then the oldest goes
+_PROCESS: Final = 12  # bytes of a gid that all endpoints of one process share
+_KIND: Final = "temoto_msgs/srv/UmrfGraphGet"
+_ACTORS: Final = 64
+_JOIN_S: Final = 2.0
+
+M = TypeVar("M", bound=Message)
+Clock: TypeAlias = Callable[[], int]
+
+
+Ear: TypeAlias = Callable[[RosValue], None]
+
+
+class Domain:
+    """A domain that this process takes part in."""
+
+    def __init__(
+        self, number: int, topics: Topics, loop: asyncio.AbstractEventLoop, clock_us: Clock
+    ) -> None:
+        """Join. Takes up to some seconds, so it is done in a thread. Raises RuntimeError."""
+        self.number = number
+        self.topics = topics
+        self.actors: set[str] = set()  # who was heard
+        self.settled_at = time.monotonic() + DISCOVERY_S
+        self._loop = loop
+        self._clock_us = clock_us
+        self._subscribers = Listeners[RosValue]()
+        self._waiting: deque[RosValue] = deque(maxlen=_KEPT)
+        self._called = False
+        self._dropped = 0
+        self._leaving = False
+        self._clients: dict[str, Client] = {}
+        self._context = Context()
+        self._context.init(domain_id=number, initialize_logging=False)
+        self._node = rclpy.create_node(
+            f"action_assistant_{secrets.token_hex(4)}",
+            context=self._context,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        self.outlets = Outlets(self._node, topics)
+        self._listen()
+        self.process, self.own_hash = self._know_ourselves()
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, name=f"ros2-{number}", daemon=True)
+        self._thread.start()
+
+    def leave(self) -> None:
+        """End the thread, then let go of everything. Waits for it: call it in a thread."""
+        self._leaving = True
+        self._executor.create_task(lambda: None)  # a mere wake-up would be slept through
+        self._thread.join()
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+        self._context.destroy()
+
+    @property
+    def settled(self) -> bool:
+        """Whether everybody who is there must have been seen."""
+        return time.monotonic() >= self.settled_at
+
+    # --- the one question ---------------------------------------------------------------------
+
+    async def ask(self, path: str) -> GetResult:
+        """Ask whoever serves a path. Waits for as long as the caller likes; the answer to a question
+        that was given up goes nowhere. Raises NotAGraph, RuntimeError."""
+        loop = asyncio.get_running_loop()
+        answered: asyncio.Future[GetResult] = loop.create_future()
+        client, asked_at = self.client(path), self._clock_us()
+
+        def hand_over(got: GetResult | Exception) -> None:
+            if answered.done():
+                return
+            if isinstance(got, Exception):
+                answered.set_exception(got)
+            else:
+                answered.set_result(got)
+
+        def read(future: Future) -> None:
+            """On the thread of this domain, so that megabytes do not hold up the event loop."""
+            if future.cancelled():
+                return
+            try:
+                got: GetResult | Exception = _read(future.result(), asked_at, self._clock_us())
+            except (NotAGraph, RuntimeError) as error:
+                got = error
+            self._to_loop(lambda: hand_over(got))
+
+        pending = client.call_async(UmrfGraphGet.Request())
+        pending.add_done_callback(read)
+        try:
+            return await answered
+        finally:
+            client.remove_pending_request(pending)
+
+    def client(self, path: str) -> Client:
+        """The client of a path, made when it is first needed: an answer needs time to find it."""
+        if path not in self._clients:
+            self._clients[path] = self._node.create_client(UmrfGraphGet, path)
+        return self._clients[path]
+
+    # --- who is there -------------------------------------------------------------------------
+
+    def servers(self, path: str) -> tuple[Endpoint, ...]:
+        """Who answers on a path."""
+        absolute = path if path.startswith("/") else f"/{path}"
+        raw = self._node.get_subscriptions_info_by_topic(f"rq{absolute}Request", True)
+        return self._others(raw)
+
+    def listeners(self, topic: str) -> tuple[Endpoint, ...]:
+        """Who subscribes to a topic, beside us."""
+        return self._others(self._node.get_subscriptions_info_by_topic(topic))
+
+    def publishers(self, topic: str) -> tuple[Endpoint, ...]:
+        """Who publishes on a topic, beside us."""
+        return self._others(self._node.get_publishers_info_by_topic(topic))
+
+    def paths(self) -> tuple[str, ...]:
+        """Every path on which something answers as engines do."""
+        found = self._node.get_service_names_and_types()
+        return tuple(name for name, kinds in found if _KIND in kinds and self.servers(name))
+
+    def _others(self, found: list[TopicEndpointInfo]) -> tuple[Endpoint, ...]:
+        ends = (_endpoint(info) for info in found)
+        return tuple(each for each in ends if each.process != self.process)
+
+    def _know_ourselves(self) -> tuple[str, str]:
+        """Our own process and the type of our own start messages, as others see them."""
+        name, deadline = (
+            self._node.get_fully_qualified_name().lstrip("/"),
+            time.monotonic() + _JOIN_S,
+        )
+        while time.monotonic() < deadline:
+            for info in self._node.get_publishers_info_by_topic(self.topics.start):
+                if info.node_name == name:
+                    own = _endpoint(info)
+                    return own.process, own.type_hash
+            time.sleep(0.01)
+        raise RuntimeError("the middleware does not show this process to itself")
+
+    # --- what comes by itself -----------------------------------------------------------------
+
+    def hearing(self, ear: Ear) -> AbstractContextManager[None]:
+        """Be told, on the event loop, what comes by itself."""
+        return self._subscribers.listening(ear)
+
+    def _listen(self) -> None:
+        topics, node, out = self.topics, self._node, self.outlets
+        node.create_subscription(UmrfGraphFeedback, topics.feedback, self._feedback, qos(100))
+        node.create_subscription(Log, "/rosout", self._log_line, qos(100))
+        self._overhear("start", UmrfGraphStart, topics.start, out.start)
+        self._overhear("stop", UmrfGraphStop, topics.stop, out.stop)
+        self._overhear("pause", UmrfGraphPause, topics.pause, out.pause)
+        self._overhear("resume", UmrfGraphResume, topics.resume, out.resume)
+        self._overhear("modify", UmrfGraphModify, topics.modify, out.modify)
+
+    def _overhear(self, command: Command, kind: type[M], topic: str, ours: Outlet[M]) -> None:
+        def heard(message: M, info: dict[str, int | None]) -> None:
+            if ours.sent(message, info.get("source_timestamp")):
+                return
+            graph, umrf = _named(message)
+            sound = OverheardCommand(
+                command=command,
+                graph=graph,
+                umrf=umrf,
+                targets=tuple(message.targets),
+                sender=self._sender(topic),
+            )
+            self._tell(sound)
+
+        self._node.create_subscription(kind, topic, heard, qos(50))
+
+    def _sender(self, topic: str) -> str:
+        """Who it must have been, when there is only one; the middleware does not say."""
+        loggers = {each.logger for each in self.publishers(topic)}
+        return loggers.pop() if len(loggers) == 1 else ""
+
+    def _feedback(self, message: UmrfGraphFeedback) -> None:
+        at, seen = self._clock_us(), []
+        for text in reversed(message.history):  # the newest stands first
+            try:
+                seen.append(snapshot(text, at=at, source="feedback"))
+            except NotAGraph as error:
+                log.warning("feedback of %r cannot be read: %s", message.actor, error)
+        if len(self.actors) < _ACTORS:
+            self.actors.add(message.actor)
+        self._tell(Feedback(actor=message.actor, snapshots=tuple(seen)))
+
+    def _log_line(self, message: Log) -> None:
+        self._tell(LogLine(message.name, message.msg))
+
+    def _tell(self, sound: RosValue) -> None:
+        if len(self._waiting) == _KEPT:
+            self._dropped += 1
+        self._waiting.append(sound)
+        if not self._called:
+            self._called = True
+            self._to_loop(self._hand_over)
+
+    def _hand_over(self) -> None:
+        """On the event loop, in order."""
+        self._called = False
+        if self._dropped:
+            log.warning("domain %d: %d messages came too fast", self.number, self._dropped)
+            self._dropped = 0
+        while self._waiting:
+            sound = self._waiting.popleft()
+            self._subscribers.tell(sound)
+
+    def _to_loop(self, work: Callable[[], None]) -> None:
+        try:
+            self._loop.call_soon_threadsafe(work)
+        except RuntimeError:  # the loop is closed: nobody wants to know any more
+            if not self._leaving:
+                log.warning("domain %d goes on without an event loop", self.number)
+
+    def _spin(self) -> None:
+        while not self._leaving and self._context.ok():
+            try:
+                self._executor.spin_once()
+            except Exception:
+                log.exception("domain %d: a message could not be taken in", self.number)
+
+
+def _endpoint(info: TopicEndpointInfo) -> Endpoint:
+    gid = bytes(info.endpoint_gid)
+    logger = f"{info.node_namespace}/{info.node_name}".strip("/").replace("/", ".")
+    return Endpoint(
+        gid=gid.hex(),
+        process=gid[:_PROCESS].hex(),
+        logger=logger,
+        type_hash=str(info.topic_type_hash),
+    )
+
+
+def _named(message: Message) -> tuple[str, str]:
+    """The graph that engines take a command to mean, and its text: a name inside a text counts more
+    than the one beside it."""
+    match message:
+        case UmrfGraphStart(umrf_graph_json=text) | UmrfGraphModify(modified_graph=text):
+            return (
+                name_of(text) or message.umrf_graph_name
+            ) if text else message.umrf_graph_name, text
+        case _:
+            return message.umrf_graph_name, ""
+
+
+def _read(response: UmrfGraphGet.Response, asked_at: int, at: int) -> GetResult:
+    """Raises NotAGraph: an answer that is not wholly understood proves nothing."""
+    texts, graphs = {}, []
+    for text in response.graph_jsons_running:
+        shown = snapshot(text, at=at, source="get", asked_at=asked_at)
+        graphs.append(shown)
+        texts[shown.graph] = text
+    return GetResult(
+        graphs=tuple(graphs),
+        texts=texts,
+        known_actions=tuple(response.umrf_jsons),
+        known_graphs=tuple(response.graph_jsons_indexed),
+    )

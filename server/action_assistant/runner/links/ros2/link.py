@@ -1,0 +1,402 @@
+"""One robot over ROS 2: what is told to its engine, what it is asked, and what it lets be known.
+
+Nothing here waits for an engine: commands are published and that is all that is known of them. Only
+an answer of the one server on a robot's path says what the engine holds, and only while the same
+server stood there before and after.
+"""
+
+import re
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import Final, TypeAlias, assert_never
+
+import anyio
+from temoto_msgs.msg import UmrfGraphModify, UmrfGraphPause, UmrfGraphResume, UmrfGraphStart
+
+from action_assistant.runner.links.engine_process import engine_process
+from action_assistant.runner.links.engine_text import NotAGraph
+from action_assistant.runner.links.listeners import Listeners
+from action_assistant.runner.links.port import (
+    Answer,
+    EngineChanged,
+    EngineLog,
+    EngineState,
+    Feedback,
+    ForeignCommand,
+    NoAnswer,
+    NotSent,
+    Order,
+    Registration,
+    Report,
+    Standing,
+)
+from action_assistant.runner.links.ros2.domain import Domain
+from action_assistant.runner.links.ros2.outlets import Topics
+from action_assistant.runner.links.ros2.peers import (
+    OLDER,
+    belonging,
+    foreign_middleware,
+    generation_of,
+    topics_of,
+    two_servers,
+)
+from action_assistant.runner.links.ros2.ros_values import (
+    Endpoint,
+    LogLine,
+    OverheardCommand,
+    RosValue,
+)
+from action_assistant.umrf.facts import EngineFacts
+
+_LOOK_S: Final = 1.0
+_IDLE_GET_S: Final = 10.0
+_BUSY_S: Final = 1.0  # an engine that is not busy answers within milliseconds
+_SETTLE_S: Final = 1.0  # a publisher may know a subscription before that one knows it
+_AGAIN_S: Final = 5.0  # until joining a domain is tried again
+
+_COMMANDS: Final = ("start", "stop", "pause", "resume", "modify")
+_GRAPH: Final = re.compile(r"[Gg]raph:? '?([^\s']+)")
+
+Join: TypeAlias = Callable[[int, Topics], Awaitable[Domain]]
+
+
+class Ros2Link:
+    """One robot. It lives while `run` is kept going."""
+
+    simulated: Final = False
+
+    def __init__(
+        self,
+        join: Join,
+        registration: Registration,
+        facts: EngineFacts,
+        clock_us: Callable[[], int],
+    ) -> None:
+        self._join = join
+        self._name = registration.name
+        self._number = registration.domain
+        self._path = registration.get_service
+        self._facts = facts
+        self._topics = topics_of(facts)
+        self._clock_us = clock_us
+        self._subscribers = Listeners[Report]()
+        self._domain: Domain | None = None
+        self._runs: set[str] = set()
+        self._known_since = 0.0  # when this incarnation was first seen, by the monotonic clock
+        self._answered = False
+        self._restarted = False
+        self._unanswered_since: float | None = None
+        self._asked_at = 0.0
+        self._standing = Standing(state="gone", why="it is not being looked for yet")
+
+    @property
+    def pauses(self) -> bool:
+        """What the robot's profile says."""
+        return self._facts.pauses_safely
+
+    @property
+    def standing(self) -> Standing:
+        """As of a second ago, or of the last get."""
+        return self._standing
+
+    # --- commands -----------------------------------------------------------------------------
+
+    async def start(self, order: Order) -> None:
+        """Publish one start. Raises NotSent."""
+        domain = self._reachable("start", self._topics.start)
+        message = UmrfGraphStart(
+            umrf_graph_name=order.graph.name,
+            umrf_graph_json=order.umrf,
+            targets=list(order.targets or (self._name,)),
+        )
+        await anyio.sleep(max(0.0, self._known_since + _SETTLE_S - time.monotonic()))
+        self._runs.add(order.run)
+        await domain.outlets.start.send(lambda: message)
+
+    async def stop(self, graph_name: str) -> None:
+        """Publish one stop, also when nobody seems to listen: what is seen may lag behind what is.
+        Raises NotSent."""
+        domain = self._joined()
+        with _sent_or_not():
+            await domain.outlets.send_stop(graph_name, self._name)
+        self._listened_to(domain, self._topics.stop)
+
+    async def pause(self, graph_name: str) -> None:
+        """Publish one pause. Raises NotSent."""
+        domain = self._reachable("pause", self._topics.pause)
+        message = UmrfGraphPause(umrf_graph_name=graph_name, targets=[self._name])
+        with _sent_or_not():
+            await domain.outlets.pause.send(lambda: message)
+
+    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+        """Publish one resume. Raises NotSent; over ROS 2 an engine goes on where it was."""
+        if continue_from:
+            raise NotSent("over ROS 2 a graph goes on where it was; no action can be named")
+        domain = self._reachable("resume", self._topics.resume)
+        message = UmrfGraphResume(umrf_graph_name=graph_name, targets=[self._name])
+        with _sent_or_not():
+            await domain.outlets.resume.send(lambda: message)
+
+    async def modify(self, order: Order, continue_from: str = "") -> None:
+        """Publish one modify. Raises NotSent."""
+        domain = self._reachable("modify", self._topics.modify)
+        message = UmrfGraphModify(
+            umrf_graph_name=order.graph.name,
+            targets=list(order.targets or (self._name,)),
+            modified_graph=order.umrf,
+            continue_from=continue_from,
+        )
+        await domain.outlets.modify.send(lambda: message)
+
+    def _joined(self) -> Domain:
+        if self._domain is None:
+            raise NotSent(self._standing.why)
+        return self._domain
+
+    def _reachable(self, command: str, topic: str) -> Domain:
+        """The domain, if this robot would take a command. Raises NotSent."""
+        domain = self._joined()
+        self._listened_to(domain, topic)
+        if generation_of(domain, domain.servers(self._path)) == "older":
+            raise NotSent(f"{self._name} cannot take a {command}: {OLDER}")
+        return domain
+
+    def _listened_to(self, domain: Domain, topic: str) -> None:
+        if not belonging(domain.servers(self._path), domain.listeners(topic)):
+            raise NotSent(f"nobody listens to {topic} on domain {self._number}")
+
+    # --- the one question ---------------------------------------------------------------------
+
+    async def get(self) -> Answer:
+        """Ask what the engine holds. Raises NoAnswer."""
+        if self._domain is None:
+            raise NoAnswer(self._standing.why)
+        domain = self._domain
+        servers = domain.servers(self._path)
+        self._look()
+        if len(servers) != 1 or not domain.settled:
+            raise NoAnswer(self._standing.why)
+        began = self._asked_at = time.monotonic()
+        asked_at = self._clock_us()
+        if self._unanswered_since is None:
+            self._unanswered_since = began
+        try:
+            got = await domain.ask(self._path)
+        except (NotAGraph, RuntimeError) as error:
+            raise NoAnswer(f"its answer cannot be used: {error}") from error
+        after = domain.servers(self._path)
+        if after != servers:
+            self._look()
+            raise NoAnswer("while it was asked, another engine came or went on its path")
+        self._answered, self._unanswered_since = True, None
+        self._look()
+        return Answer(
+            asked_at=asked_at,
+            at=self._clock_us(),
+            incarnation=servers[0].gid,
+            graphs=got.graphs,
+            texts=got.texts,
+            known_actions=got.known_actions,
+            known_graphs=got.known_graphs,
+        )
+
+    # --- life ---------------------------------------------------------------------------------
+
+    async def run(self) -> None:
+        """Join the domain, look every second who is there, and ask when nobody else does."""
+        domain = await self._joining()
+        domain.client(self._path)
+        self._domain = domain
+        try:
+            with domain.hearing(self._hear):
+                while True:
+                    self._look()
+                    if self._due():
+                        await self._ask_by_ourselves()
+                    left = domain.settled_at - time.monotonic()
+                    await anyio.sleep(left if 0 < left < _LOOK_S else _LOOK_S)
+        finally:
+            self._domain = None
+            self._become(Standing(state="gone", why="it is not being looked for any more"))
+
+    async def _joining(self) -> Domain:
+        while True:
+            try:
+                return await self._join(self._number, self._topics)
+            except RuntimeError as error:
+                why = f"domain {self._number} cannot be joined: {error}"
+                self._become(Standing(state="gone", why=why))
+                await anyio.sleep(_AGAIN_S)
+
+    def _due(self) -> bool:
+        """An engine that was not asked for a while, or has yet to say its first word, is asked."""
+        rested = time.monotonic() - self._asked_at
+        return self._standing.servers == 1 and (not self._answered or rested >= _IDLE_GET_S)
+
+    async def _ask_by_ourselves(self) -> None:
+        with anyio.move_on_after(_BUSY_S):
+            try:
+                await self.get()
+            except NoAnswer:
+                return  # the standing says so
+        self._look()
+
+    def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
+        """Everything that concerns this robot, from now on."""
+        return self._subscribers.listening(hear)
+
+    async def aclose(self) -> None:
+        """Nothing of its own: the domain is shared."""
+
+    # --- what is known ------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        """Look who is there and say what has changed."""
+        domain = self._domain
+        if domain is None:
+            return
+        servers = domain.servers(self._path)
+        incarnation = servers[0].gid if len(servers) == 1 else ""
+        before = self._standing
+        known = before.incarnation
+        process = before.process
+        if incarnation and incarnation != known:
+            process = engine_process(servers[0].process, domain.process, self._number, self._name)
+            self._known_since = time.monotonic()
+            self._answered, self._unanswered_since = False, None
+            self._restarted = bool(known)
+        state, why = self._judged(domain, servers)
+        listeners = {
+            each: len(belonging(servers, domain.listeners(getattr(self._topics, each))))
+            for each in _COMMANDS
+        }
+        self._become(
+            Standing(
+                state=state,
+                why=why,
+                incarnation=incarnation or known,
+                generation=generation_of(domain, servers),
+                servers=len(servers),
+                listeners=listeners,
+                others=len(domain.publishers(self._topics.start)),
+                actor=self._actor(domain),
+                process=process,
+            )
+        )
+
+    def _judged(self, domain: Domain, servers: tuple[Endpoint, ...]) -> tuple[EngineState, str]:
+        place = f"{self._path} on domain {self._number}"
+        joined = f"This runner has just joined domain {self._number} and looks around."
+        if not servers and not domain.settled:
+            return "gone", joined
+        if not servers:
+            others = domain.paths()
+            hint = f" Engines answer on {', '.join(others)}." if others else ""
+            return "gone", f"Nobody answers on {place}.{hint}"
+        if len(servers) > 1:
+            return "busy", two_servers(place, len(servers))
+        if not domain.settled:  # a second server on this path would go unnoticed
+            return "busy", joined
+        since = self._unanswered_since
+        if since is not None and time.monotonic() - since >= _BUSY_S:
+            other = foreign_middleware(domain, servers[0])
+            if other:
+                return "busy", (
+                    f"It is there, but speaks {other}, and this runner does not, so it cannot be "
+                    "asked: RMW_IMPLEMENTATION must be the same on both sides."
+                )
+            return "busy", "It is there, but does not answer."
+        if self._answered:
+            return "answering", ""
+        if self._restarted:
+            return "restarted", "Another engine stands where the one before was: look at the robot."
+        return "busy", "It has not answered yet."
+
+    def _become(self, now: Standing) -> None:
+        before, self._standing = self._standing, now
+        if (before.state, before.incarnation) != (now.state, now.incarnation):
+            self._subscribers.tell(
+                EngineChanged(
+                    at=self._clock_us(), state=now.state, incarnation=now.incarnation, why=now.why
+                )
+            )
+
+    def _actor(self, domain: Domain) -> str:
+        """What this robot's feedback calls itself, as far as that can be told."""
+        if self._name in domain.actors:
+            return self._name
+        alone = len(domain.actors) == 1 and self._alone(domain)
+        return next(iter(domain.actors)) if alone else ""
+
+    def _alone(self, domain: Domain) -> bool:
+        """Whether all feedback on this domain comes from one engine."""
+        return len({each.process for each in domain.publishers(self._topics.feedback)}) <= 1
+
+    # --- what is heard ------------------------------------------------------------------------
+
+    def _hear(self, sound: RosValue) -> None:
+        match sound:
+            case Feedback():
+                self._hear_feedback(sound)
+            case OverheardCommand():
+                if self._name in sound.targets:
+                    self._subscribers.tell(
+                        ForeignCommand(
+                            at=self._clock_us(),
+                            command=sound.command,
+                            graph=sound.graph,
+                            umrf=sound.umrf,
+                            targets=sound.targets,
+                            sender=sound.sender,
+                        )
+                    )
+            case LogLine():
+                if self._said(sound.logger):
+                    text = sound.text.strip()
+                    self._subscribers.tell(
+                        EngineLog(at=self._clock_us(), text=text, graph=_graph_in(text))
+                    )
+            case _:
+                assert_never(sound)
+
+    def _hear_feedback(self, sound: Feedback) -> None:
+        """With several engines on a domain, the name inside tells them apart; what carries a run of
+        ours is ours under any name."""
+        domain = self._domain
+        if domain is None:
+            return
+        if sound.actor != self._name and not self._alone(domain):
+            ours = tuple(each for each in sound.snapshots if each.run in self._runs)
+            if not ours:
+                return
+            sound = Feedback(actor=sound.actor, snapshots=ours)
+        self._subscribers.tell(sound)
+
+    def _said(self, logger: str) -> bool:
+        """Whether a line can only be this engine's: nodes of one name cannot be told apart."""
+        domain = self._domain
+        if domain is None:
+            return False
+        servers = domain.servers(self._path)
+        if len(servers) != 1 or servers[0].logger != logger:
+            return False
+        return all(
+            each.process == servers[0].process
+            for each in domain.publishers(self._topics.feedback)
+            if each.logger == logger
+        )
+
+
+@contextmanager
+def _sent_or_not() -> Iterator[None]:
+    """What the middleware refuses has not left. Not for starts: of those nobody may be so sure."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise NotSent(f"the middleware refuses it: {error}") from error
+
+
+def _graph_in(text: str) -> str | None:
+    found = _GRAPH.search(text)
+    return found[1] if found else None

@@ -1,0 +1,61 @@
+"""What can be told of engines on a ROS 2 domain by looking at their endpoints."""
+
+from typing import Final
+
+from action_assistant.runner.links.port import Generation
+from action_assistant.runner.links.ros2.domain import Domain
+from action_assistant.runner.links.ros2.outlets import Topics
+from action_assistant.runner.links.ros2.ros_values import Endpoint
+from action_assistant.umrf.facts import EngineFacts
+
+OLDER: Final = (
+    "its temoto_msgs are another generation than the ones here, so it would misread what is sent; "
+    "build the engine with temoto_msgs of March 2025 or later"
+)
+#: Who made a middleware, by the first bytes of its gids (a number of the DDS standard's registry).
+_VENDORS: Final = {"010f": "Fast DDS", "0110": "Cyclone DDS", "0101": "Connext"}
+
+
+def topics_of(facts: EngineFacts) -> Topics:
+    """Where an engine of these facts listens and speaks."""
+    return Topics(
+        start=facts.start_topic,
+        stop=facts.stop_topic,
+        pause=facts.pause_topic,
+        resume=facts.resume_topic,
+        modify=facts.modify_topic,
+        feedback=facts.feedback_topic,
+    )
+
+
+def generation_of(domain: Domain, servers: tuple[Endpoint, ...]) -> Generation:
+    """Whether an engine reads a start as we write it, by the hash of its type; old middlewares tell
+    none."""
+    hashes = {each.type_hash for each in belonging(servers, domain.listeners(domain.topics.start))}
+    known = {each for each in hashes if not each.upper().startswith("INVALID")}
+    if not known:
+        return "unknown"
+    return "current" if known == {domain.own_hash} else "older"
+
+
+def two_servers(place: str, count: int) -> str:
+    """Why answers on a path prove nothing."""
+    return (
+        f"{count} engines answer on {place}, so an answer may be another's and proves nothing. Give "
+        "each engine a domain of its own (ROS_DOMAIN_ID); one that died just now is seen for up to "
+        "20 s more."
+    )
+
+
+def belonging(servers: tuple[Endpoint, ...], ends: tuple[Endpoint, ...]) -> tuple[Endpoint, ...]:
+    """Those endpoints that belong to the processes of these servers."""
+    processes = {each.process for each in servers}
+    return tuple(each for each in ends if each.process in processes)
+
+
+def foreign_middleware(domain: Domain, server: Endpoint) -> str:
+    """The name of a server's middleware if it is not ours: then it may be seen but never answers."""
+    theirs = server.gid[:4]
+    if theirs == domain.process[:4]:
+        return ""
+    return _VENDORS.get(theirs, "another middleware")

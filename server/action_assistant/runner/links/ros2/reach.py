@@ -1,0 +1,95 @@
+"""Reaches TeMoto Action Engines over ROS 2, through rclpy.
+
+Imported by `ros2_reach` alone, which says why it cannot be.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable
+
+import anyio
+import anyio.to_thread
+import rclpy
+
+from action_assistant.runner.links.port import Candidate, Link, Registration
+from action_assistant.runner.links.ros2.domain import Domain
+from action_assistant.runner.links.ros2.link import Ros2Link
+from action_assistant.runner.links.ros2.outlets import Topics
+from action_assistant.runner.links.ros2.peers import OLDER, generation_of, topics_of, two_servers
+from action_assistant.runner.links.unreachable import UnreachableLink
+from action_assistant.umrf.facts import PINNED, EngineFacts
+
+
+class Ros2:
+    """Makes the links, and holds the domains they share. One per process: a process has one
+    middleware, chosen by RMW_IMPLEMENTATION before anything else happens."""
+
+    def __init__(self, clock_us: Callable[[], int], home: int) -> None:
+        self._clock_us = clock_us
+        self._home = home
+        self._domains: dict[tuple[int, Topics], Domain] = {}
+        self._joining = anyio.Lock()
+
+    @property
+    def rmw(self) -> str:
+        """The middleware of this process."""
+        return rclpy.get_rmw_implementation_identifier()
+
+    def link(self, registration: Registration, facts: EngineFacts) -> Link:
+        """A link to a robot; one that says why, if it is on another middleware."""
+        if registration.rmw not in {"", self.rmw}:
+            return UnreachableLink(
+                f"{registration.name} is registered with {registration.rmw}, but this runner speaks "
+                f"{self.rmw}, and two of them cannot ask each other anything. A process has one: "
+                "start the runner with RMW_IMPLEMENTATION set to the robot's"
+            )
+        return Ros2Link(self.domain, registration, facts, self._clock_us)
+
+    async def domain(self, number: int, topics: Topics) -> Domain:
+        """A domain, joined when it is first asked for. Raises RuntimeError."""
+        async with self._joining:
+            known = self._domains.get((number, topics))
+            if known is None:
+                loop = asyncio.get_running_loop()
+                known = await anyio.to_thread.run_sync(
+                    lambda: Domain(number, topics, loop, self._clock_us)
+                )
+                self._domains[number, topics] = known
+            return known
+
+    async def candidates(self) -> tuple[Candidate, ...]:
+        """Whoever answers as engines do, on the domains of links and the one of the environment."""
+        await self.domain(self._home, topics_of(PINNED))
+        domains = tuple(self._domains.values())
+        youngest = max(each.settled_at for each in domains)
+        await anyio.sleep(max(0.0, youngest - time.monotonic()))
+        found = {
+            (domain.number, path): self._candidate(domain, path)
+            for domain in domains
+            for path in domain.paths()
+        }
+        return tuple(found[key] for key in sorted(found))
+
+    def _candidate(self, domain: Domain, path: str) -> Candidate:
+        servers = domain.servers(path)
+        alone = len(servers) == 1 and len(domain.paths()) == 1 and len(domain.actors) == 1
+        generation = generation_of(domain, servers)
+        problem = two_servers(path, len(servers)) if len(servers) > 1 else ""
+        if generation == "older":
+            problem = OLDER
+        return Candidate(
+            domain=domain.number,
+            rmw=self.rmw,
+            get_service=path,
+            servers=len(servers),
+            actor=next(iter(domain.actors)) if alone else "",
+            generation=generation,
+            problem=problem,
+        )
+
+    async def aclose(self) -> None:
+        """Leave every domain."""
+        with anyio.CancelScope(shield=True):
+            while self._domains:
+                _, domain = self._domains.popitem()
+                await anyio.to_thread.run_sync(domain.leave)

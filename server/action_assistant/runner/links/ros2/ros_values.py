@@ -1,0 +1,51 @@
+"""What is seen and heard on a ROS 2 domain, as values without ROS 2.
+
+`Domain` over rclpy tells its links these, and so does the air of virtual time in which tests fly.
+"""
+
+from typing import TypeAlias
+
+import msgspec
+
+from action_assistant.runner.links.observations import Snapshot
+from action_assistant.runner.links.port import Command, Feedback
+
+
+class Endpoint(msgspec.Struct, frozen=True):
+    """A publisher, a subscription or a server of somebody. `gid` is another one after every restart;
+    `process` is the part of it that all endpoints of one process share. `logger` is the name under
+    which its node logs."""
+
+    gid: str
+    process: str
+    logger: str
+    type_hash: str
+
+
+class OverheardCommand(msgspec.Struct, frozen=True, kw_only=True):
+    """A command that somebody else published. `graph` is the name that engines go by."""
+
+    command: Command
+    graph: str
+    umrf: str
+    targets: tuple[str, ...]
+    sender: str
+
+
+class LogLine(msgspec.Struct, frozen=True):
+    """A line of somebody's log."""
+
+    logger: str
+    text: str
+
+
+RosValue: TypeAlias = Feedback | OverheardCommand | LogLine
+
+
+class GetResult(msgspec.Struct, frozen=True, kw_only=True):
+    """What a server answered. `graphs` and `texts` are what it runs or has run; `known_…` its index."""
+
+    graphs: tuple[Snapshot, ...]
+    texts: dict[str, str]
+    known_actions: tuple[str, ...]
+    known_graphs: tuple[str, ...]

@@ -1,0 +1,127 @@
+"""The tables of the runner: a fold of the events, written in their transactions."""
+
+from collections.abc import Sequence
+
+import msgspec
+from sqlalchemy import Executable, func, insert, update
+from sqlalchemy.dialects.sqlite import insert as upsert
+
+from action_assistant.journal.events import Event
+from action_assistant.runner.analysis import annotations, expected_runs
+from action_assistant.runner.robots.registration import RobotRegistered, RobotRemoved
+from action_assistant.runner.runs.events import (
+    AlarmRaised,
+    Answered,
+    Ended,
+    MovesAgain,
+    Proof,
+    Published,
+    Requested,
+    Silent,
+    StopRequested,
+    decode,
+)
+from action_assistant.runner.runs.queries import OPEN
+from action_assistant.schema.runner_tables import review, robot, run
+
+
+def fold(event: Event) -> Sequence[Executable]:
+    """What an event means for the tables."""
+    if event.kind == RobotRegistered.kind:
+        return (_robot(msgspec.json.decode(event.body, type=RobotRegistered)),)
+    if annotations.is_about(event.stream):
+        return annotations.fold(event)
+    if event.stream == expected_runs.STREAM:
+        return expected_runs.fold(event)
+    if event.kind == RobotRemoved.kind:
+        gone = msgspec.json.decode(event.body, type=RobotRemoved)
+        return (update(robot).where(robot.c.name == gone.name).values(retired_at=gone.at),)
+    if not event.stream.startswith("run/"):
+        return ()
+    change = update(run).where(run.c.id == event.stream.removeprefix("run/"))
+    match decode(event.kind, event.body):
+        case Requested() as asked:
+            return (_run(asked),)
+        case Published() as sent:
+            return (change.values(started_at=sent.at),)
+        case StopRequested() as stop:
+            first = change.where(run.c.desired != "stopped")
+            return (
+                first.values(
+                    desired="stopped",
+                    stopped_by=stop.author.name,
+                    summary=func.json_set(
+                        run.c.summary,
+                        "$.stopped_by",
+                        func.json(msgspec.json.encode(stop.author).decode()),
+                    ),
+                ),
+            )
+        case Proof() as proof:
+            return (change.values(summary=func.json_set(run.c.summary, "$.proof_at", proof.at)),)
+        case Silent() as silent:
+            since = func.json_set(run.c.summary, "$.unknown_since", silent.since)
+            return (change.values(summary=since),)
+        case Answered():
+            return (change.values(summary=func.json_remove(run.c.summary, "$.unknown_since")),)
+        case AlarmRaised() as alarm:
+            text = msgspec.json.encode({"code": alarm.code, "at": alarm.at, "text": alarm.text})
+            more = func.json_insert(run.c.summary, "$.alarms[#]", func.json(text.decode()))
+            return (change.values(summary=more),)
+        case MovesAgain() as again_:
+            return _open_again(event.stream.removeprefix("run/"), again_)
+        case Ended() as end:
+            summary = func.json_set(run.c.summary, "$.detail", end.detail)
+            if end.at_rest is not None:
+                seen = msgspec.json.encode(end.at_rest).decode()
+                summary = func.json_set(summary, "$.at_rest", func.json(seen))
+            return (
+                change.values(state=end.state, ended_at=end.at, result=end.result, summary=summary),
+            )
+        case _:
+            return ()
+
+
+def _open_again(id_: str, moves: MovesAgain) -> Sequence[Executable]:
+    """A run that was over is not; its sum is made anew at its next end."""
+    text = msgspec.json.encode({"code": "moves_again", "at": moves.at, "text": moves.text})
+    more = func.json_insert(run.c.summary, "$.alarms[#]", func.json(text.decode()))
+    summary = func.json_remove(more, "$.proof_at", "$.unknown_since", "$.detail", "$.at_rest")
+    values = {"state": OPEN, "ended_at": None, "summary": summary}
+    return (
+        update(run).where(run.c.id == id_).values(**values),
+        update(review).where(review.c.run == id_).values(summed=False),
+    )
+
+
+def _run(asked: Requested) -> Executable:
+    return insert(run).values(
+        id=asked.run,
+        number=asked.number,
+        graph=asked.graph,
+        graph_name=asked.graph_name,
+        version=asked.version,
+        digest=asked.digest,
+        engine=asked.engine,
+        author_id=asked.author.id,
+        author_name=asked.author.name,
+        state=OPEN,
+        desired="running",
+        simulated=asked.simulated,
+        request_id=asked.request_id,
+        requested_at=asked.at,
+        summary={"alarms": []} if asked.group is None else {"alarms": [], "group": asked.group},
+    )
+
+
+def _robot(robot_: RobotRegistered) -> Executable:
+    values = {
+        "domain": robot_.domain,
+        "rmw": robot_.rmw,
+        "get_service": robot_.get_service,
+        "profile": robot_.profile,
+        "registered_at": robot_.at,
+        "retired_at": None,
+    }
+    statement = upsert(robot).values(name=robot_.name, **values)
+    return statement.on_conflict_do_update(index_elements=["name"], set_=values)

@@ -1,0 +1,487 @@
+"""The review service: sums up ended runs, keeps marks, compares, exports, checks expectations."""
+
+import logging
+from collections import Counter
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from datetime import datetime
+from typing import Any, Concatenate, Final, Literal, ParamSpec, Protocol, TypeAlias, TypeVar
+
+import anyio
+import msgspec
+from sqlalchemy import Row, Select, func, select
+
+from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refused, TooLarge
+from action_assistant.journal.events import Draft, Event
+from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
+from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.causes import causes
+from action_assistant.runner.analysis.comparison import RunComparison, compare
+from action_assistant.runner.analysis.keyframes import KeyframeStore
+from action_assistant.runner.analysis.replay import RunReplay, run_replay
+from action_assistant.runner.archives import examples
+from action_assistant.runner.archives.archive_store import Archived, ArchiveStore
+from action_assistant.runner.archives.raw_messages import RawMessages, RawPut, raw_of, stream_of_raw
+from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.robots.recordings import Recording, hours
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.history import RunHistory
+from action_assistant.runner.runs.recorder import RunRecorder, stream_of
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.workers import Crashed
+from action_assistant.schema.runner_tables import expectation, review, run, run_label
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics import script_from
+from action_assistant.web.workers.lanes import RunInWorker
+
+log: Final = logging.getLogger(__name__)
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_TRIES: Final = 3
+_LAST: Final = 1_000  # runs in one statistics
+_CAUSES: Final = 10  # in one answer
+_AT_ONCE: Final = 200  # runs summed up between two looks
+_ROWS: Final = 400  # parameters of one query
+_PAGE: Final = 500  # events exported at once
+_CLOCK: Final = 3_600_000_000  # microseconds by which a clock may be set back
+
+Format: TypeAlias = Literal["jsonl", "csv", "mcap"]
+
+
+class RunMarks(msgspec.Struct, frozen=True):
+    """What people noted about a run."""
+
+    pinned: bool
+    note: str
+    labels: list[str]
+
+
+class Expectation(msgspec.Struct, frozen=True, kw_only=True):
+    """A run that shall go the same for ever, with all that simulating it again takes."""
+
+    name: str
+    run: str
+    graph: str | None
+    graph_name: str
+    author: Author
+    umrf: msgspec.Raw
+    script: msgspec.Raw
+    course: list[expected_runs.ExpectedStep]
+
+
+class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
+    """One cause in a sentence, with its evidence: the moment, the event `seq` by which it had been
+    seen, the action, and the words that were said there."""
+
+    kind: str
+    text: str
+    at: datetime
+    seq: int
+    action: str | None
+    aid: str | None
+    quote: str
+
+
+class ReviewQueries(Protocol):
+    """Somebody who answers what a method of `ReviewService` would."""
+
+    async def value(
+        self,
+        question: Callable[Concatenate["ReviewService", P], Awaitable[T]],
+        *args: P.args,
+        **kw: P.kwargs,
+    ) -> T:
+        """The answer."""
+        ...
+
+
+class OngoingRun(Protocol):
+    """A run that goes on."""
+
+    run: Run
+    recorder: RunRecorder
+
+
+class OngoingRuns(Protocol):
+    """What goes on, as far as looking back needs it: open runs, and how others are read."""
+
+    history: RunHistory
+
+    @property
+    def open(self) -> Mapping[str, OngoingRun]:
+        """The runs that are not over."""
+        ...
+
+    def next_number(self) -> int:
+        """The number of a run that is taken in."""
+        ...
+
+    def watch(self, watcher: Callable[[OngoingRun], None]) -> None:
+        """Be told, at once, of every run that has changed."""
+        ...
+
+
+class ReviewService:
+    """Looks back on runs. Nothing here commands a robot. What only reads is asked of a worker that
+    has a desk of its own (`stored.Asked`), over the same file and with nothing that goes on."""
+
+    def __init__(
+        self,
+        control: OngoingRuns,
+        ledger: ArchiveStore,
+        run_in_worker: RunInWorker,
+        clock_us: ClockUs,
+        asked: ReviewQueries | None = None,
+    ) -> None:
+        self.keyframe_store = KeyframeStore(ledger, run_in_worker)
+        self._asked = asked
+        self._control = control
+        self._ledger = ledger
+        self._run_in_worker = run_in_worker
+        self._clock_us = clock_us
+        self._ended = anyio.Event()
+        self._summed_up: int | None = None  # all runs that had ended by then are summed up
+        self._tried: Counter[str] = Counter()  # runs whose sums took a worker's life
+        control.watch(self._saw)
+
+    def _saw(self, opened: OngoingRun) -> None:
+        if opened.run.end is not None:
+            if not opened.recorder.recorded:
+                self._summed_up = None  # it may be stored long after it ended
+            self._ended.set()
+
+    async def run(self) -> None:
+        """Sum up runs that have ended, those of earlier processes too, until cancelled."""
+        while True:
+            ended, self._ended = self._ended, anyio.Event()
+            try:
+                left = await self._sum_up_some()
+            except Refused as refused:
+                log.warning("runs cannot be summed up now: %s", refused.detail)
+                await anyio.sleep(5)
+                continue
+            if left:
+                continue
+            if ended.is_set():  # its last events may still be on their way to the journal
+                await anyio.sleep(0.2)
+                continue
+            await self._ended.wait()
+
+    async def _sum_up_some(self) -> bool:
+        """Sum up the newest runs that are over and are not yet. Whether any was."""
+        before, since = self._clock_us(), self._summed_up
+        figures = func.coalesce(func.json_extract(run.c.summary, "$.figures"), 0)
+        done = select(review.c.run).where(
+            review.c.run == run.c.id, review.c.summed, figures == annotations.FIGURES
+        )
+        query = (
+            select(run.c.id)
+            .where(run.c.archived_at.is_(None), run.c.ended_at > (since or 0), ~done.exists())
+            .order_by(run.c.number.desc())
+            .limit(_AT_ONCE)
+        )
+        rows = await self._ledger.query(query)
+        for row in rows:
+            await self._sum_up(row.id)
+        if not rows:
+            self._summed_up = before - _CLOCK
+        return bool(rows)
+
+    async def _sum_up(self, run_id: str) -> None:
+        try:
+            if self._asked is None:
+                summed = await self.summed(run_id, self._clock_us())
+            else:
+                summed = await self._asked.value(ReviewService.summed, run_id, self._clock_us())
+        except Refused as refused:
+            self._tried[run_id] += 1
+            if self._tried[run_id] < _TRIES or not isinstance(refused, Crashed | TooLarge):
+                raise  # it will be, later
+            log.error("run %s is left out of sums: %s", run_id, refused.detail)
+            summed = annotations.SummedUp(self._clock_us(), {})
+        except Exception:  # whatever a run of long ago holds, those that go on are not ended by it
+            log.exception("run %s cannot be read; it is left out of sums", run_id)
+            summed = annotations.SummedUp(self._clock_us(), {}, figures=annotations.FIGURES)
+        await self._ledger.append(annotations.stream_about(run_id), [annotations.draft(summed)])
+
+    async def summed(self, run_id: str, now: int) -> annotations.SummedUp:
+        """The sum of a run that is over. Raises NotFound."""
+        found = (await self.keyframe_store.keyframes(run_id)).keys[-1].run
+        good = found.end == "finished" and found.result == "on_true"
+        graph = None if good else await self._graph(run_id)  # only failures have causes
+        return await self._run_in_worker(lambda: annotations.sum_of(found, graph, now))
+
+    async def whole(self, run_id: str) -> views.RunWhole:
+        """A run that is over, and the graph as it was sent. Raises NotFound."""
+        umrf = await self._control.history.umrf(run_id)
+        found, place = await self.known(run_id), await self.place(run_id)
+        return views.whole(found, views.sent_of(umrf), place=place)
+
+    async def followed(self, run_id: str, robots_too: bool) -> tuple[Run, int]:
+        """A run and the seq of its last event; with few visits unless it has to go on exactly.
+        Raises NotFound."""
+        key = (await self.keyframe_store.keyframes(run_id)).keys[-1]
+        return (key.run if robots_too else views.thinned(key.run)), key.seq
+
+    async def known(self, run_id: str) -> Run:
+        """A run, open or over. Raises NotFound."""
+        opened = self._control.open.get(run_id)
+        return (
+            opened.run
+            if opened is not None
+            else (await self.keyframe_store.keyframes(run_id)).keys[-1].run
+        )
+
+    # --- one run ------------------------------------------------------------------------------
+
+    async def causes(self, run_id: str) -> list[CauseShown]:
+        """What is proven to be behind the end of a run, the weightiest first. Raises NotFound."""
+        found, graph = await self.known(run_id), await self._graph(run_id)
+        named = await self._run_in_worker(lambda: causes(found, graph))
+        shown: list[CauseShown] = []
+        for each in named[:_CAUSES]:
+            action = found.actions.get(each.action or "")
+            shown.append(
+                CauseShown(
+                    kind=str(each.__struct_config__.tag),
+                    text=words(each, found),
+                    at=views.time(each.at),
+                    seq=await self.keyframe_store.seq_at(run_id, each.at),
+                    action=each.action,
+                    aid=action.aid if action is not None else None,
+                    quote=each.quote,
+                )
+            )
+        return shown
+
+    async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
+        """Rows of the tables. Raises Unavailable."""
+        return await self._ledger.query(statement)
+
+    async def events(self, run_id: str, after: int, limit: int) -> Sequence[Event]:
+        """Stored events of a run. Raises Unavailable."""
+        return await self._control.history.events(run_id, after, limit)
+
+    async def sent(self, run_id: str) -> views.Sent:
+        """The graph as it was sent, and the values of its actions. Raises NotFound."""
+        return views.sent_of(await self._control.history.umrf(run_id))
+
+    async def place(self, run_id: str) -> Row[Any] | None:
+        """Where the events of a run are, when they are in an archive."""
+        return await self._ledger.place(stream_of(run_id))
+
+    async def raw(self, run_id: str, recordings: Sequence[Recording], now: int) -> RawMessages:
+        """The raw messages of its robot from its time; `recordings` are all of it that are here.
+        Raises NotFound."""
+        run_ = await self.known(run_id)
+        until = run_.ended_at or now
+        first, last = hours(run_.started_at or run_.requested_at, until)
+        here = [
+            each
+            for each in recordings
+            if not run_.simulated and first <= each.name[: len(first)] <= last
+        ]
+        told = await self._ledger.read(stream_of_raw(run_.engine))
+        gone = (msgspec.json.decode(event.body, type=RawPut) for event in told)
+        return raw_of(run_, here, gone, until)
+
+    async def replay(self, run_id: str, after: int) -> RunReplay:
+        """A page of the run's film. Raises NotFound."""
+        return await run_replay(self.keyframe_store, run_id, after=after)
+
+    async def umrf(self, run_id: str) -> bytes:
+        """The graph as it was sent. Raises NotFound."""
+        return (await self._control.history.umrf(run_id)).encode()
+
+    async def mark(self, run_id: str, marks: annotations.Marks, author: Author) -> RunMarks:
+        """Pin, note or label a run. Raises NotFound."""
+        await self.known(run_id)
+        marked = annotations.Marked(self._clock_us(), author, marks)
+        await self._ledger.append(annotations.stream_about(run_id), [annotations.draft(marked)])
+        return await self.marks(run_id)
+
+    async def marks(self, run_id: str) -> RunMarks:
+        """What people noted about it."""
+        rows = await self._ledger.query(select(review).where(review.c.run == run_id))
+        labels = await self._ledger.query(
+            select(run_label.c.label).where(run_label.c.run == run_id).order_by(run_label.c.label)
+        )
+        pinned, note = (rows[0].pinned, rows[0].note) if rows else (False, "")
+        return RunMarks(bool(pinned), note, [row.label for row in labels])
+
+    async def compare(self, a: str, b: str) -> RunComparison:
+        """Two runs side by side. Raises NotFound."""
+        one, other = await self.known(a), await self.known(b)
+        umrf_a = await self._control.history.umrf(a)
+        umrf_b = await self._control.history.umrf(b)
+        return await self._run_in_worker(lambda: compare(one, other, umrf_a, umrf_b))
+
+    async def export(self, run_id: str, form: Format) -> bytes:
+        """The run as a file. Raises NotFound."""
+        found = await self.known(run_id)
+        if form == "csv":
+            return await self._run_in_worker(lambda: exports.intervals(found))
+        events = await self._ledger.read(stream_of(run_id))
+        if form == "mcap":
+            return await self._run_in_worker(lambda: exports.mcap(events))
+        return await self._run_in_worker(lambda: b"".join(exports.lines(run_id, events)))
+
+    async def lines(self, run_id: str, after: int) -> tuple[int, bytes]:
+        """A page of JSON lines, and the seq of its last event; the run may be longer than memory
+        should hold. Raises NotFound when there is nothing at all."""
+        events = await self._ledger.read(stream_of(run_id), after=after, limit=_PAGE)
+        if not events and not after:
+            raise NotFound("There is no such run.")
+        return events[-1].seq if events else after, b"".join(exports.lines(run_id, events))
+
+    async def script(
+        self, run_id: str, fault: tuple[str, expected_runs.Fault] | None, umrf: bytes | None = None
+    ) -> expected_runs.Recorded:
+        """What the run did as a script, for its own graph or for another version of it. Raises
+        NotFound, BadInput, NotUmrf."""
+        found = await self.known(run_id)
+        if fault is not None and fault[0] not in found.actions:
+            raise BadInput(f"The run has no action {fault[0]!r}.", where={"path": "/fault"})
+        script = expected_runs.recorded(found, fault)
+        if umrf is None:
+            return script
+        try:
+            reading = await self._run_in_worker(lambda: codec.read(umrf))
+        except codec.Unreadable as wrong:
+            raise NotUmrf(wrong.message, where={"path": f"/umrf{wrong.path}"}) from wrong
+        return expected_runs.fitted(script, found, reading.graph)
+
+    # --- many runs ----------------------------------------------------------------------------
+
+    async def statistics(self, graph: str, engine: str | None, last: int) -> statistics.Statistics:
+        """The newest runs of a graph together."""
+        rows = await self._ledger.query(statistics.runs_of(graph, engine, min(last, _LAST)))
+        ids = [row.id for row in rows]
+        sums: list[Row[Any]] = []
+        for i in range(0, len(ids), _ROWS):
+            sums += await self._ledger.query(statistics.sums_of(ids[i : i + _ROWS]))
+        newest = await self._graph(ids[0]) if ids else None
+        return await self._run_in_worker(lambda: statistics.statistics(rows, sums, newest))
+
+    async def _graph(self, run_id: str) -> Graph | None:
+        try:
+            text = await self._control.history.umrf(run_id)
+            return codec.read(text.encode()).graph
+        except (codec.Unreadable, Archived):
+            return None
+
+    async def take_in(self, texts: Sequence[bytes], author: Author) -> list[str]:
+        """Take in recorded runs as examples, each once; their ids. Raises BadInput, Unavailable."""
+        taken: list[str] = []
+        for text in texts:
+            first, rest = examples.read(text)
+            stream = stream_of(first.run)
+            if not await self._ledger.newest(stream):
+                label = annotations.Marks(labels=(examples.LABEL,))
+                marked = annotations.Marked(self._clock_us(), author, label)
+                await self._ledger.append(
+                    annotations.stream_about(first.run), [annotations.draft(marked)]
+                )
+                begin = examples.numbered(first, self._control.next_number())
+                await self._ledger.append(stream, [begin, *rest], expected=0)
+            taken.append(first.run)
+        self._summed_up = None  # they ended long ago
+        self._ended.set()
+        return taken
+
+    # --- expectations -------------------------------------------------------------------------
+
+    async def expect(self, run_id: str, name: str, author: Author) -> Expectation:
+        """Save the course of a run as what is expected for ever. Raises NotFound, BadInput,
+        Conflict when the simulator does not take the same course as the run."""
+        name = " ".join(name.split())
+        if not 1 <= len(name) <= 100:
+            raise BadInput("A name has 1 to 100 characters.", where={"path": "/name"})
+        if run_id in self._control.open:
+            raise Conflict("The run is not over yet.")
+        if self._asked is None:
+            saved = await self.expected(run_id, name, author, self._clock_us())
+        else:
+            saved = await self._asked.value(
+                ReviewService.expected, run_id, name, author, self._clock_us()
+            )
+        draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
+        await self._ledger.append(expected_runs.STREAM, [draft])
+        return _shown(saved)
+
+    async def expected(
+        self, run_id: str, name: str, author: Author, now: int
+    ) -> expected_runs.Expected:
+        """What would be expected. Raises NotFound, Conflict."""
+        found = await self.known(run_id)
+        if found.end is None:
+            raise Conflict("The run is not over yet.")
+        umrf = await self._control.history.umrf(run_id)
+        recorded = expected_runs.recorded(found)
+        script = {"behaviours": recorded.behaviours}
+        course = expected_runs.course(codec.read(umrf.encode()).graph, script_from(script))
+        _check_alike(found, course)
+        return expected_runs.Expected(
+            at=now,
+            name=name,
+            author=author,
+            run=found.id,
+            graph=found.graph,
+            graph_name=found.graph_name,
+            umrf=umrf,
+            script=msgspec.json.encode(script).decode(),
+            course=course,
+        )
+
+    async def expectations(self) -> list[Expectation]:
+        """All of them, by name."""
+        rows = await self._ledger.query(select(expectation).order_by(expectation.c.name))
+        return [_shown(await self._saved(row.seq)) for row in rows]
+
+    async def _saved(self, seq: int) -> expected_runs.Expected:
+        (event,) = await self._ledger.read(expected_runs.STREAM, after=seq - 1, upto=seq)
+        return msgspec.json.decode(event.body, type=expected_runs.Expected)
+
+    async def retire(self, name: str, author: Author) -> None:
+        """Expect it no more. Raises NotFound."""
+        if not await self._ledger.query(select(expectation).where(expectation.c.name == name)):
+            raise NotFound(f"Nothing is expected under the name {name!r}.")
+        retired = expected_runs.Retired(self._clock_us(), name, author)
+        draft = Draft(retired.kind, author.id, msgspec.json.encode(retired))
+        await self._ledger.append(expected_runs.STREAM, [draft])
+
+
+def _check_alike(found: Run, course: tuple[expected_runs.ExpectedStep, ...]) -> None:
+    """A run that the simulator cannot repeat is no expectation: it would fail by itself."""
+    simulated: dict[str, list[str]] = {}
+    for step in course:
+        if step.what == "result":
+            own = step.graph == found.graph_name
+            name = step.node if own else f"{step.graph}/{step.node}"
+            simulated.setdefault(name, []).append(step.how.removeprefix("on_"))
+    for name, action in found.actions.items():
+        seen = [visit.result for visit in action.visits if visit.result not in {None, "stopped"}]
+        again_ = [each for each in simulated.get(name, []) if each != "stopped"]
+        if len(seen) == len(action.visits) and seen != again_:
+            raise Conflict(
+                f"The simulator does not repeat this run: {name} ended {', '.join(again_) or 'never'} "
+                f"there, and {', '.join(map(str, seen)) or 'never'} in the run. Its arrows may "
+                "depend on something that was not recorded.",
+                where={"path": "/run", "action": name},
+            )
+
+
+def _shown(saved: expected_runs.Expected) -> Expectation:
+    return Expectation(
+        name=saved.name,
+        run=saved.run,
+        graph=saved.graph,
+        graph_name=saved.graph_name,
+        author=saved.author,
+        umrf=msgspec.Raw(saved.umrf.encode()),
+        script=msgspec.Raw(saved.script.encode()),
+        course=list(saved.course),
+    )

@@ -1,0 +1,183 @@
+"""Queries about stored runs, answered in a worker that reads the database itself, read-only.
+
+A question is a method of `ReviewService`. `WorkerQueries` is the runner's side: it has what was just shown stored
+before it asks, and keeps what the worker folded on the way.
+"""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any, Concatenate, Final, NoReturn, ParamSpec, TypeVar, cast
+
+import anyio
+import msgspec
+from litestar import MediaType, Response
+
+from action_assistant.errors import Refused, Unavailable
+from action_assistant.journal.events import Draft, StreamSnapshot
+from action_assistant.journal.reader import FileJournalReader
+from action_assistant.runner.analysis.keyframes import SnapshotJournal
+from action_assistant.runner.archives.archive_store import ArchiveStore
+from action_assistant.runner.review.service import OngoingRun, ReviewService
+from action_assistant.runner.runs.history import Ledger, RunHistory
+from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.runs.run import Run
+from action_assistant.web.workers.lanes import RunInWorker
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_SETTLED_S: Final = 2.0  # for what was shown to be stored; then what is stored is told
+
+
+def json_of(text: bytes, _: type[T]) -> Response[T]:
+    """An answer that was encoded elsewhere; the type is for those who read the interface."""
+    return cast("Response[T]", Response(text, media_type=MediaType.JSON))
+
+
+class StoragePaths(msgspec.Struct, frozen=True):
+    """Where the runs are: the database file, and the folder of archives."""
+
+    database: Path
+    archive: Path
+
+
+class WorkerQueries:
+    """Asks a worker. `opened` are the runs that go on, once that is known."""
+
+    def __init__(
+        self, run_in_worker: RunInWorker, place: StoragePaths, ledger: SnapshotJournal
+    ) -> None:
+        self.opened: Mapping[str, OngoingRun] = {}
+        self._run_in_worker = run_in_worker
+        self._place = place
+        self._ledger = ledger
+
+    async def value(
+        self,
+        question: Callable[Concatenate[ReviewService, P], Awaitable[T]],
+        *args: P.args,
+        **kw: P.kwargs,
+    ) -> T:
+        """What a method of `ReviewService` returns. Raises what that raises, Unavailable, TooMany."""
+        await self._settled(args)
+        found, kept = await self._run_in_worker(
+            answered, self._place, partial(question, **kw) if kw else question, args
+        )
+        await self._keep(kept)
+        value: T = found
+        return value
+
+    async def text(
+        self,
+        question: Callable[Concatenate[ReviewService, P], Awaitable[T]],
+        *args: P.args,
+        **kw: P.kwargs,
+    ) -> bytes:
+        """The same as JSON: it need not be taken apart and put together here."""
+        await self._settled(args)
+        found, kept = await self._run_in_worker(
+            encoded, self._place, partial(question, **kw) if kw else question, args
+        )
+        await self._keep(kept)
+        text: bytes = found
+        return text
+
+    async def newest(self, run: str) -> int:
+        """The seq of the last stored event of a run; 0 when there is none. Raises Unavailable."""
+        await self._settled([run])
+        return await self._ledger.newest(stream_of(run))
+
+    async def past(self, run: str, robots_too: bool) -> tuple[Run, int]:
+        """As `history.Past`."""
+        return await self.value(ReviewService.followed, run, robots_too)
+
+    async def _settled(self, args: Sequence[object]) -> None:
+        for each in args:
+            opened = self.opened.get(each) if isinstance(each, str) else None
+            if opened is not None:
+                with anyio.move_on_after(_SETTLED_S):
+                    await opened.recorder.flushed()
+
+    async def _keep(self, kept: Sequence[StreamSnapshot]) -> None:
+        for each in kept:
+            with suppress(Refused):  # a cache: it is made again when the journal can be written
+                await self._ledger.keep_snapshot(each.stream, each.seq, each.state)
+
+
+def answered(
+    place: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
+) -> tuple[Any, list[StreamSnapshot]]:
+    """In the worker: the answer, and what of it is worth keeping."""
+    review_service, file = _reading(place)
+    found = asyncio.run(_asked(question, review_service, args))
+    return found, file.given()
+
+
+def encoded(
+    place: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
+) -> tuple[bytes, list[StreamSnapshot]]:
+    """The same as JSON."""
+    found, kept = answered(place, question, args)
+    return msgspec.json.encode(found), kept
+
+
+async def _asked(
+    question: Callable[..., Awaitable[Any]], review_service: ReviewService, args: Sequence[Any]
+) -> object:
+    return await question(review_service, *args)
+
+
+@lru_cache(maxsize=1)
+def _reading(place: StoragePaths) -> "tuple[ReviewService, _ReadOnlyJournal]":
+    file = _ReadOnlyJournal(place.database)
+    archive_store = ArchiveStore(file, place.archive, _here)
+    return ReviewService(_NoOngoingRuns(archive_store), archive_store, _here, _no_clock), file
+
+
+async def _here(work: Callable[..., T], *args: Any) -> T:
+    return work(*args)
+
+
+def _no_clock() -> NoReturn:
+    raise AssertionError("what is stored needs no clock to be read")
+
+
+class _ReadOnlyJournal(FileJournalReader):
+    """The journal as a worker has it: what is to be kept is given to the runner."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._kept: list[StreamSnapshot] = []
+
+    async def append(
+        self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
+    ) -> int:
+        """Never."""
+        raise Unavailable("A worker writes nothing.")
+
+    async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
+        """By the runner."""
+        self._kept.append(StreamSnapshot(stream, seq, state))
+
+    def given(self) -> list[StreamSnapshot]:
+        """What is to be kept, once."""
+        given, self._kept = self._kept, []
+        return given
+
+
+class _NoOngoingRuns:
+    """Where nothing goes on: all that is known is stored."""
+
+    def __init__(self, ledger: Ledger) -> None:
+        self.open: Mapping[str, OngoingRun] = {}
+        self.history = RunHistory(ledger)
+
+    def next_number(self) -> int:
+        """Nothing begins here."""
+        raise NotImplementedError
+
+    def watch(self, watcher: Callable[[OngoingRun], None]) -> None:
+        """Nothing changes here."""

@@ -1,0 +1,1 @@
+"""Robots: their engines as watched, registrations, what others told them."""

@@ -1,0 +1,179 @@
+"""Recordings of raw messages of engines, by the hour.
+
+Beside the journal and with its own retention: one folder per robot, one file of JSON lines per hour,
+compressed. Of an answer only the graphs that are otherwise than in the one before are kept. A file is
+a row of gzip members, so that a crash costs the last seconds and nothing else.
+"""
+
+import gzip
+import logging
+from collections import deque
+from collections.abc import Iterable
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import anyio
+import msgspec
+
+from action_assistant.errors import NotFound
+from action_assistant.private_files import make_folder, opener
+from action_assistant.runner.links.observations import Snapshot
+from action_assistant.runner.links.port import Answer, Feedback
+from action_assistant.web.workers.lanes import RunInWorker
+
+log: Final = logging.getLogger(__name__)
+
+_EVERY_S: Final = 2.0
+_WAITING: Final = 2_000  # lines in memory; then the oldest go
+_KEPT_DAYS: Final = 7
+_KEPT_BYTES: Final = 500_000_000
+_ENDING: Final = ".jsonl.gz"
+
+
+class GetLine(msgspec.Struct, frozen=True, omit_defaults=True, tag="get", tag_field="kind"):
+    """An answer: graphs that are not as before, as the engine wrote them, and those that have gone."""
+
+    at: int
+    asked_at: int
+    incarnation: str
+    changed: dict[str, str] = {}
+    gone: tuple[str, ...] = ()
+
+
+class FeedbackLine(msgspec.Struct, frozen=True, tag="feedback", tag_field="kind"):
+    """What came by itself, oldest first."""
+
+    at: int
+    actor: str
+    snapshots: tuple[Snapshot, ...]
+
+
+class Recording(msgspec.Struct, frozen=True):
+    """A file: its name (the hour, UTC) and its size in bytes."""
+
+    name: str
+    bytes: int
+
+
+class Recordings:
+    """Writes while `run` goes. `kept_bytes` bounds all robots together. Unless it `prunes`, somebody
+    else has to take away what is `due`."""
+
+    def __init__(
+        self,
+        folder: Path,
+        run_in_worker: RunInWorker,
+        *,
+        kept_days: int = _KEPT_DAYS,
+        kept_bytes: int = _KEPT_BYTES,
+        prunes: bool = True,
+    ) -> None:
+        self._folder = folder
+        self._prunes = prunes
+        self._run_in_worker = run_in_worker
+        self._kept_days = kept_days
+        self._kept_bytes = kept_bytes
+        self._waiting: deque[tuple[str, int, bytes]] = deque(maxlen=_WAITING)
+        self._texts: dict[str, dict[str, str]] = {}
+
+    def heard(self, robot: str, answer: Answer) -> None:
+        """An answer has come."""
+        before = self._texts.get(robot, {})
+        changed = {name: text for name, text in answer.texts.items() if before.get(name) != text}
+        gone = tuple(sorted(before.keys() - answer.texts.keys()))
+        if not changed and not gone:
+            return
+        self._texts[robot] = answer.texts
+        line = GetLine(answer.at, answer.asked_at, answer.incarnation, changed, gone)
+        self._waiting.append((robot, answer.at, msgspec.json.encode(line)))
+
+    def fed(self, robot: str, feedback: Feedback) -> None:
+        """Feedback has come."""
+        if feedback.snapshots:
+            at = feedback.snapshots[-1].at
+            line = FeedbackLine(at, feedback.actor, feedback.snapshots)
+            self._waiting.append((robot, at, msgspec.json.encode(line)))
+
+    async def run(self) -> None:
+        """Write until cancelled. A full disk loses recordings, never a run."""
+        told = False
+        while True:
+            await anyio.sleep(_EVERY_S)
+            lines, self._waiting = self._waiting, deque(maxlen=_WAITING)
+            if not lines:
+                continue
+            try:
+                await self._run_in_worker(partial(self._write, lines))
+                told = False
+            except Exception:
+                if not told:
+                    log.exception("recordings of robots cannot be written")
+                told = True
+
+    def _write(self, lines: Iterable[tuple[str, int, bytes]]) -> None:
+        files: dict[Path, list[bytes]] = {}
+        for robot, at, line in lines:
+            hour = datetime.fromtimestamp(at / 1e6, UTC).strftime("%Y-%m-%dT%H")
+            files.setdefault(self._folder / robot / f"{hour}{_ENDING}", []).append(line)
+        for path, found in files.items():
+            is_new = not path.exists()
+            make_folder(path.parent)
+            with open(path, "ab", opener=opener) as file:
+                file.write(gzip.compress(b"\n".join(found) + b"\n"))
+            if is_new and self._prunes:
+                for each in self.due(self._kept_days):
+                    each.unlink()
+
+    def due(self, kept_days: float) -> list[Path]:
+        """What has been kept long enough: by age, then by what all of it takes; the oldest first.
+        The newest hour never is."""
+        named = ((path, _hour_of(path)) for path in self._folder.glob(f"*/*{_ENDING}"))
+        dated = {path: hour for path, hour in named if hour is not None}
+        found = sorted(dated, key=lambda path: path.name)
+        sizes = {path: path.stat().st_size for path in found}
+        total = sum(sizes.values())
+        due: list[Path] = []
+        for path in found[:-1]:
+            age = dated[found[-1]] - dated[path]
+            if age >= timedelta(days=kept_days) or total > self._kept_bytes:
+                due.append(path)
+                total -= sizes[path]
+        return due
+
+    async def of(self, robot: str, since: int, until: int) -> list[Recording]:
+        """The files of a robot that may hold anything from these moments (microseconds UTC)."""
+        first, last = hours(since, until)
+        found = await self.listed(robot)
+        return [each for each in found if first <= each.name.removesuffix(_ENDING) <= last]
+
+    async def listed(self, robot: str) -> list[Recording]:
+        """The files of a robot, newest first."""
+        folder = self._folder / robot
+
+        def read() -> list[Recording]:
+            found = sorted(folder.glob(f"*{_ENDING}"), reverse=True)
+            return [Recording(path.name, path.stat().st_size) for path in found]
+
+        return await self._run_in_worker(read)
+
+    async def file(self, robot: str, name: str) -> bytes:
+        """One of them, compressed. Raises NotFound."""
+        if name not in {each.name for each in await self.listed(robot)}:
+            raise NotFound("There is no such recording.")
+        return await self._run_in_worker((self._folder / robot / name).read_bytes)
+
+
+def hours(since: int, until: int) -> tuple[str, str]:
+    """The names of the first and the last hour (UTC) between two moments, without the ending."""
+    first, last = (datetime.fromtimestamp(each / 1e6, UTC) for each in (since, until))
+    return f"{first:%Y-%m-%dT%H}", f"{last:%Y-%m-%dT%H}"
+
+
+def _hour_of(path: Path) -> datetime | None:
+    """None for a file that somebody else put there: it is not ours to take away."""
+    try:
+        return datetime.strptime(path.name, f"%Y-%m-%dT%H{_ENDING}").replace(tzinfo=UTC)
+    except ValueError:
+        return None

@@ -1,0 +1,142 @@
+"""The registration of a robot, and the robot as pages see it."""
+
+import re
+from collections.abc import Callable
+from datetime import datetime
+from typing import ClassVar, Final, Literal, TypeAlias
+
+import msgspec
+from msgspec.structs import replace
+
+from action_assistant.errors import BadInput, Conflict
+from action_assistant.runner.links.port import SIMULATOR, EngineState, Generation, Registration
+from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.runs.views import time
+from action_assistant.umrf.facts import BadProfile, facts_of
+
+#: The stream of all registrations.
+STREAM: Final = "robots"
+
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
+#: Names in ROS 2 hold no two underscores in a row.
+_SERVICE: Final = re.compile(r"(?!.*__)/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+
+RobotState: TypeAlias = EngineState | Literal["no_link"]
+
+
+class RobotRegistered(msgspec.Struct, frozen=True, kw_only=True):
+    """Somebody registered a robot, or registered it anew."""
+
+    kind: ClassVar[str] = "robot.registered.v1"
+
+    at: int
+    name: str
+    domain: int
+    rmw: str
+    get_service: str
+    profile: dict[str, object]
+
+
+class RobotRemoved(msgspec.Struct, frozen=True, kw_only=True):
+    """Somebody took a robot out of the registry. Its runs stay."""
+
+    kind: ClassVar[str] = "robot.removed.v1"
+
+    at: int
+    name: str
+
+
+class HeldGraph(msgspec.Struct, frozen=True, kw_only=True):
+    """A graph that an engine holds, ended ones too. `run`: the run of ours that it is.
+
+    `stopping`: why a stop of it is not proven yet, "" at first; None when nobody wants that.
+    """
+
+    graph: str
+    state: str
+    active: bool
+    run: str | None
+    stopping: str | None = None
+
+
+class Robot(msgspec.Struct, frozen=True, kw_only=True):
+    """An engine as people see it. `why` explains any state but `answering`.
+
+    `servers`: how many answer on the path of its get; `others`: publishers of starts beside us.
+    `actions`, `graphs`: how many it has indexed; None before its first answer. `pauses`: whether
+    pausing is safe there.
+    """
+
+    name: str
+    simulated: bool
+    state: RobotState
+    why: str = ""
+    since: datetime | None = None
+    domain: int | None = None
+    rmw: str = ""
+    get_service: str = ""
+    profile: dict[str, object] = {}
+    heard_at: datetime | None = None
+    took_ms: float | None = None
+    restarted_at: datetime | None = None
+    generation: Generation = "unknown"
+    servers: int = 0
+    others: int = 0
+    actor: str = ""
+    pauses: bool = False
+    holds: tuple[HeldGraph, ...] = ()
+    actions: int | None = None
+    graphs: int | None = None
+
+
+def check_registration(asked: Registration) -> None:
+    """Refuse what cannot be on the wire or true of an engine. Raises BadInput, Conflict."""
+    if asked.name.lower() == SIMULATOR:
+        raise Conflict("The simulator is always there; a robot needs a name of its own.")
+    if not _NAME.fullmatch(asked.name):
+        raise BadInput(
+            "A robot's name starts with a letter and has letters, digits, _ and - only, "
+            "64 at most.",
+            where={"path": "/name"},
+        )
+    if not _SERVICE.fullmatch(asked.get_service):
+        raise BadInput("This is no name of a ROS 2 service.", where={"path": "/get_service"})
+    try:
+        facts_of(asked.profile)
+    except BadProfile as wrong:
+        raise BadInput(wrong.message, where={"path": f"/profile{wrong.path}"}) from wrong
+
+
+def seen(plain: Robot, engine: KnownEngine, stopping: Callable[[str, str], str | None]) -> Robot:
+    """A robot with what is known of its engine."""
+    answer, standing = engine.answer, engine.standing
+    known = replace(
+        plain,
+        state=engine.state,
+        since=time(engine.since),
+        restarted_at=None if engine.restarted_at is None else time(engine.restarted_at),
+        generation=standing.generation,
+        servers=standing.servers,
+        others=standing.others,
+        actor=standing.actor,
+        pauses=engine.pauses,
+    )
+    if answer is None:
+        return known
+    return replace(
+        known,
+        heard_at=time(answer.at),
+        took_ms=engine.took_ms,
+        holds=tuple(
+            HeldGraph(
+                graph=each.graph,
+                state=each.state,
+                active=each.active,
+                run=each.run,
+                stopping=stopping(plain.name, each.graph),
+            )
+            for each in answer.graphs
+        ),
+        actions=len(answer.known_actions),
+        graphs=len(answer.known_graphs),
+    )

@@ -1,0 +1,336 @@
+"""The registry: the engines that runs can go to, which are the simulator and registered robots."""
+
+import logging
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Final, Protocol, TypeAlias
+
+import anyio
+import msgspec
+from anyio.abc import TaskGroup
+
+from action_assistant.errors import BadInput, Conflict, NotFound
+from action_assistant.journal.events import Draft
+from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.links.observations import Snapshot
+from action_assistant.runner.links.port import (
+    SIMULATOR,
+    Candidate,
+    ForeignCommand,
+    Link,
+    Reach,
+    Registration,
+)
+from action_assistant.runner.robots.engine import EngineIndex, KnownEngine
+from action_assistant.runner.robots.foreign_graphs import foreign_graphs
+from action_assistant.runner.robots.recordings import Recordings
+from action_assistant.runner.robots.registration import (
+    STREAM,
+    Robot,
+    RobotRegistered,
+    RobotRemoved,
+    check_registration,
+    seen,
+)
+from action_assistant.runner.robots.robot_events import (
+    Commanded,
+    EngineBecame,
+    RobotEvent,
+    RobotLog,
+)
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.history import Ledger
+from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
+from action_assistant.web.workers.lanes import RunInWorker
+
+log: Final = logging.getLogger(__name__)
+
+_NO_LINK: Final = "Nothing can be started or stopped there from here."
+
+
+class ForeignStops(Protocol):
+    """What stops graphs that were not started from here."""
+
+    def trouble(self, robot: str, graph: str) -> str | None:
+        """None when the graph is not being stopped; else why that is not proven yet, "" at first."""
+        ...
+
+    def going(self, robot: str) -> bool:
+        """Whether something is being stopped there."""
+        ...
+
+    def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
+        """Want a graph stopped. Never waits."""
+        ...
+
+    def hear_of(self, robot: str, command: ForeignCommand) -> None:
+        """Somebody else may just have set it going."""
+        ...
+
+
+Note: TypeAlias = Callable[[str, RobotEvent, str], None]
+
+
+class RegistryContext(msgspec.Struct, frozen=True):
+    """What the registry stands on. `foreign` hears of each command of somebody else,
+    `shows` of all graphs that an engine shows; `stops` makes what stops foreign graphs."""
+
+    ledger: Ledger
+    tasks: TaskGroup
+    clock_us: ClockUs
+    run_in_worker: RunInWorker
+    changed: Callable[[], None]
+    foreign: Callable[[KnownEngine, ForeignCommand], Commanded]
+    shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None]
+    stops: Callable[[TaskGroup, ClockUs, Note, Callable[[], None]], ForeignStops]
+
+
+class Robots:
+    """The registry. `reach` makes links, or says why there are none; `links` are there already.
+    `recordings` keep what engines say, where they are kept."""
+
+    def __init__(
+        self,
+        links: Mapping[str, Link] | None = None,
+        reach: Reach | str | None = None,
+        recordings: Recordings | None = None,
+    ) -> None:
+        self.recordings: Final = recordings
+        self._given: Final = dict(links or {})
+        self._reach: Final = reach if reach is not None else "No link to robots was made."
+        self._registered: dict[str, Registration] = {}
+        self._engines: dict[str, KnownEngine] = {}
+        self._scopes: dict[str, anyio.CancelScope] = {}
+        self._ground: RegistryContext | None = None
+        self._robot_log: RobotLog | None = None
+        self._foreign_stops: ForeignStops | None = None
+
+    def open(self, ground: RegistryContext) -> None:
+        """Watch what was given, and from now on whatever is added."""
+        self._ground = ground
+        self._robot_log = RobotLog(ground.ledger, ground.tasks)
+        self._foreign_stops = ground.stops(
+            ground.tasks, ground.clock_us, self._robot_log.note, lambda: ground.changed()
+        )
+        if self.recordings is not None:
+            ground.tasks.start_soon(self.recordings.run)
+        for name in self._given:
+            self.add(Registration(name=name))
+
+    # --- the registry -------------------------------------------------------------------------
+
+    async def register(self, asked: Registration, author: Author) -> Robot:
+        """Take a robot in, or change it. Raises BadInput, Conflict, Unavailable."""
+        check_registration(asked)
+        ground = self._standing()
+        body = RobotRegistered(at=ground.clock_us(), **msgspec.structs.asdict(asked))
+        draft = Draft(body.kind, author.id, msgspec.json.encode(body))
+        await ground.ledger.append(STREAM, [draft])
+        self.add(asked)
+        ground.changed()
+        return self.robot(asked.name)
+
+    async def remove(self, name: str, author: Author) -> None:
+        """Take a robot out. Raises NotFound, Unavailable."""
+        self.registration(name)
+        ground = self._standing()
+        body = RobotRemoved(at=ground.clock_us(), name=name)
+        draft = Draft(body.kind, author.id, msgspec.json.encode(body))
+        await ground.ledger.append(STREAM, [draft])
+        self._let_go(name)
+        del self._registered[name]
+        ground.changed()
+
+    def add(self, registration: Registration) -> None:
+        """Take in a robot that is stored; an older link to it is let go of."""
+        name = registration.name
+        if self._registered.get(name) == registration and name in self._engines:
+            return
+        self._let_go(name)
+        self._registered[name] = registration
+        link, facts = self._link(registration)
+        if link is None:
+            return
+        ground = self._standing()
+        engine = KnownEngine(
+            registration,
+            facts,
+            link,
+            clock_us=ground.clock_us,
+            changed=ground.changed,
+            became=self._note_state,
+            foreign=self._note_command,
+            shows=ground.shows,
+            recordings=self.recordings,
+        )
+        self._engines[name] = engine
+        scope = self._scopes[name] = anyio.CancelScope()
+        ground.tasks.start_soon(self._watch, engine, scope)
+
+    def _link(self, registration: Registration) -> tuple[Link | None, EngineFacts]:
+        try:
+            facts = facts_of(registration.profile)
+        except BadProfile:  # stored before it was checked: then nothing good is believed of it
+            log.warning("the profile of %s cannot be read", registration.name)
+            facts = PINNED
+        given = self._given.get(registration.name)
+        if given is not None:
+            return given, facts
+        if isinstance(self._reach, str):
+            return None, facts
+        return self._reach.link(registration, facts), facts
+
+    def _let_go(self, name: str) -> None:
+        self._engines.pop(name, None)
+        scope = self._scopes.pop(name, None)
+        if scope is not None:
+            scope.cancel()
+
+    async def _watch(self, engine: KnownEngine, scope: anyio.CancelScope) -> None:
+        with scope:
+            await engine.watch()
+
+    def _standing(self) -> RegistryContext:
+        if self._ground is None:
+            raise RuntimeError("the registry is not open")
+        return self._ground
+
+    @property
+    def foreign_stops(self) -> ForeignStops:
+        """Stops of what others run there."""
+        if self._foreign_stops is None:
+            raise RuntimeError("the registry is not open")
+        return self._foreign_stops
+
+    def silence(
+        self, author: Author, going: Callable[[str], Collection[str]], name: str | None = None
+    ) -> list[str]:
+        """Stop whatever robots run that is no run of ours `going` on there: on all of them, or on
+        one. The names of the graphs. Never waits. Raises NotFound."""
+        if name is not None:
+            self.registration(name)
+        told: list[str] = []
+        for robot, engine in self._engines.items():
+            if name in {None, robot}:
+                answer = engine.answer
+                for graph in [] if answer is None else foreign_graphs(answer, going(robot)):
+                    self.foreign_stops.stop(engine, graph, author)
+                    told.append(f"{robot}: {graph}")
+        return told
+
+    # --- what there is ------------------------------------------------------------------------
+
+    def all(self) -> Iterator[Robot]:
+        """Every engine, the simulator first."""
+        yield Robot(
+            name=SIMULATOR, simulated=True, state="answering", generation="current", pauses=True
+        )
+        for name in sorted(self._registered):
+            yield self.robot(name)
+
+    def robot(self, name: str) -> Robot:
+        """One robot as people see it. Raises NotFound."""
+        known = self.registration(name)
+        engine = self._engines.get(name)
+        plain = Robot(
+            name=name,
+            simulated=False,
+            state="no_link",
+            why=f"No link: {self._reach} {_NO_LINK}" if engine is None else engine.why,
+            domain=known.domain,
+            rmw=known.rmw,
+            get_service=known.get_service,
+            profile=known.profile,
+        )
+        if engine is None:
+            return plain
+        return seen(plain, engine, self.foreign_stops.trouble)
+
+    def heard(self) -> dict[str, int]:
+        """When each robot last answered, microseconds UTC; those that never did are left out."""
+        return {
+            name: engine.answer.at
+            for name, engine in self._engines.items()
+            if engine.answer is not None
+        }
+
+    def registration(self, name: str) -> Registration:
+        """How a robot is reached. Raises NotFound."""
+        known = self._registered.get(name)
+        if known is None:
+            raise NotFound(f"No robot is called {name!r}.")
+        return known
+
+    def reachable(self, name: str) -> KnownEngine:
+        """The engine of a robot. Raises BadInput for an unknown name, Conflict without a link."""
+        engine = self._engines.get(name)
+        if engine is not None:
+            return engine
+        if name in self._registered:
+            raise Conflict(f"{name}: No link: {self._reach} {_NO_LINK}", where={"path": "/engine"})
+        raise BadInput(f"No robot is called {name!r}.", where={"path": "/engine"})
+
+    def link(self, name: str) -> KnownEngine | None:
+        """The engine of a robot, if there is a link."""
+        return self._engines.get(name)
+
+    async def index(self, name: str) -> EngineIndex:
+        """What a robot can do, as far as is known. Raises NotFound."""
+        self.registration(name)
+        engine = self._engines.get(name)
+        return (
+            EngineIndex() if engine is None else await engine.index(self._standing().run_in_worker)
+        )
+
+    def held(self, name: str, graph: str) -> str:
+        """A graph as the engine wrote it in its last answer. Raises NotFound."""
+        self.registration(name)
+        engine = self._engines.get(name)
+        answer = None if engine is None else engine.answer
+        text = None if answer is None else answer.texts.get(graph)
+        if text is None:
+            raise NotFound(f"{name} has not shown a graph called {graph!r}.")
+        return text
+
+    async def candidates(self) -> tuple[Candidate, ...]:
+        """Engines in sight that nobody registered yet."""
+        if isinstance(self._reach, str):
+            return ()
+        known = {(each.domain, _path(each.get_service)) for each in self._registered.values()}
+        return tuple(
+            each
+            for each in await self._reach.candidates()
+            if (each.domain, _path(each.get_service)) not in known
+            and each.actor not in self._registered
+        )
+
+    @property
+    def no_reach(self) -> str:
+        """Why no robot can be reached; "" when some can."""
+        return self._reach if isinstance(self._reach, str) else ""
+
+    # --- the flight recorder ------------------------------------------------------------------
+
+    def _note_state(self, engine: KnownEngine) -> None:
+        name = engine.registration.name
+        incarnation = engine.standing.incarnation
+        at = self._standing().clock_us()
+        became = EngineBecame(at=at, state=engine.state, why=engine.why, incarnation=incarnation)
+        self.robot_log.note(name, became, name)
+
+    def _note_command(self, engine: KnownEngine, command: ForeignCommand) -> None:
+        name = engine.registration.name
+        if not command.targets or name in command.targets:
+            self.foreign_stops.hear_of(name, command)
+            told = self._standing().foreign(engine, command)
+            self.robot_log.note(name, told, command.sender)
+
+    @property
+    def robot_log(self) -> RobotLog:
+        """What others told the robots."""
+        if self._robot_log is None:
+            raise RuntimeError("the registry is not open")
+        return self._robot_log
+
+
+def _path(service: str) -> str:
+    return service.strip("/")

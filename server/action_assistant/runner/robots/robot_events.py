@@ -1,0 +1,160 @@
+"""The log of a robot: commands of others, and changes of its engine's state.
+
+One stream per robot, `robot/NAME`. Bodies are msgspec JSON; fields are only ever added, with a
+default. What our own runs sent stands in their streams.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar, Final, TypeAlias
+
+import msgspec
+from anyio.abc import TaskGroup
+
+from action_assistant.errors import NotFound
+from action_assistant.journal.events import Draft, Event
+from action_assistant.runner.links.port import Command, EngineState, ForeignCommand
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.runs.recorder import StreamAppender
+
+
+def stream_of_robot(name: str) -> str:
+    """The stream of a robot."""
+    return f"robot/{name}"
+
+
+class Commanded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Somebody else published a command to this robot, with this graph.
+
+    `run` and `number`: the open run of ours that it concerns. `sender` tells publishers apart.
+    """
+
+    kind: ClassVar[str] = "robot.commanded.v1"
+
+    at: int
+    command: Command
+    graph: str
+    umrf: str = ""
+    targets: tuple[str, ...] = ()
+    sender: str = ""
+    run: str | None = None
+    number: int | None = None
+
+
+class EngineBecame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """The engine is in another state than before."""
+
+    kind: ClassVar[str] = "robot.engine_became.v1"
+
+    at: int
+    state: EngineState
+    why: str = ""
+    incarnation: str = ""
+
+
+class StopAsked(msgspec.Struct, frozen=True, kw_only=True):
+    """Somebody here wants a graph stopped that was not started from here."""
+
+    kind: ClassVar[str] = "robot.stop_asked.v1"
+
+    at: int
+    graph: str
+    author: Author
+
+
+class StopWasProven(msgspec.Struct, frozen=True, kw_only=True):
+    """A get asked after that stop showed nothing of the graph moving."""
+
+    kind: ClassVar[str] = "robot.stop_proven.v1"
+
+    at: int
+    graph: str
+    asked_at: int
+
+
+class StopUnproven(msgspec.Struct, frozen=True, kw_only=True):
+    """That stop was given up without a proof."""
+
+    kind: ClassVar[str] = "robot.stop_unproven.v1"
+
+    at: int
+    graph: str
+    why: str
+
+
+RobotEvent: TypeAlias = Commanded | EngineBecame | StopAsked | StopWasProven | StopUnproven
+
+_KINDS: Final[Mapping[str, type[RobotEvent]]] = {
+    each.kind: each for each in (Commanded, EngineBecame, StopAsked, StopWasProven, StopUnproven)
+}
+
+
+_ALARMS: Final[Mapping[Command, str]] = {
+    "start": "Somebody else started a graph called {graph} on {robot}, too: the engine refuses that "
+    "one and stops this run.",
+    "stop": "Somebody else told {robot} to stop this run.",
+    "pause": "Somebody else told {robot} to pause this run.",
+    "resume": "Somebody else told {robot} to go on with this run.",
+    "modify": "Somebody else changed the graph on {robot}: what runs is not what was started.",
+}
+
+
+def alarm_of(command: ForeignCommand, robot: str, graph: str) -> tuple[str, str] | None:
+    """What a command of somebody else means for a run of `graph` there: a code and a sentence."""
+    if command.graph == graph:
+        text = _ALARMS[command.command].format(graph=graph, robot=robot)
+        return f"foreign_{command.command}", text
+    if command.command == "start":
+        return (
+            "foreign_other",
+            f"Somebody else started {command.graph} on {robot}, beside this run.",
+        )
+    return None
+
+
+def draft_of(event: RobotEvent, author: str) -> Draft:
+    """An event as it is stored."""
+    return Draft(event.kind, author, msgspec.json.encode(event))
+
+
+def event_of(stored: Event) -> RobotEvent | None:
+    """What a stored event says; None for kinds that this version does not know."""
+    known = _KINDS.get(stored.kind)
+    return None if known is None else msgspec.json.decode(stored.body, type=known)
+
+
+class RobotLog:
+    """Writes and reads the streams of robots."""
+
+    def __init__(self, ledger: Ledger, tasks: TaskGroup) -> None:
+        self._ledger = ledger
+        self._tasks = tasks
+        self._pens: dict[str, StreamAppender] = {}
+
+    def note(self, robot: str, event: RobotEvent, author: str) -> None:
+        """Record soon. Never waits."""
+        appender = self._pens.get(robot)
+        if appender is None:
+            appender = self._pens[robot] = StreamAppender(self._ledger, stream_of_robot(robot), -1)
+            self._tasks.start_soon(self._write, appender)
+        appender.add(draft_of(event, author))
+
+    async def _write(self, appender: StreamAppender) -> None:
+        await appender.find_end()
+        await appender.run()
+
+    async def newest(self, robot: str, most: int) -> list[tuple[int, RobotEvent]]:
+        """The newest events of a robot, oldest first, with their seqs. Raises Unavailable."""
+        stream = stream_of_robot(robot)
+        end = await self._ledger.newest(stream)
+        stored = await self._ledger.read(stream, after=max(0, end - most))
+        read = [(each.seq, event_of(each)) for each in stored]
+        return [(seq, event) for seq, event in read if event is not None]
+
+    async def graph(self, robot: str, seq: int) -> str:
+        """The graph of a recorded command. Raises NotFound, Unavailable."""
+        stored = await self._ledger.read(stream_of_robot(robot), after=seq - 1, limit=1)
+        event = event_of(stored[0]) if stored and stored[0].seq == seq else None
+        if not isinstance(event, Commanded) or not event.umrf:
+            raise NotFound("No graph was recorded with this.")
+        return event.umrf

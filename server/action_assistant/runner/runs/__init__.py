@@ -1,0 +1,1 @@
+"""Runs: their events, the fold of these, views and queries."""

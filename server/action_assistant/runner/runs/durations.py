@@ -1,0 +1,66 @@
+"""Durations, each between two bounds, since robots are not seen at every moment.
+
+A figure that is told without its bounds is exact. What is not known is no figure: it is neither zero
+nor a failure.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import msgspec
+
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import MOMENT_US, Visit
+
+_EXACT_S: Final = 0.001
+
+
+class Took(msgspec.Struct, frozen=True, kw_only=True):
+    """Seconds: at least `least` and at most `most`; None: nothing bounds it from above."""
+
+    least: float
+    most: float | None
+
+    @property
+    def exact(self) -> float | None:
+        """The one value that it can have; None where there are several."""
+        known = self.most is not None and self.most - self.least <= _EXACT_S
+        return self.most if known else None
+
+
+def took_us(least: int, most: int | None) -> Took:
+    """From microseconds, rounded away from each other."""
+    above = None if most is None else max(0, math.ceil(most / 1000) / 1000)
+    return Took(least=max(0, math.floor(least / 1000) / 1000), most=above)
+
+
+def of_visit(visit: Visit) -> Took | None:
+    """How long a visit took; None while it goes on, as far as is known."""
+    return None if visit.until is None else took_us(visit.least, visit.most)
+
+
+def of_run(run: Run) -> Took | None:
+    """From the start to when nothing of it moved any more, whenever that was proven. None of one that
+    was never started. While it goes on nothing bounds it from above; nor does the end of one of which
+    an action may go on still."""
+    if run.started_at is None or run.end == "refused":
+        return None
+    visits = [visit for action in run.actions.values() for visit in action.visits]
+    known = [max(visit.until or 0, visit.not_before) for visit in visits]
+    least = max([run.going_at - MOMENT_US, run.started_at, *known]) - run.started_at
+    open_end = run.end in {None, "lost"} or any(visit.not_after is None for visit in visits)
+    if open_end or run.over_at is None:
+        return took_us(least, None)
+    return took_us(min(least, run.over_at - run.started_at), run.over_at - run.started_at)
+
+
+def at_rank(spans: Sequence[Took], share: float) -> Took | None:
+    """The smallest that at least `share` of them do not exceed, between its bounds: each bound is that
+    of the bounds. None of nothing."""
+    if not spans:
+        return None
+    place = max(0, math.ceil(share * len(spans)) - 1)
+    least = sorted(each.least for each in spans)[place]
+    most = sorted(math.inf if each.most is None else each.most for each in spans)[place]
+    return Took(least=least, most=None if math.isinf(most) else most)

@@ -1,0 +1,307 @@
+"""The events of a run's stream: requests, messages sent, observations, proofs, ends.
+
+Bodies are msgspec JSON; the kind stands in the journal's own column. Fields are only ever added,
+with a default: streams of older versions must fold the same for ever. `at` is microseconds UTC,
+taken when the thing happened, which may be before it was stored.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar, Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.runner.links.engine_process import EngineProcess
+from action_assistant.runner.links.observations import Seen
+from action_assistant.umrf.laps import Laps
+
+End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "lost"]
+
+
+class Author(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The person behind a command, and from where it came. `address`: on the network; "" for the
+    runner's own computer. `by` is "" where it was not recorded."""
+
+    id: str
+    name: str
+    by: Literal["browser", "program", ""] = ""
+    address: str = ""
+
+
+class Override(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Problems that a person decided to start in spite of, and why."""
+
+    codes: tuple[str, ...]
+    reason: str
+
+
+class Overridden(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """A problem that stood in the way of a start, as the look before it told it. `aid` and `path`
+    are its place in the graph that was sent."""
+
+    code: str
+    text: str
+    aid: str | None = None
+    path: str = ""
+
+
+class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Somebody asked for a start and nothing stood in its way. Stored before anything is sent."""
+
+    kind: ClassVar[str] = "run.requested.v1"
+
+    at: int
+    run: str
+    number: int
+    request_id: str
+    author: Author
+    graph: str | None
+    graph_name: str
+    version: str
+    digest: str
+    engine: str
+    simulated: bool
+    actions: dict[str, str]  # full name -> aid
+    umrf: str  # as sent
+    script: str = ""  # JSON text
+    override: Override | None = None
+    despite: tuple[Overridden, ...] = ()  # what was overridden
+    group: str | None = None  # shared by runs that one request has started together
+    like: str | None = None  # the robot whose engine the simulator played
+    laps: Laps | None = None  # None: found in `umrf`
+
+
+class Published(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The one start message has left. `incarnation` names the life of the engine it went to,
+    `process` that engine's process where it is one of the runner's own computer."""
+
+    kind: ClassVar[str] = "run.published.v1"
+
+    at: int
+    incarnation: str = ""
+    process: EngineProcess | None = None
+
+
+class Observed(msgspec.Struct, frozen=True):
+    """Something of the engine was seen, in this order."""
+
+    kind: ClassVar[str] = "run.observed.v1"
+
+    at: int
+    seen: tuple[Seen, ...]
+
+
+class PauseRequested(msgspec.Struct, frozen=True):
+    """Somebody wants the run to pause."""
+
+    kind: ClassVar[str] = "run.pause_requested.v1"
+
+    at: int
+    author: Author
+
+
+class ResumeRequested(msgspec.Struct, frozen=True):
+    """Somebody wants the run to go on."""
+
+    kind: ClassVar[str] = "run.resume_requested.v1"
+
+    at: int
+    author: Author
+
+
+class ModifyRequested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Somebody gave the run another version of its graph. Stored before it is sent."""
+
+    kind: ClassVar[str] = "run.modify_requested.v1"
+
+    at: int
+    author: Author
+    version: str
+    digest: str
+    actions: dict[str, str]  # full name -> aid
+    umrf: str  # as sent
+    continue_from: str = ""
+
+
+class ModifyRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """The change that was asked for last was not made: what runs is what ran before, which is told
+    here once more. `actions` are all that were known then."""
+
+    kind: ClassVar[str] = "run.modify_refused.v1"
+
+    at: int
+    version: str
+    digest: str
+    actions: dict[str, str | None]  # full name -> aid
+    why: str = ""
+
+
+class StopRequested(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Somebody wants the run stopped. Holds until the run has ended; nothing takes it back."""
+
+    kind: ClassVar[str] = "run.stop_requested.v1"
+
+    at: int
+    author: Author
+    stop_id: str = ""
+
+
+class StopSent(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A stop message has left, or (`failed`) could not."""
+
+    kind: ClassVar[str] = "run.stop_sent.v1"
+
+    at: int
+    attempt: int
+    failed: str = ""
+
+
+class Proof(msgspec.Struct, frozen=True):
+    """A get asked after the stop showed no running node. `hash` is SHA-256 over what it showed."""
+
+    kind: ClassVar[str] = "run.proof.v1"
+
+    at: int
+    asked_at: int
+    hash: str
+
+
+class Silent(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The engine answers no get; nothing is known since `since`."""
+
+    kind: ClassVar[str] = "run.silent.v1"
+
+    at: int
+    since: int
+    why: str = ""
+
+
+class Answered(msgspec.Struct, frozen=True):
+    """The engine answers again."""
+
+    kind: ClassVar[str] = "run.answered.v1"
+
+    at: int
+
+
+class AlarmRaised(msgspec.Struct, frozen=True):
+    """Something that a person must know now."""
+
+    kind: ClassVar[str] = "run.alarm_raised.v1"
+
+    at: int
+    code: str
+    text: str
+
+
+class EngineSaid(msgspec.Struct, frozen=True):
+    """A line of the engine's own log, from about this run. Evidence for a person, proof of nothing."""
+
+    kind: ClassVar[str] = "run.engine_said.v1"
+
+    at: int
+    text: str
+
+
+class Unconfirmed(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Nothing that the engine says can show any more that the run is at rest, and why. `lost`: the
+    engine does not hold it any more; else it holds actions that did not obey."""
+
+    kind: ClassVar[str] = "run.unconfirmed.v1"
+
+    at: int
+    why: str
+    lost: bool = False
+
+
+class AtRest(msgspec.Struct, frozen=True):
+    """How rest was seen where the engine's word is none: `by` a person who looked, or by the runner
+    itself (None), which saw the engine's process end."""
+
+    by: Author | None
+    at: int
+    how: str
+
+
+class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The run is over, and in which state; for `refused` and `lost` `detail` says why. `at_rest`:
+    who saw that, where no answer of the engine could prove it."""
+
+    kind: ClassVar[str] = "run.ended.v1"
+
+    at: int
+    state: End
+    result: str | None = None
+    detail: str = ""
+    at_rest: AtRest | None = None
+
+
+class MovesAgain(msgspec.Struct, frozen=True):
+    """After its end the engine shows the run moving: it is open again, and what was said of its end
+    is taken back. `text` says what moves and what the run had been called."""
+
+    kind: ClassVar[str] = "run.moves_again.v1"
+
+    at: int
+    text: str
+
+
+class Unknown(msgspec.Struct, frozen=True):
+    """An event of a kind that this version does not know: kept, and passed over."""
+
+    kind: ClassVar[str] = ""
+
+
+RunEvent: TypeAlias = (
+    Requested
+    | Published
+    | Observed
+    | PauseRequested
+    | ResumeRequested
+    | ModifyRequested
+    | ModifyRefused
+    | StopRequested
+    | StopSent
+    | Proof
+    | Silent
+    | Answered
+    | AlarmRaised
+    | EngineSaid
+    | Unconfirmed
+    | Ended
+    | MovesAgain
+    | Unknown
+)
+
+_KINDS: Final[Mapping[str, type[RunEvent]]] = {
+    each.kind: each
+    for each in (
+        Requested,
+        Published,
+        Observed,
+        PauseRequested,
+        ResumeRequested,
+        ModifyRequested,
+        ModifyRefused,
+        StopRequested,
+        StopSent,
+        Proof,
+        Silent,
+        Answered,
+        AlarmRaised,
+        EngineSaid,
+        Unconfirmed,
+        Ended,
+        MovesAgain,
+    )
+}
+
+
+def encode(event: RunEvent) -> bytes:
+    """The body of an event."""
+    return msgspec.json.encode(event)
+
+
+def decode(kind: str, body: bytes) -> RunEvent:
+    """The event of a stored body. Raises msgspec.DecodeError when the body is not of its kind."""
+    known = _KINDS.get(kind)
+    return Unknown() if known is None else msgspec.json.decode(body, type=known)

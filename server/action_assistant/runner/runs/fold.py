@@ -1,0 +1,264 @@
+"""The fold of a run's events.
+
+The same function serves the live view and the history, so both always show the same. Nothing here
+knows a clock, a link or a database.
+"""
+
+from collections.abc import Iterable
+from typing import assert_never
+
+from msgspec.structs import replace
+
+from action_assistant.runner.links.observations import Seen, Snapshot
+from action_assistant.runner.runs.events import (
+    AlarmRaised,
+    Answered,
+    Ended,
+    EngineSaid,
+    ModifyRefused,
+    ModifyRequested,
+    MovesAgain,
+    Observed,
+    PauseRequested,
+    Proof,
+    Published,
+    Requested,
+    ResumeRequested,
+    RunEvent,
+    Silent,
+    StopRequested,
+    StopSent,
+    Unconfirmed,
+    Unknown,
+)
+from action_assistant.runner.runs.observed import key_of as key_of
+from action_assistant.runner.runs.observed import names_all, observe
+from action_assistant.runner.runs.run import Alarm, Run
+from action_assistant.runner.runs.visits import (
+    KEPT,
+    ActionRun,
+    Message,
+    awaits_answer,
+    is_heard,
+    paused,
+)
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.laps import Laps, laps
+
+
+def replay(events: Iterable[RunEvent]) -> Run | None:
+    """The run that these events tell; None before it was requested."""
+    run: Run | None = None
+    for event in events:
+        if run is not None:
+            run = follow(run, event)
+        elif isinstance(event, Requested):
+            run = begin(event)
+    return run
+
+
+def begin(event: Requested) -> Run:
+    """A run at its first event."""
+    known = event.laps if event.laps is not None else _laps(event.umrf)
+    once, joined = frozenset(known.once), frozenset(known.barring_errors)
+    return Run(
+        id=event.run,
+        number=event.number,
+        request_id=event.request_id,
+        author=event.author,
+        graph=event.graph,
+        graph_name=event.graph_name,
+        version=event.version,
+        digest=event.digest,
+        engine=event.engine,
+        simulated=event.simulated,
+        requested_at=event.at,
+        override=event.override,
+        despite=event.despite,
+        group=event.group,
+        like=event.like,
+        actions={
+            name: ActionRun(aid=aid, once=name in once, joined=name in joined)
+            for name, aid in event.actions.items()
+        },
+        stoppable=known.stops,
+    )
+
+
+def _laps(umrf: str) -> Laps:
+    """For runs that were begun before this was recorded with them."""
+    try:
+        return laps(codec.read(umrf.encode()).graph)
+    except codec.Unreadable:
+        return Laps(stops=True)
+
+
+def follow(run: Run, event: RunEvent) -> Run:
+    """The run after one more event. Total: no event that can be decoded is refused."""
+    if run.end is not None and not isinstance(event, AlarmRaised | MovesAgain):
+        return run
+    match event:
+        case Published():
+            return replace(
+                run, incarnation=event.incarnation, started_at=event.at, process=event.process
+            )
+        case Observed():
+            return observe(run, event.seen)
+        case PauseRequested():
+            held = _held(run)
+            return held if run.desired == "stopped" else replace(held, desired="paused")
+        case ResumeRequested():
+            return run if run.desired == "stopped" else replace(run, desired="running")
+        case ModifyRequested():
+            actions = {
+                name: replace(run.actions.get(name, ActionRun()), aid=aid)
+                for name, aid in event.actions.items()
+            }
+            return replace(
+                run,
+                version=event.version,
+                digest=event.digest,
+                actions=run.actions | actions,
+                reshaped=True,
+            )
+        case ModifyRefused():
+            return _unmodified(run, event)
+        case StopRequested():
+            if run.desired == "stopped":
+                return run
+            return replace(
+                run, desired="stopped", stop_requested_at=event.at, stopped_by=event.author
+            )
+        case StopSent():
+            return replace(run, stops_sent=run.stops_sent + (0 if event.failed else 1))
+        case Proof():
+            return replace(run, proof_at=event.at)
+        case Silent():
+            return replace(run, unknown_since=event.since)
+        case Answered():
+            return replace(run, unknown_since=None, lost="")
+        case AlarmRaised():
+            alarm = Alarm(event.code, event.at, event.text)
+            return replace(_meddled(run, event.code), alarms=(*run.alarms, alarm)[-KEPT:])
+        case MovesAgain():
+            return _reopen(run, event)
+        case EngineSaid():
+            return replace(run, log=(*run.log, Message(event.at, event.text))[-KEPT:])
+        case Unconfirmed(lost=True):
+            return replace(run, lost=event.why)
+        case Unconfirmed():
+            return replace(run, unconfirmed=event.why)
+        case Ended():
+            return _end(run, event)
+        case Requested() | Unknown():
+            return run
+        case _:
+            assert_never(event)
+
+
+def _held(run: Run) -> Run:
+    actions = {name: paused(action) for name, action in run.actions.items()}
+    return replace(run, actions=actions)
+
+
+def _meddled(run: Run, alarm: str) -> Run:
+    """Strangers may do what the graph rules out."""
+    match alarm:
+        case "foreign_pause":
+            return _held(run)
+        case "foreign_start" | "foreign_modify":
+            return replace(_held(run), reshaped=True, stoppable=True)
+        case "foreign_resume":
+            return replace(run, reshaped=True)
+        case "foreign_stop":
+            return replace(run, stoppable=True)
+        case _:
+            return run
+
+
+def is_news(run: Run, shown: Snapshot) -> bool:
+    """Whether a snapshot says anything that is not known yet."""
+    own = shown.graph == run.graph_name
+    if shown.state != (run.graph_state if own else run.parts.get(shown.graph)):
+        return True
+    for node, state in shown.nodes.items():
+        action = run.actions.get(key_of(run, shown.graph, node))
+        if action is None or action.state != state:
+            return True
+        if shown.source == "get" and awaits_answer(action):
+            return True
+        messages = shown.messages.get(node, ())
+        if len(messages) != action.heard or not is_heard(action, messages):
+            return True
+    return False
+
+
+def thin(run: Run, seen: Iterable[Seen]) -> tuple[Seen, ...]:
+    """The same without what is known already: an engine tells its whole graph after every change,
+    and to store that again and again would cost the square of its size. Folds to the same run."""
+    thinned: list[Seen] = []
+    for item in seen:
+        less = _thin(run, item) if isinstance(item, Snapshot) and not item.same else item
+        run = observe(run, (less,))
+        thinned.append(less)
+    return tuple(thinned)
+
+
+def _thin(run: Run, shown: Snapshot) -> Snapshot:
+    if not names_all(run, shown):
+        return shown  # some are gone: of them nothing may be said
+    news: dict[str, str] = {}
+    said: dict[str, tuple[str, ...]] = {}
+    for node, state in shown.nodes.items():
+        action = run.actions.get(key_of(run, shown.graph, node))
+        messages = shown.messages.get(node, ())
+        is_new = len(messages) != action.heard or not is_heard(action, messages) if action else True
+        is_new = is_new or (shown.source == "get" and action is not None and awaits_answer(action))
+        if is_new or action is None or action.state != state:
+            news[node] = state
+            if messages:
+                said[node] = messages
+    inputs = {name: values for name, values in shown.inputs.items() if name in news}
+    return replace(shown, nodes=news, messages=said, inputs=inputs, same=True)
+
+
+def _unmodified(run: Run, event: ModifyRefused) -> Run:
+    """Actions that only the change would have brought are gone again."""
+    actions = {
+        name: replace(action, aid=event.actions.get(name, action.aid))
+        for name, action in run.actions.items()
+        if name in event.actions or action.seen_at
+    }
+    return replace(run, version=event.version, digest=event.digest, actions=actions)
+
+
+def _reopen(run: Run, event: MovesAgain) -> Run:
+    """What was proven before proves nothing now. What people wanted last is still wanted."""
+    alarm = Alarm("moves_again", event.at, event.text)
+    return replace(
+        run,
+        end=None,
+        ended_at=None,
+        proof_at=None,
+        at_rest=None,
+        unknown_since=None,
+        detail="",
+        moves_again_at=event.at,
+        alarms=(*run.alarms, alarm)[-KEPT:],
+    )
+
+
+def _end(run: Run, event: Ended) -> Run:
+    """An end that nothing proves leaves the actions as they were seen last, without an end."""
+    return replace(
+        run,
+        end=event.state,
+        ended_at=event.at,
+        result=event.result or run.result,
+        detail=event.detail,
+        at_rest=event.at_rest,
+        lost="",
+        unconfirmed="",
+        moves_again_at=None,
+        unknown_since=run.unknown_since if event.state == "lost" else None,
+    )

@@ -1,0 +1,100 @@
+"""Runs as the journal has them: those that are over, and those that an earlier process left."""
+
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any, Protocol, TypeAlias
+
+import msgspec
+from sqlalchemy import Row, Select
+
+from action_assistant.errors import NotFound
+from action_assistant.journal.events import Event
+from action_assistant.runner.runs.events import ModifyRequested, Requested, RunEvent, decode
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.recorder import Store, stream_of
+from action_assistant.runner.runs.run import Run
+
+
+class Ledger(Store, Protocol):
+    """What the runner asks of its journal."""
+
+    async def query(self, statement: Select[Any]) -> list[Row[Any]]:
+        """Rows of the tables. Raises Unavailable."""
+        ...
+
+
+#: Reads a run that is over, and the seq of its last event: all of it, or only what people are
+#: shown. Raises NotFound.
+Past: TypeAlias = Callable[[str, bool], Awaitable[tuple[Run, int]]]
+
+
+class RunHistory:
+    """Reads runs. Raises Unavailable while the journal cannot be read. `past` reads those that are
+    over; without it they are folded here."""
+
+    def __init__(self, ledger: Ledger, past: Past | None = None) -> None:
+        self._ledger = ledger
+        self._past = past
+
+    async def followed(self, run: str) -> tuple[Run | None, int]:
+        """A run to go on with, and the seq of its last event. Raises msgspec.DecodeError."""
+        if self._past is not None:
+            return await self._past(run, True)
+        return await self.replayed(run)
+
+    async def replayed(self, run: str) -> tuple[Run | None, int]:
+        """The same, folded here and now: for the time before anybody can ask for anything."""
+        events = await self._ledger.read(stream_of(run))
+        found = replay(decode(each.kind, each.body) for each in events)
+        return found, events[-1].seq if events else 0
+
+    async def left(self, run: str) -> tuple[Run | None, int, bool]:
+        """A run that an earlier process left, the seq of its last event, and whether all of them could
+        be read; those that cannot are passed over."""
+        events = await self._ledger.read(stream_of(run))
+        read = [_decoded(each) for each in events]
+        told = [event for event in read if event is not None]
+        return replay(told), events[-1].seq if events else 0, len(told) == len(read)
+
+    async def run(self, run: str) -> Run:
+        """A run. Raises NotFound."""
+        if self._past is not None:
+            return (await self._past(run, False))[0]
+        found, _ = await self.replayed(run)
+        if found is None:
+            raise NotFound("There is no such run.")
+        return found
+
+    async def umrf(self, run: str) -> str:
+        """The graph as it was sent. Raises NotFound."""
+        first = await self._ledger.read(stream_of(run), limit=1)
+        event = decode(first[0].kind, first[0].body) if first else None
+        if not isinstance(event, Requested):
+            raise NotFound("There is no such run.")
+        return event.umrf
+
+    async def events(self, run: str, after: int, limit: int) -> Sequence[Event]:
+        """Stored events of a run with `seq > after`."""
+        return await self._ledger.read(stream_of(run), after=after, limit=limit)
+
+    async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
+        """Rows of the tables."""
+        return await self._ledger.query(statement)
+
+
+def _decoded(event: Event) -> RunEvent | None:
+    try:
+        return decode(event.kind, event.body)
+    except msgspec.DecodeError:
+        return None
+
+
+async def sent_of(store: Store, run: Run) -> str | None:
+    """The graph that a run has now: as it was sent, or changed since. None when it cannot be told.
+    Raises Unavailable."""
+    stored = await store.read(stream_of(run.id))
+    sent = {Requested.kind, ModifyRequested.kind}
+    for each in reversed(stored):
+        event = decode(each.kind, each.body) if each.kind in sent else None
+        if isinstance(event, Requested | ModifyRequested) and event.digest == run.digest:
+            return event.umrf
+    return None

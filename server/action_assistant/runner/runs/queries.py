@@ -1,0 +1,144 @@
+"""What is asked of the runner's tables: runs, labels, robots.
+
+Open runs live in memory; the table answers for those that are over, and says which were open when
+the process ended.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+import msgspec
+from sqlalchemy import (
+    ColumnElement,
+    Select,
+    Text,
+    and_,
+    cast,
+    func,
+    not_,
+    or_,
+    select,
+    union_all,
+)
+
+from action_assistant.schema.runner_tables import FAILED, review, robot, run, run_label
+
+OPEN: Final = "open"
+
+
+def open_runs() -> Select[Any]:
+    """Ids of the runs that have no end yet, oldest first."""
+    return select(run.c.id).where(run.c.state == OPEN).order_by(run.c.number)
+
+
+def last_number() -> Select[Any]:
+    """The highest run number given so far."""
+    return select(func.coalesce(func.max(run.c.number), 0))
+
+
+def of_run(run_id: str) -> Select[Any]:
+    """A run: state, simulated."""
+    return select(run.c.state, run.c.simulated).where(run.c.id == run_id)
+
+
+def by_request(request_id: str) -> Select[Any]:
+    """The run that a request has become: id, digest, engine."""
+    return select(run.c.id, run.c.digest, run.c.engine).where(run.c.request_id == request_id)
+
+
+def of_start(request_id: str) -> Select[Any]:
+    """Ids of the runs that a start has become, also one on several robots: those have a request each,
+    which begins with that of their group."""
+    group = and_(run.c.request_id > f"{request_id}/", run.c.request_id < f"{request_id}0")
+    return select(run.c.id).where(or_(run.c.request_id == request_id, group)).order_by(run.c.number)
+
+
+class Filter(msgspec.Struct, frozen=True, kw_only=True):
+    """Which runs are asked for; None asks for all. `failed`: refused, lost, halted, or ended in
+    error; the other ones are over as well. `graph` is an id or a name, `person` an id or a
+    part of a name, `text` a part of a name or of what was said, `before` a run's id."""
+
+    graph: str | None = None
+    engine: str | None = None
+    states: tuple[str, ...] = ()
+    failed: bool | None = None
+    version: str | None = None
+    person: str | None = None
+    text: str | None = None
+    label: str | None = None
+    pinned: bool | None = None
+    since: int | None = None
+    until: int | None = None
+    before: str | None = None
+
+
+def listed(wanted: Filter, limit: int) -> Select[Any]:
+    """Runs and what was noted about them, newest first. Which of its states an open run is in the
+    table does not know: with `states` all open ones are there, too."""
+    query = select(run, review.c.pinned, review.c.note)
+    query = query.outerjoin(review, review.c.run == run.c.id)
+    if wanted.graph is None:
+        return _newest(query, wanted, limit)
+    ids = select(run.c.id).outerjoin(review, review.c.run == run.c.id)
+    # each by an index in the order of the numbers: one question for both would read all runs
+    named = union_all(
+        *(
+            select(_newest(ids.where(column == wanted.graph), wanted, limit).subquery())
+            for column in (run.c.graph, run.c.graph_name)
+        )
+    )
+    return query.where(run.c.id.in_(named)).order_by(run.c.number.desc()).limit(limit)
+
+
+def _newest(query: Select[Any], wanted: Filter, limit: int) -> Select[Any]:
+    for condition in _conditions(wanted):
+        query = query.where(condition)
+    if wanted.before is not None:
+        number = select(run.c.number).where(run.c.id == wanted.before).scalar_subquery()
+        query = query.where(run.c.number < number)
+    return query.order_by(run.c.number.desc()).limit(limit)
+
+
+def _conditions(wanted: Filter) -> Iterator[ColumnElement[bool]]:
+    if wanted.engine is not None:
+        yield run.c.engine == wanted.engine
+    if wanted.states:
+        yield run.c.state.in_([*wanted.states, OPEN])
+    if wanted.failed is not None:
+        yield (
+            FAILED if wanted.failed else and_(run.c.state != OPEN, func.coalesce(not_(FAILED), 1))
+        )
+    if wanted.version is not None:
+        yield or_(run.c.version == wanted.version, run.c.digest.startswith(wanted.version))
+    if wanted.person is not None:
+        named = run.c.author_name.icontains(wanted.person, autoescape=True)
+        yield or_(run.c.author_id == wanted.person, named)
+    if wanted.text is not None:
+        places = (run.c.graph_name, run.c.engine, run.c.author_name, review.c.words, review.c.note)
+        found = (each.icontains(wanted.text, autoescape=True) for each in places)
+        yield or_(*found, cast(run.c.number, Text) == wanted.text)
+    if wanted.label is not None:
+        yield run.c.id.in_(select(run_label.c.run).where(run_label.c.label == wanted.label))
+    if wanted.pinned is not None:
+        yield func.coalesce(review.c.pinned, False) == wanted.pinned
+    if wanted.since is not None:
+        yield run.c.requested_at >= wanted.since
+    if wanted.until is not None:
+        yield run.c.requested_at <= wanted.until
+
+
+def labels_of(runs: Sequence[str]) -> Select[Any]:
+    """The labels of these runs."""
+    query = select(run_label).where(run_label.c.run.in_(runs))
+    return query.order_by(run_label.c.run, run_label.c.label)
+
+
+def all_labels() -> Select[Any]:
+    """Every label, the most used first."""
+    query = select(run_label.c.label).group_by(run_label.c.label)
+    return query.order_by(func.count().desc(), run_label.c.label).limit(200)
+
+
+def all_robots() -> Select[Any]:
+    """Registered robots by name."""
+    return select(robot).where(robot.c.retired_at.is_(None)).order_by(robot.c.name)

@@ -1,0 +1,148 @@
+"""Appends the events of one stream in order, without making anybody wait.
+
+What happens to a robot is shown first and stored at once. When the journal fails the pen says so
+(`recorded` is false) and goes on trying with the same events, in the same order.
+"""
+
+import logging
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
+
+import anyio
+
+from action_assistant.errors import Conflict, Refused
+from action_assistant.journal.events import Draft, Event
+from action_assistant.runner.runs.events import RunEvent, encode
+
+log: Final = logging.getLogger(__name__)
+
+_PAUSES: Final = (0.05, 0.2, 0.5, 1.0, 2.0)  # seconds between attempts
+_BATCH: Final = 500  # events in one transaction
+
+
+class Store(Protocol):
+    """What the runner asks of a journal."""
+
+    async def append(
+        self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
+    ) -> int:
+        """Store; returns the last seq. Raises Conflict, Unavailable."""
+        ...
+
+    async def read(
+        self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
+    ) -> list[Event]:
+        """Events of a stream in order."""
+        ...
+
+    async def newest(self, stream: str) -> int:
+        """The last seq of a stream; 0 when there is none."""
+        ...
+
+
+def stream_of(run: str) -> str:
+    """The stream of a run."""
+    return f"run/{run}"
+
+
+class StreamAppender:
+    """Appends to a stream that ends at `seq`. `changed` is called when `seq` or `recorded` have
+    changed."""
+
+    def __init__(
+        self, store: Store, stream: str, seq: int, changed: Callable[[], None] = lambda: None
+    ) -> None:
+        self.seq = seq
+        self.recorded = True
+        self._store = store
+        self._stream = stream
+        self._changed = changed
+        self._waiting: deque[Draft] = deque()
+        self._more = anyio.Event()
+        self._done = anyio.Event()
+
+    def add(self, draft: Draft) -> None:
+        """Store soon."""
+        self._waiting.append(draft)
+        self._more.set()
+
+    @property
+    def idle(self) -> bool:
+        """Whether everything is stored."""
+        return not self._waiting
+
+    async def flushed(self) -> None:
+        """Wait until everything that was put so far is stored."""
+        while self._waiting:
+            await self._done.wait()
+
+    async def find_end(self) -> None:
+        """Learn where the stream ends, however long that takes."""
+        failures = 0
+        while True:
+            try:
+                self.seq = await self._store.newest(self._stream)
+            except Refused as refused:
+                self._failed(refused.detail)
+                await anyio.sleep(_PAUSES[min(failures, len(_PAUSES) - 1)])
+                failures += 1
+            else:
+                return
+
+    async def run(self) -> None:
+        """Write until cancelled."""
+        while True:
+            await self._more.wait()
+            self._more = anyio.Event()
+            failures = 0
+            while self._waiting:
+                if await self._write():
+                    failures = 0
+                else:
+                    await anyio.sleep(_PAUSES[min(failures, len(_PAUSES) - 1)])
+                    failures += 1
+
+    async def _write(self) -> bool:
+        """One transaction. `expected` keeps a commit whose answer got lost from being repeated."""
+        batch = [self._waiting[i] for i in range(min(len(self._waiting), _BATCH))]
+        try:
+            try:
+                seq = await self._store.append(self._stream, batch, expected=self.seq)
+            except Conflict:
+                seq = await self._store.newest(self._stream)
+                if not self.seq < seq <= self.seq + len(batch):
+                    raise
+        except Refused as refused:
+            self._failed(refused.detail)
+            return False
+        except Exception as error:
+            log.exception("the journal of the runner failed")
+            self._failed(str(error))
+            return False
+        for _ in range(seq - self.seq):
+            self._waiting.popleft()
+        self.seq, self.recorded = seq, True
+        self._done.set()
+        self._done = anyio.Event()
+        self._changed()
+        return True
+
+    def _failed(self, why: str) -> None:
+        if self.recorded:
+            log.error("%s is not being recorded: %s", self._stream, why)
+        self.recorded = False
+        self._changed()
+
+
+class RunRecorder(StreamAppender):
+    """Appends the events of one run."""
+
+    def __init__(
+        self, store: Store, run: str, seq: int, changed: Callable[[], None] = lambda: None
+    ) -> None:
+        super().__init__(store, stream_of(run), seq, changed)
+
+    def put(self, event: RunEvent, author: str) -> None:
+        """Store soon."""
+        self.add(Draft(event.kind, author, encode(event)))

@@ -1,0 +1,129 @@
+"""A run: all that is known of it, as a value."""
+
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.runner.links.engine_process import EngineProcess
+from action_assistant.runner.links.observations import ACTIVE, TERMINAL
+from action_assistant.runner.runs.events import AtRest, Author, End, Overridden, Override
+from action_assistant.runner.runs.visits import ActionRun, Message
+
+State: TypeAlias = Literal[
+    "requested",
+    "published",
+    "running",
+    "paused",
+    "stopping",
+    "unknown",
+    "finished",
+    "halted",
+    "stopped",
+    "error",
+    "refused",
+    "lost",
+]
+Desired: TypeAlias = Literal["running", "paused", "stopped"]
+#: States in which a run is over.
+ENDED: Final[frozenset[State]] = frozenset(
+    {"finished", "halted", "stopped", "error", "refused", "lost"}
+)
+_END_OF: Final[dict[str, End]] = {
+    "FINISHED": "finished",
+    "HALTED": "halted",
+    "STOPPED": "stopped",
+    "ERROR": "error",
+}
+
+
+class Alarm(msgspec.Struct, frozen=True):
+    """Something that a person must know now."""
+
+    code: str
+    at: int
+    text: str
+
+
+class Run(msgspec.Struct, frozen=True, kw_only=True):
+    """All that is known of one run. Times are microseconds UTC."""
+
+    id: str
+    number: int
+    request_id: str
+    author: Author
+    graph: str | None
+    graph_name: str
+    version: str
+    digest: str
+    engine: str
+    simulated: bool
+    requested_at: int
+    override: Override | None = None
+    despite: tuple[Overridden, ...] = ()
+    group: str | None = None
+    like: str | None = None
+    desired: Desired = "running"
+    incarnation: str | None = None  # None: nothing has been sent, as far as is known
+    process: EngineProcess | None = None  # of the engine, where it can be seen to end
+    graph_state: str | None = None
+    parts: dict[str, str] = {}  # running sub-graphs of this run, and their states
+    actions: dict[str, ActionRun] = {}
+    looked: dict[str, int] = {}  # asking for the newest answer that showed a graph to be as here
+    reshaped: bool = False  # what its arrows rule out may have happened nevertheless
+    failed: bool = False  # an action has, or may have in a sub-graph
+    stoppable: bool = False  # something or somebody may have stopped an action
+    result: str | None = None
+    started_at: int | None = None
+    ended_at: int | None = None
+    going_at: int = 0  # it was not over at that moment, or any before
+    over_at: int | None = None  # nothing of it moved any more when that was seen first
+    end: End | None = None
+    detail: str = ""
+    unknown_since: int | None = None
+    proof_at: int | None = None
+    unconfirmed: str = ""  # why nothing that the engine says shows rest any more
+    lost: str = ""  # why the engine does not hold it any more; nobody has seen it at rest
+    at_rest: AtRest | None = None
+    moves_again_at: int | None = None  # it had ended, and was seen to move; until its next end
+    stop_requested_at: int | None = None
+    stopped_by: Author | None = None
+    stops_sent: int = 0
+    alarms: tuple[Alarm, ...] = ()
+    log: tuple[Message, ...] = ()  # the newest lines of the engine
+
+    @property
+    def state(self) -> State:
+        """One word for where the run is."""
+        if self.end is not None:
+            return self.end
+        if self.lost:
+            return "lost"
+        if self.unknown_since is not None:
+            return "unknown"
+        if self.desired == "stopped" or self.graph_state == "STOPPING":
+            return "stopping"
+        if self.incarnation is None:
+            return "requested"
+        match self.graph_state:
+            case None | "UNINITIALIZED" | "INITIALIZED":
+                return "published"
+            case "PAUSED":
+                return "paused"
+            case state if self.unconfirmed and state in TERMINAL and not self.active:
+                return "unknown"
+            case _:  # also a graph that has finished while nodes still run (H12)
+                return "running"
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Actions that move or may move again."""
+        return tuple(name for name, action in self.actions.items() if action.state in ACTIVE)
+
+    @property
+    def apparent_end(self) -> End | None:
+        """How the run would end if what was seen last is all there is."""
+        if self.end is not None or self.graph_state is None or self.active:
+            return None
+        if any(state in {"RUNNING", "STOPPING", "PAUSED"} for state in self.parts.values()):
+            return None
+        return _END_OF.get(self.graph_state)

@@ -1,0 +1,1 @@
+"""Starts: reading, checking, looking at the robot, storing once."""

@@ -1,0 +1,206 @@
+"""The rules of admission: what a start must satisfy before it is stored or sent. Pure."""
+
+import re
+from collections.abc import Sequence
+from typing import Annotated, Final, TypeVar
+
+import msgspec
+
+from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
+from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.runner.links.simulator import slowed
+from action_assistant.runner.runs.events import Override
+from action_assistant.umrf.check import STRUCTURAL, blocking, check
+from action_assistant.umrf.digest import digest
+from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.laps import Laps, laps
+from action_assistant.umrf.model import Graph, Problem
+from action_assistant.umrf.semantics import Script, script_from
+
+T = TypeVar("T")
+
+#: What robots may read: the engine puts names into format strings and file names.
+_WIRE_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+#: What the simulator may read: anything that can be printed, but no format directives.
+_PLAIN_NAME: Final = re.compile(r"[^%\x00-\x1f\x7f\u2028\u2029]{1,200}")
+_SHOWN: Final = 20  # problems in an answer
+_ACTIONS: Final = 5_000  # as in the editor
+_KEPT: Final = 40  # problems of a kind that somebody could be shown
+
+
+class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A start: the version by value, and where it shall run.
+
+    `digest` is what the person saw; `request_id` is made by the asker, once per intended start.
+    `like`: the robot whose engine the simulator plays, with its hazards.
+    """
+
+    version: str
+    digest: str
+    umrf: msgspec.Raw
+    engine: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
+    request_id: Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
+    graph: str | None = None
+    script: msgspec.Raw = msgspec.Raw()
+    override: Override | None = None
+    like: str | None = None
+
+
+class Admitted(msgspec.Struct, frozen=True, kw_only=True):
+    """A start that nothing about its graph stands in the way of. `problems`: warnings, and what
+    was overridden."""
+
+    graph: Graph
+    graph_id: str | None
+    script: Script
+    script_text: str
+    digest: str
+    problems: tuple[Problem, ...] = ()
+
+
+class Prepared(msgspec.Struct, frozen=True, kw_only=True):
+    """An admitted start without its graph, which only workers read: its name, the aid of each action
+    by full name, and the text that will be sent, with the identity of the run in it. `problems`: as
+    many as anybody is shown."""
+
+    run: str
+    name: str
+    actions: dict[str, str]
+    umrf: str
+    graph_id: str | None
+    script: str
+    digest: str
+    laps: Laps
+    problems: tuple[Problem, ...] = ()
+
+
+def read_request(body: bytes) -> StartRequest:
+    """The body of a start. Raises BadInput with the place."""
+    return decoded(body, StartRequest)
+
+
+def decoded(body: bytes, kind: type[T]) -> T:
+    """A body that is read by hand. Raises BadInput with the place."""
+    try:
+        return msgspec.json.decode(body, type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        message, where = _placed(str(error))
+        raise BadInput(message, where=where) from error
+
+
+def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> Admitted:
+    """Check text, digest, names and problems. Raises BadInput, NotUmrf, Conflict. Before a graph is
+    `approved` nobody needs to know its digest."""
+    text = bytes(asked.umrf)
+    try:
+        reading = codec.read(text)
+        stamp = codec.stamp_of(text)
+    except codec.Unreadable as wrong:
+        raise NotUmrf(wrong.message, where={"path": f"/umrf{wrong.path}"}) from wrong
+    found = digest(reading.graph)
+    if found != asked.digest and (approved or asked.digest):
+        raise Conflict(
+            "The graph that was sent is not the one that was approved: its digest is "
+            f"{found[:12]}…, not {asked.digest[:12]}…. Nothing was started.",
+            where={"path": "/digest"},
+        )
+    _check_names(reading.graph, simulated=asked.engine == SIMULATOR)
+    problems = [*reading.problems, *reading.placed(check(reading.graph, None, facts))]
+    _check_problems(problems, asked.override)
+    script, script_text = _script(asked)
+    return Admitted(
+        graph=reading.graph,
+        graph_id=asked.graph or stamp.graph,
+        script=script,
+        script_text=script_text,
+        digest=found,
+        problems=tuple(problems),
+    )
+
+
+def prepared(
+    asked: StartRequest, facts: EngineFacts, run: str, *, approved: bool = True
+) -> Prepared:
+    """As `admit`, for a start that becomes this run. For workers: takes its time with large graphs."""
+    admitted = admit(asked, facts, approved=approved)
+    graph = admitted.graph
+    if len(graph.actions) > _ACTIONS:
+        raise TooLarge(f"A graph that is started has at most {_ACTIONS:,} actions.")
+    errors = [each for each in admitted.problems if each.severity == "error"]
+    warnings = [each for each in admitted.problems if each.severity != "error"]
+    return Prepared(
+        run=run,
+        name=graph.name,
+        actions={each.full_name: each.key for each in graph.actions if not each.missing},
+        umrf=codec.write(graph, codec.Stamp(admitted.graph_id, asked.version, run)),
+        graph_id=admitted.graph_id,
+        script=admitted.script_text,
+        digest=admitted.digest,
+        laps=laps(graph),
+        problems=(*errors[:_KEPT], *warnings[:_KEPT]),
+    )
+
+
+def _check_names(graph: Graph, *, simulated: bool) -> None:
+    allowed = _PLAIN_NAME if simulated else _WIRE_NAME
+    names = [("graph", graph.name)]
+    names += [("action", action.name) for action in graph.actions if not action.missing]
+    for what, name in names:
+        if not allowed.fullmatch(name):
+            rule = (
+                "without % and control characters"
+                if simulated
+                else "a letter, then letters, digits and _, 64 at most"
+            )
+            raise Conflict(
+                f"The {what} name {name[:80]!r} is not safe to send to an engine; allowed is: "
+                f"{rule}.",
+                where={"path": "/umrf/graph_name" if what == "graph" else "/umrf/actions"},
+            )
+
+
+def _check_problems(problems: Sequence[Problem], override: Override | None) -> None:
+    if override is not None and not override.reason.strip():
+        raise BadInput("Say why the problems do not matter.", where={"path": "/override/reason"})
+    codes = override.codes if override is not None else ()
+    left = blocking(list(problems), overridden=codes)
+    if not left:
+        return
+    never = sorted({problem.code for problem in left} & STRUCTURAL)
+    first = left[0]
+    more = f" (and {len(left) - 1} more)" if len(left) > 1 else ""
+    rule = (
+        f" {', '.join(never)} cannot be overridden."
+        if never
+        else " A person may override this with a reason."
+    )
+    raise Conflict(
+        f"{first.message}{more}{rule}",
+        where={
+            "path": f"/umrf{first.where.path}",
+            "problems": msgspec.to_builtins(left[:_SHOWN]),
+        },
+    )
+
+
+def _script(asked: StartRequest) -> tuple[Script, str]:
+    raw = bytes(asked.script).strip()
+    if raw in {b"", b"null"}:
+        return Script({}), ""
+    if asked.engine != SIMULATOR:
+        raise BadInput("Only the simulator follows a script.", where={"path": "/script"})
+    try:
+        script = script_from(msgspec.json.decode(raw))
+    except ValueError as error:
+        raise BadInput(f"The script: {error}", where={"path": "/script"}) from error
+    return slowed(script), raw.decode()
+
+
+def _placed(text: str) -> tuple[str, dict[str, object] | None]:
+    """msgspec says `… - at `$.a[0]`` where it can; the same as text and JSON pointer."""
+    message, found, place = text.partition(" - at `$")
+    if not found:
+        return text, None
+    path = re.sub(r"\[(\d+)\]", r"/\1", place.rstrip("`").replace(".", "/").replace("[...]", ""))
+    return message, {"path": path}

@@ -1,0 +1,372 @@
+"""The pre-flight: the items that are checked before a start. Pure: answers come in as values.
+
+The page shows the items, a start refuses by the same ones: nobody is told something else than what
+then happens.
+"""
+
+from collections.abc import Collection, Sequence
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.errors import Conflict, Refused
+from action_assistant.runner.links.observations import Snapshot, failed_in
+from action_assistant.runner.links.port import Answer, Standing
+from action_assistant.runner.robots.engine import EngineIndex
+from action_assistant.runner.robots.foreign_graphs import foreign_graphs
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.start.admission import Admitted, Prepared
+from action_assistant.umrf.check import STRUCTURAL, check
+from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import Graph, Problem
+
+Verdict: TypeAlias = Literal["passed", "warned", "blocked"]
+
+#: Problems that the index of an engine shows.
+_OF_INDEX: Final = frozenset(
+    {"unknown-action", "signature", "parameter-type", "recursion", "subgraph-twice"}
+)
+#: Those that no index makes better: the engine refuses the graph whatever a person says.
+_REFUSED: Final = frozenset({"recursion", "subgraph-twice"})
+_SHOWN: Final = 20
+
+
+class Item(msgspec.Struct, frozen=True, kw_only=True):
+    """One thing that was looked at. A person may override a blocked one where `overridable`, with
+    the codes in `codes` and a reason."""
+
+    code: str
+    verdict: Verdict
+    text: str
+    codes: tuple[str, ...] = ()
+    overridable: bool = False
+    problems: tuple[Problem, ...] = ()
+
+
+class Preflight(msgspec.Struct, frozen=True, kw_only=True):
+    """What stands between a graph and its start on one engine. `override`: the codes that a person
+    would have to answer for; `never`: something cannot be overridden; `digest`: of the graph that
+    was looked at."""
+
+    engine: str
+    digest: str
+    items: tuple[Item, ...]
+    override: tuple[str, ...]
+    never: bool
+
+
+class Settled(msgspec.Struct, frozen=True):
+    """A run of ours that somebody has seen at rest: the actions that were in ERROR then, by running name
+    of their graph and full name, in this life of the engine."""
+
+    engine: str
+    run: str
+    incarnation: str
+    places: frozenset[tuple[str, str]]
+
+
+class EngineSight(msgspec.Struct, frozen=True, kw_only=True):
+    """An engine at the moment of a pre-flight. `took_ms`: until it answered a get sent for it;
+    `open_runs`: runs of ours that go on there; `settled`: those that somebody has seen at rest."""
+
+    name: str
+    facts: EngineFacts
+    standing: Standing
+    answer: Answer
+    index: EngineIndex
+    took_ms: float
+    open_runs: Collection[str] = ()
+    settled: tuple[Settled, ...] = ()
+
+
+def summed(engine: str, items: Sequence[Item], digest: str = "") -> Preflight:
+    """The items of one engine with what follows from them."""
+    blocked = [item for item in items if item.verdict == "blocked"]
+    codes = sorted({code for item in blocked if item.overridable for code in item.codes})
+    never = any(not item.overridable for item in blocked)
+    return Preflight(
+        engine=engine, digest=digest, items=tuple(items), override=tuple(codes), never=never
+    )
+
+
+def of_refusal(code: str, refused: Refused) -> Item:
+    """A refusal as an item. Problems that a person may answer for stay so."""
+    where = refused.where or {}
+    found = where.get("problems")
+    problems = msgspec.convert(found, tuple[Problem, ...]) if isinstance(found, list) else ()
+    codes = tuple(sorted({problem.code for problem in problems}))
+    return Item(
+        code=code,
+        verdict="blocked",
+        text=refused.detail,
+        codes=codes,
+        overridable=bool(codes) and not STRUCTURAL & set(codes),
+        problems=problems,
+    )
+
+
+def of_graph(admitted: Admitted | Prepared) -> Item:
+    """The graph has been admitted; what warns does not stand in the way."""
+    warned = tuple(each for each in admitted.problems if each.severity == "warning")[:_SHOWN]
+    over = tuple(each for each in admitted.problems if each.severity == "error")[:_SHOWN]
+    if over:
+        text = f"{len(over)} certain problems are overridden."
+        return Item(code="graph", verdict="warned", text=text, problems=(*over, *warned))
+    if warned:
+        text = f"No certain hazard; {_count(len(warned), 'possible one')}."
+        return Item(code="graph", verdict="warned", text=text, problems=warned)
+    return Item(code="graph", verdict="passed", text="No hazard is known.")
+
+
+def of_taken(engine: str, other: Run | None) -> Item:
+    """One run per robot."""
+    if other is None:
+        return Item(code="free", verdict="passed", text=f"{engine} has no other run from here.")
+    text = (
+        f"{engine} is taken by run {other.number} of {other.graph_name}, started by "
+        f"{other.author.name}; it is {other.state}."
+    )
+    if doubt := other.lost or other.unconfirmed:
+        text += f" {doubt.rstrip('.')}. Somebody has to see it at rest and confirm that in the run."
+    return Item(code="free", verdict="blocked", text=text)
+
+
+def of_answer(sight: EngineSight) -> Item:
+    """It has answered a get sent now."""
+    return Item(
+        code="answers",
+        verdict="passed",
+        text=f"{sight.name} answered after {max(1, round(sight.took_ms))} ms.",
+    )
+
+
+def of_silence(engine: str, why: str) -> Item:
+    """It has not."""
+    text = f"{engine} does not answer, so a stop could not be confirmed either. Nothing was sent. {why}"
+    return Item(code="answers", verdict="blocked", text=text.rstrip())
+
+
+def of_robot(sight: EngineSight, graph: Graph) -> tuple[Item, ...]:
+    """All that an answering robot is looked at for."""
+    return (
+        of_answer(sight),
+        _proof(sight),
+        _actions(sight, graph),
+        _again(sight, graph),
+        _quiet(sight, graph),
+        _rest(sight),
+        _others(sight),
+        _actors(sight, graph),
+    )
+
+
+def of_text(sight: EngineSight, umrf: str) -> tuple[Item, ...]:
+    """As `of_robot`, of a graph as it will be sent. For workers."""
+    return of_robot(sight, codec.read(umrf).graph)
+
+
+def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
+    """Refuse a start that an item stands in the way of. Raises Conflict."""
+    for item in items:
+        if item.verdict != "blocked":
+            continue
+        if item.overridable and set(item.codes) <= set(overridden):
+            continue
+        rule = " A person may override this with a reason." if item.overridable else ""
+        raise Conflict(
+            f"{item.text}{rule}",
+            where={"path": "/engine", "item": item.code, "items": msgspec.to_builtins(list(items))},
+        )
+
+
+def _proof(sight: EngineSight) -> Item:
+    """A stop can be proven, and the messages are those that we speak."""
+    standing, name = sight.standing, sight.name
+    if standing.generation == "older":
+        text = (
+            f"{name} speaks an older generation of temoto_msgs: it would not understand a Stop. "
+            "Update its engine."
+        )
+        return Item(code="proof", verdict="blocked", text=text)
+    deaf = [each for each in ("start", "stop") if standing.listeners.get(each) == 0]
+    if deaf:
+        text = f"Nobody listens to {' and '.join(deaf)} messages for {name}: nothing would arrive."
+        return Item(code="proof", verdict="blocked", text=text)
+    if standing.servers != 1:
+        text = (
+            f"{standing.servers} engines answer on the path of {name}"
+            if standing.servers
+            else f"Discovery shows nobody who serves the path of {name}"
+        )
+        text += ", so no answer would prove a stop. Give each engine a domain of its own."
+        return Item(code="proof", verdict="blocked", text=text, codes=("proof",), overridable=True)
+    if standing.generation == "unknown":
+        text = (
+            f"One engine answers for {name}; which generation of messages it speaks is not known."
+        )
+        return Item(code="proof", verdict="warned", text=text)
+    return Item(code="proof", verdict="passed", text="A stop can be proven: one engine answers.")
+
+
+def _actions(sight: EngineSight, graph: Graph) -> Item:
+    """It has the actions, with the same parameters."""
+    index = sight.index
+    if graph.name in index.graphs:
+        text = (
+            f"{sight.name} has a graph called {graph.name} in its own index and so refuses another "
+            "one of that name. Rename this one."
+        )
+        return Item(code="actions", verdict="blocked", text=text)
+    if not index.actions and not index.graphs:
+        text = f"{sight.name} names no actions, so whether it knows these cannot be said."
+        return Item(code="actions", verdict="warned", text=text)
+    own = {action.key for action in graph.actions if action.actor in {"", sight.name}}
+    problems = tuple(
+        each
+        for each in check(graph, index.actions, sight.facts, index.graphs)
+        if each.code in _OF_INDEX and (each.where.aid is None or each.where.aid in own)
+    )
+    if not problems:
+        text = f"{sight.name} knows all {_count(len(own), 'action')}, with the same parameters."
+        return Item(code="actions", verdict="passed", text=text)
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    codes = {each.code for each in problems}
+    return Item(
+        code="actions",
+        verdict="blocked",
+        text=f"{sight.name} would refuse the graph: {problems[0].message}{more}",
+        codes=tuple(sorted(codes)),
+        overridable=not codes & _REFUSED,
+        problems=problems[:_SHOWN],
+    )
+
+
+def _again(sight: EngineSight, graph: Graph) -> Item:
+    """The engine does not hold a graph of this name already, or survives that it is started again.
+
+    Whoever started that one, and however it ended: the name is held until the engine is restarted.
+    """
+    held = {each.graph for each in sight.answer.graphs}
+    if graph.name not in held:
+        text = f"{sight.name} holds no graph called {graph.name} from an earlier start."
+        return Item(code="again", verdict="passed", text=text)
+    lost = not_matched(graph, sight.facts, sight.index, held)
+    if not lost:
+        text = f"{sight.name} can start {graph.name} again: nothing in it has to be looked up."
+        return Item(code="again", verdict="passed", text=text)
+    text = (
+        f"{sight.name} holds a graph called {graph.name} from an earlier start. Its engine does not "
+        f"look up {_listed(lost)} when a name is started again: it aborts with every running graph, or "
+        "does nothing. Restart the engine, or give the graph another name."
+    )
+    return Item(code="again", verdict="blocked", text=text)
+
+
+def not_matched(
+    graph: Graph, facts: EngineFacts, index: EngineIndex, held: Collection[str]
+) -> tuple[str, ...]:
+    """The full names of what an engine cannot build when it takes a graph without looking anything up
+    in its index (a start of a name that it holds, a modify): sub-graphs, and what it does not know.
+    Of one that names nothing, those sub-graphs that it `held`. Empty where it looks them up."""
+    if facts.restart_matches:
+        return ()
+    silent = not index.actions and not index.graphs
+    return tuple(
+        action.full_name
+        for action in graph.actions
+        if not action.missing
+        and (
+            f"{graph.name}__{action.name}__{action.instance_id}" in held
+            if silent
+            else action.name not in index.actions
+        )
+    )
+
+
+def not_matched_in(
+    umrf: str, facts: EngineFacts, index: EngineIndex, held: Collection[str]
+) -> tuple[str, ...]:
+    """As `not_matched`, of a graph as it will be sent. For workers."""
+    return not_matched(codec.read(umrf).graph, facts, index, held)
+
+
+def _listed(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:3])
+    return shown if len(names) <= 3 else f"{shown} and {len(names) - 3} more"
+
+
+def _quiet(sight: EngineSight, graph: Graph) -> Item:
+    """Nothing of somebody else runs there."""
+    moving = foreign_graphs(sight.answer, sight.open_runs)
+    if graph.name in moving:
+        text = (
+            f"A graph called {graph.name} runs on {sight.name} already, started by somebody else: "
+            "the engine would refuse this one and stop that one. Stop it first."
+        )
+        return Item(code="quiet", verdict="blocked", text=text)
+    if moving:
+        names = ", ".join(moving[:3])
+        text = f"{sight.name} runs {names}, which nobody started from here."
+        return Item(code="quiet", verdict="blocked", text=text, codes=("quiet",), overridable=True)
+    return Item(code="quiet", verdict="passed", text=f"Nothing else runs on {sight.name}.")
+
+
+def _rest(sight: EngineSight) -> Item:
+    """Nothing there may still move that its engine calls ERROR. Runs of ours stand in the way as runs,
+    until somebody has seen them at rest."""
+    doubted = sorted(
+        each.graph
+        for each in sight.answer.graphs
+        if (each.state == "ERROR" or each.stoppable)
+        and each.run not in sight.open_runs
+        and not _is_settled(sight, each)
+    )
+    if not doubted:
+        text = f"No action on {sight.name} is known to have been given up by its engine."
+        return Item(code="rest", verdict="passed", text=text)
+    text = (
+        f"{', '.join(doubted[:3])} on {sight.name} did not obey a stop, or failed while it was told to: "
+        "the engine says ERROR, but the code may still run. Look at the robot; restart its engine."
+    )
+    return Item(code="rest", verdict="blocked", text=text, codes=("rest",), overridable=True)
+
+
+def _is_settled(sight: EngineSight, shown: Snapshot) -> bool:
+    """Whether somebody has seen at rest just what is in doubt here: the graph of that run or a part of
+    it, in the same life of the engine, with no other action in ERROR."""
+    marks = {each.graph: each.run for each in sight.answer.graphs if each.run is not None}
+    for each in sight.settled:
+        top = next((name for name, run in marks.items() if run == each.run), None)
+        is_part = top is not None and f"{shown.graph}__".startswith(f"{top}__")
+        places = {(shown.graph, node) for node in failed_in(shown) or [shown.graph]}
+        if is_part and each.incarnation == sight.answer.incarnation and places <= each.places:
+            return True
+    return False
+
+
+def _others(sight: EngineSight) -> Item:
+    """Nobody else publishes starts."""
+    others = sight.standing.others
+    if others == 0:
+        return Item(code="others", verdict="passed", text="Nobody else can start something there.")
+    who = _count(others, "other program")
+    text = f"{who} can publish starts to {sight.name}: what runs there may change at any moment."
+    return Item(code="others", verdict="blocked", text=text, codes=("others",), overridable=True)
+
+
+def _actors(sight: EngineSight, graph: Graph) -> Item:
+    """The actions are this robot's, or the engines synchronise."""
+    named = {action.actor for action in graph.actions if not action.missing} - {""}
+    foreign = sorted(named - {sight.name, sight.standing.actor})
+    if not foreign or sight.facts.synchronises:
+        return Item(code="actors", verdict="passed", text=f"The actions are {sight.name}'s to do.")
+    text = (
+        f"Actions belong to {', '.join(foreign)}, not to {sight.name}, and its engine cannot "
+        "synchronise with others: it refuses the graph."
+    )
+    return Item(code="actors", verdict="blocked", text=text, codes=("actors",), overridable=True)
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,273 @@
+"""The checks before a start is stored and sent, for each engine that it shall go to."""
+
+import secrets
+from collections.abc import Callable, Collection, Sequence
+from functools import partial
+from typing import Annotated, Final
+
+import anyio
+import msgspec
+
+from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
+from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.links.port import SIMULATOR, Answer, Link, NoAnswer
+from action_assistant.runner.links.simulator import Simulator
+from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import Overridden, Override
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.start import preflight
+from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
+from action_assistant.runner.start.preflight import EngineSight, Item, Preflight, Settled
+from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
+from action_assistant.web.workers.lanes import RunInWorker
+
+#: The simulator as itself: a paused run can be stopped there.
+_ITSELF: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
+_PREFLIGHT_S: Final = 2.0
+_MOST: Final = 20  # engines of one group
+_TOLD: Final = 40  # overridden problems that are kept with a run
+
+_Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
+
+
+class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One version for several robots at once. Without version, digest and `request_id` it can only
+    be looked at."""
+
+    umrf: msgspec.Raw
+    version: str = ""
+    digest: str = ""
+    engines: Annotated[tuple[_Name, ...], msgspec.Meta(min_length=1, max_length=_MOST)]
+    request_id: Annotated[str, msgspec.Meta(max_length=200)] = ""
+    graph: str | None = None
+    override: Override | None = None
+    like: str | None = None
+
+    def of(self, engine: str) -> StartRequest:
+        """The start on one of them."""
+        return StartRequest(
+            version=self.version,
+            digest=self.digest,
+            umrf=self.umrf,
+            engine=engine,
+            request_id=f"{self.request_id}/{engine}",
+            graph=self.graph,
+            override=self.override,
+            like=self.like if engine == SIMULATOR else None,
+        )
+
+
+def read_group(body: bytes) -> GroupRequest:
+    """The body of a start on several robots, or of a look. Raises BadInput with the place."""
+    asked = decoded(body, GroupRequest)
+    if len(set(asked.engines)) < len(asked.engines):
+        raise BadInput("A robot is named twice.", where={"path": "/engines"})
+    return asked
+
+
+class Cleared(msgspec.Struct, frozen=True, kw_only=True):
+    """Nothing stands in the way: what will be sent, where, to which life of the engine, and which
+    problems somebody answers for."""
+
+    ready: Prepared
+    link: Link
+    own: bool
+    incarnation: str
+    despite: tuple[Overridden, ...] = ()
+
+
+class Started(msgspec.Struct, frozen=True):
+    """The answer to a start. `fresh` is false when the request had been carried out before."""
+
+    run: Run
+    fresh: bool
+
+
+class Grouped(msgspec.Struct, frozen=True):
+    """The answer to the start of a group. `failed`: the engines that nothing was sent to, and why."""
+
+    group: str
+    runs: list[Run]
+    failed: dict[str, str]
+    fresh: bool
+
+
+class StartChecks:
+    """Looks before starts. `taken(engine)` is the run that an engine has from here, if any;
+    `going(engine)` the ids of all that go on there; `settled(engine)` what somebody has seen at rest
+    there."""
+
+    def __init__(
+        self,
+        robots: Robots,
+        *,
+        clock_us: ClockUs,
+        run_in_worker: RunInWorker,
+        taken: Callable[[str], Run | None],
+        going: Callable[[str], Collection[str]],
+        settled: Callable[[str], Sequence[Settled]],
+        simulator: Simulator,
+    ) -> None:
+        self._robots = robots
+        self._clock_us = clock_us
+        self._run_in_worker = run_in_worker
+        self._taken = taken
+        self._going = going
+        self._settled = settled
+        self._simulator = simulator
+
+    async def cleared(self, asked: StartRequest) -> Cleared:
+        """Look, and refuse what stands in the way. Raises Refused of many kinds."""
+        if asked.engine == SIMULATOR:
+            facts = self._simulated(asked)
+            ready = await self._run_in_worker(prepared, asked, facts, secrets.token_urlsafe(9))
+            link = self._simulator(facts, ready.script, self._clock_us)
+            return Cleared(
+                ready=ready,
+                link=link,
+                own=True,
+                incarnation=link.standing.incarnation,
+                despite=_despite(ready, ()),
+            )
+        robot = self._robots.reachable(asked.engine)
+        if asked.like is not None:
+            raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
+        ready = await self._run_in_worker(prepared, asked, robot.facts, secrets.token_urlsafe(9))
+        free = preflight.of_taken(asked.engine, self._taken(asked.engine))
+        preflight.check_items([free], ())
+        if self._robots.foreign_stops.going(asked.engine):
+            raise Conflict(
+                f"Something is being stopped on {asked.engine}; a start would be stopped with it.",
+                where={"path": "/engine", "item": "quiet"},
+            )
+        try:
+            sight = await self._sight(robot)
+        except NoAnswer as nothing:
+            silence = preflight.of_silence(asked.engine, str(nothing))
+            raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
+                nothing
+            )
+        items = await self._run_in_worker(preflight.of_text, sight, ready.umrf)
+        preflight.check_items([preflight.of_taken(asked.engine, self._taken(asked.engine))], ())
+        preflight.check_items(items, asked.override.codes if asked.override else ())
+        return Cleared(
+            ready=ready,
+            link=robot,
+            own=False,
+            incarnation=sight.answer.incarnation,
+            despite=_despite(ready, items),
+        )
+
+    async def all_cleared(self, starts: Sequence[StartRequest]) -> list[Cleared]:
+        """Look at several engines at once, and refuse all if one has to be. Raises Conflict."""
+        cleared: dict[str, Cleared] = {}
+        refused: dict[str, Refused] = {}
+
+        async def look(each: StartRequest) -> None:
+            try:
+                cleared[each.engine] = await self.cleared(each)
+            except Refused as why:
+                refused[each.engine] = why
+
+        async with anyio.create_task_group() as tasks:
+            for each in starts:
+                tasks.start_soon(look, each)
+        if refused:
+            told = " ".join(f"{name}: {why.detail}" for name, why in sorted(refused.items()))
+            engines = {name: why.where or {} for name, why in refused.items()}
+            raise Conflict(
+                f"Nothing was started. {told}", where={"path": "/engines", "engines": engines}
+            )
+        return [cleared[each.engine] for each in starts]
+
+    async def look(self, asked: GroupRequest) -> list[Preflight]:
+        """Look, and tell all of it. Never raises Refused; nothing is stored or sent but a get."""
+        found: dict[str, Preflight] = {}
+
+        async def look(engine: str) -> None:
+            found[engine] = await self._look(asked.of(engine))
+
+        async with anyio.create_task_group() as tasks:
+            for engine in asked.engines:
+                tasks.start_soon(look, engine)
+        return [found[engine] for engine in asked.engines]
+
+    async def _look(self, asked: StartRequest) -> Preflight:
+        items: list[Item] = []
+        robot: KnownEngine | None = None
+        ready: Prepared | None = None
+        try:
+            if asked.engine == SIMULATOR:
+                facts = self._simulated(asked)
+            else:
+                robot = self._robots.reachable(asked.engine)
+                facts = robot.facts
+        except Refused as refused:
+            return preflight.summed(asked.engine, [preflight.of_refusal("link", refused)])
+        try:
+            ready = await self._run_in_worker(partial(prepared, approved=False), asked, facts, "")
+            items.append(preflight.of_graph(ready))
+        except Refused as refused:
+            items.append(preflight.of_refusal("graph", refused))
+        if robot is not None:
+            items.append(preflight.of_taken(asked.engine, self._taken(asked.engine)))
+            items += await self._look_at(robot, ready)
+        digest = ready.digest if ready is not None else ""
+        return preflight.summed(asked.engine, items, digest)
+
+    async def _look_at(self, robot: KnownEngine, ready: Prepared | None) -> list[Item]:
+        try:
+            sight = await self._sight(robot)
+        except NoAnswer as nothing:
+            return [preflight.of_silence(robot.registration.name, str(nothing))]
+        if ready is None:
+            return [preflight.of_answer(sight)]
+        return list(await self._run_in_worker(preflight.of_text, sight, ready.umrf))
+
+    async def _sight(self, robot: KnownEngine) -> EngineSight:
+        """The engine as it answers a get sent now, on the path that would confirm a stop. Raises
+        NoAnswer."""
+        name, began = robot.registration.name, anyio.current_time()
+        going = frozenset(self._going(name))  # what is taken back later on is in nobody's hand yet
+        answer: Answer
+        try:
+            with anyio.fail_after(_PREFLIGHT_S):
+                answer = await robot.get()
+        except TimeoutError as late:
+            raise NoAnswer(f"Asked for {_PREFLIGHT_S:.0f} s. {robot.standing.why}") from late
+        took = 1000 * (anyio.current_time() - began)
+        return EngineSight(
+            name=name,
+            facts=robot.facts,
+            standing=robot.standing,
+            answer=answer,
+            index=await robot.index(self._run_in_worker),
+            took_ms=took,
+            open_runs=going,
+            settled=tuple(self._settled(name)),
+        )
+
+    def _simulated(self, asked: StartRequest) -> EngineFacts:
+        """What is true of the simulator, as itself or playing a robot. Raises NotFound."""
+        if asked.like is None:
+            return _ITSELF
+        facts = facts_of(self._robots.registration(asked.like).profile)
+        return msgspec.structs.replace(facts, simulated=True)
+
+
+def _despite(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:
+    """What somebody overrides: of the graph, and of the robot that has answered."""
+    found = [each for each in ready.problems if each.severity == "error"]
+    told: list[Overridden] = []
+    for item in items:
+        if item.verdict != "blocked":
+            continue
+        found += item.problems
+        if not item.problems:
+            told.append(Overridden(code=item.code, text=item.text))
+    told += [
+        Overridden(code=each.code, text=each.message, aid=each.where.aid, path=each.where.path)
+        for each in found
+    ]
+    return tuple(told[:_TOLD])

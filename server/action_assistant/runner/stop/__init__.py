@@ -1,0 +1,1 @@
+"""Stop: the messages, what proves rest, what happens without a proof."""

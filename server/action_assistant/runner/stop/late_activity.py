@@ -1,0 +1,205 @@
+"""Late activity: runs that are over and move again, since an action was still being loaded.
+
+An engine neither counts nor shows an action that it loads, so nothing can be proven about one that
+takes longer than people would wait. What can be done is to look on, and to take back what was said.
+"""
+
+import logging
+from collections import OrderedDict, deque
+from collections.abc import Callable, Mapping
+from typing import Final, Protocol, TypeAlias, TypeVar
+
+import anyio
+import msgspec
+from anyio.abc import TaskGroup
+
+from action_assistant.errors import NotFound, Refused
+from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.links.engine_text import run_in
+from action_assistant.runner.links.observations import ACTIVE, Snapshot
+from action_assistant.runner.links.port import ForeignCommand, NoAnswer
+from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.robot_events import Commanded, RobotLog
+from action_assistant.runner.runs.events import MovesAgain
+from action_assistant.runner.runs.history import RunHistory
+from action_assistant.runner.runs.run import Run
+
+log: Final = logging.getLogger(__name__)
+
+_GET_S: Final = 1.0
+_PATIENCE_S: Final = 3.0  # until feedback counts although no answer has said the same
+_AGAIN_S: Final = 0.5
+_KEPT: Final = 200
+_TOLD: Final = 500  # newest entries of a flight record
+
+T = TypeVar("T")
+Reopen: TypeAlias = Callable[[Run, int, MovesAgain], None]
+
+
+class Reopenable(Protocol):
+    """A run that is open, or is just being left."""
+
+    run: Run
+
+    def moves_again(self, event: MovesAgain) -> bool:
+        """It had ended and moves. False when it is stored and left already."""
+        ...
+
+
+class RobotRecords(Protocol):
+    """Where it is recorded what others told robots."""
+
+    @property
+    def robot_log(self) -> RobotLog:
+        """The records."""
+        ...
+
+
+class LateActivity:
+    """Watches what engines show for runs that are over. `open` are the runs that are not;
+    `reopen` is given a run as stored, the seq of its last event, and what opens it again."""
+
+    def __init__(
+        self,
+        open_: Mapping[str, Reopenable],
+        history: RunHistory,
+        robots: RobotRecords,
+        tasks: TaskGroup,
+        *,
+        clock_us: ClockUs,
+        reopen: Reopen,
+    ) -> None:
+        self._open = open_
+        self._history = history
+        self._robots = robots
+        self._tasks = tasks
+        self._clock_us = clock_us
+        self._reopen = reopen
+        self._looking: set[str] = set()
+        self._waiting: deque[tuple[KnownEngine, Snapshot, str]] = deque()
+        self._news = anyio.Event()
+        self._ended: OrderedDict[str, tuple[Run, int]] = OrderedDict()
+        self._others: OrderedDict[str, None] = OrderedDict()
+
+    def ended(self, run: Run, seq: int) -> None:
+        """A run is over and stored; its end is known without the journal then."""
+        _put(self._ended, run.id, (run, seq))
+
+    def sent_by_others(self, command: ForeignCommand) -> None:
+        """Whoever plays a start of ours again has started it, not we: it is a graph of theirs."""
+        run = run_in(command.umrf) if command.umrf else None
+        if run is not None:
+            _put(self._others, run, None)
+
+    def is_of_others(self, run: str) -> bool:
+        """Whether somebody else has played the start of this run again."""
+        return run in self._others
+
+    def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
+        """An engine shows these graphs, in an answer or by feedback. Never waits; feedback comes
+        outside of any task, so that none can be started here."""
+        for each in snapshots:
+            if each.run is not None and each.active and self._is_over(each.run):
+                self._looking.add(each.run)
+                self._waiting.append((engine, each, each.run))
+                self._news.set()
+
+    async def run(self) -> None:
+        """Look into what was shown, until cancelled."""
+        while True:
+            await self._news.wait()
+            self._news = anyio.Event()
+            while self._waiting:
+                self._tasks.start_soon(self._look_into, *self._waiting.popleft())
+
+    def _is_over(self, run: str) -> bool:
+        if run in self._looking or run in self._others:
+            return False
+        opened = self._open.get(run)
+        return opened is None or opened.run.end is not None
+
+    async def _look_into(self, engine: KnownEngine, shown: Snapshot, run: str) -> None:
+        try:
+            moving = shown if shown.source == "get" else await _asked(engine, shown, run)
+            if moving is not None and self._is_over_still(run):
+                await self._take_back(engine, moving, run)
+        except (
+            Exception
+        ):  # one look must not end the others; the next snapshot is looked into again
+            log.exception("whether run %s moves again cannot be told", run)
+        finally:
+            self._looking.discard(run)
+
+    def _is_over_still(self, run: str) -> bool:
+        opened = self._open.get(run)
+        return run not in self._others and (opened is None or opened.run.end is not None)
+
+    async def _take_back(self, engine: KnownEngine, shown: Snapshot, run: str) -> None:
+        opened = self._open.get(run)
+        if opened is not None and opened.moves_again(self._told(opened.run, shown)):
+            return
+        while run in self._open:  # noqa: ASYNC110 - it is just being left
+            await anyio.sleep(0.01)
+        found = await self._known(run, engine.registration.name)
+        if found is None or not _is_of(found[0], engine):
+            _put(self._others, run, None)
+        elif found[0].end is not None:  # else it is being taken up after a restart
+            self._reopen(*found, self._told(found[0], shown))
+
+    async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:
+        """A run that is not open, and its last seq; None when there is no such run here, or when an
+        earlier process has recorded that somebody else played its start again."""
+        if run in self._ended:
+            return self._ended.pop(run)
+        while True:
+            try:
+                told = await self._robots.robot_log.newest(robot, _TOLD)
+                found, seq = await self._history.followed(run)
+            except NotFound:
+                return None
+            except Refused:
+                await anyio.sleep(_AGAIN_S)
+            except msgspec.DecodeError:
+                return None
+            else:
+                played = any(
+                    isinstance(each, Commanded) and run_in(each.umrf) == run for _, each in told
+                )
+                return None if played or found is None else (found, seq)
+
+    def _told(self, run: Run, shown: Snapshot) -> MovesAgain:
+        nodes = ", ".join(name for name, state in shown.nodes.items() if state in ACTIVE)
+        text = (
+            f"MOVES AGAIN: {run.engine} shows {nodes} moving in {run.graph_name}, after the run "
+            f"had been called {run.end}."
+        )
+        return MovesAgain(self._clock_us(), text)
+
+
+async def _asked(engine: KnownEngine, shown: Snapshot, run: str) -> Snapshot | None:
+    """What an answer says about what feedback has shown, which may be late or made up; without any
+    answer the feedback is believed."""
+    with anyio.move_on_after(_PATIENCE_S):
+        while True:
+            try:
+                with anyio.fail_after(_GET_S):
+                    answer = await engine.get()
+            except (NoAnswer, TimeoutError):
+                await anyio.sleep(0.1)
+            else:
+                return next(
+                    (each for each in answer.graphs if each.run == run and each.active), None
+                )
+    return shown
+
+
+def _is_of(run: Run, engine: KnownEngine) -> bool:
+    """Whether a run went to this life of this engine."""
+    lives = {run.incarnation, engine.standing.incarnation} - {None, ""}
+    return run.engine == engine.registration.name and len(lives) <= 1
+
+
+def _put(kept: OrderedDict[str, T], key: str, value: T) -> None:
+    kept[key] = value
+    while len(kept) > _KEPT:
+        kept.popitem(last=False)

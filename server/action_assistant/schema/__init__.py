@@ -1,0 +1,1 @@
+"""The tables of both databases, as the scripts in `migrations/` make them."""

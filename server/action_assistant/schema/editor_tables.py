@@ -1,0 +1,67 @@
+"""The editor's tables: its log, and what is folded from it."""
+
+from typing import Final
+
+from sqlalchemy import BigInteger, Column, Index, MetaData, Table, Text
+
+from action_assistant.schema.log_tables import NAMES, log_tables
+
+EDITOR: Final = MetaData(naming_convention=NAMES)
+editor_event, editor_head, editor_snapshot = log_tables(EDITOR)
+#: A graph of the catalogue. `name` and `description` follow the document.
+graph: Final = Table(
+    "graph",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("description", Text, nullable=False),
+    Column("made_at", BigInteger, nullable=False),
+    Column("made_by", Text, nullable=False),
+    Column("deleted_at", BigInteger),
+)
+#: A published version. Its UMRF stands in the body of the event `(stream, event_seq)`.
+version: Final = Table(
+    "version",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("graph", Text, nullable=False),
+    Column("label", Text, nullable=False),
+    Column("digest", Text, nullable=False),
+    Column("seq", BigInteger, nullable=False),
+    Column("author_id", Text, nullable=False),
+    Column("author_name", Text, nullable=False),
+    Column("at", BigInteger, nullable=False),
+    Column("stream", Text, nullable=False),
+    Column("event_seq", BigInteger, nullable=False),
+    Index(None, "graph", "at"),
+    Index(None, "digest"),
+)
+#: Somebody who acted here, under the name they last gave.
+person: Final = Table(
+    "person",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("seen_at", BigInteger, nullable=False),
+)
+#: A link that lets people in with a role.
+invitation: Final = Table(
+    "invitation",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("role", Text, nullable=False),
+    Column("label", Text, nullable=False),
+    Column("made_at", BigInteger, nullable=False),
+    Column("made_by", Text, nullable=False),
+    Column("revoked_at", BigInteger),
+    Column("revoked_by", Text),
+)
+#: Who came in by which link, under which name and when that was first.
+guest: Final = Table(
+    "guest",
+    EDITOR,
+    Column("invitation", Text, primary_key=True),
+    Column("person", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("at", BigInteger, nullable=False),
+)

@@ -1,0 +1,60 @@
+"""The tables of a log, which both databases have.
+
+`event`, `head` (where each stream ends) and `snapshot` are in both. Everything else is a fold of the
+events: it can be thrown away and made again. Times are microseconds since 1970, UTC.
+"""
+
+from typing import Final
+
+from sqlalchemy import (
+    BigInteger,
+    Column,
+    Index,
+    LargeBinary,
+    MetaData,
+    Table,
+    Text,
+)
+
+NAMES: Final = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "pk": "pk_%(table_name)s",
+}
+
+
+def log_tables(metadata: MetaData) -> tuple[Table, Table, Table]:
+    """The tables `event`, `head` and `snapshot` of a database."""
+    event = Table(
+        "event",
+        metadata,
+        Column("stream", Text, primary_key=True),
+        Column("seq", BigInteger, primary_key=True, autoincrement=False),
+        Column("kind", Text, nullable=False),
+        Column("author", Text, nullable=False),
+        Column("at", BigInteger, nullable=False),
+        Column("body", LargeBinary, nullable=False),
+        Column("position", BigInteger, nullable=False),
+        Column("chain", LargeBinary, nullable=False),
+        Index(None, "position", unique=True),
+    )
+    head = Table(
+        "head",
+        metadata,
+        Column("stream", Text, primary_key=True),
+        Column("seq", BigInteger, nullable=False),
+        Column("chain", LargeBinary, nullable=False),
+    )
+    snapshot = Table(
+        "snapshot",
+        metadata,
+        Column("stream", Text, primary_key=True),
+        Column("seq", BigInteger, nullable=False),
+        Column("proof", LargeBinary, nullable=False),
+        Column("state", LargeBinary, nullable=False),
+    )
+    return event, head, snapshot
+
+
+#: What is not a fold.
+LOG: Final = frozenset({"event", "head", "snapshot"})

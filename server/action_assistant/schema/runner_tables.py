@@ -1,0 +1,113 @@
+"""The runner's tables: its log, and what is folded from it."""
+
+from typing import Final
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Boolean,
+    Column,
+    ColumnElement,
+    Index,
+    Integer,
+    MetaData,
+    Table,
+    Text,
+    literal_column,
+    text,
+)
+
+from action_assistant.schema.log_tables import NAMES, log_tables
+
+RUNNER: Final = MetaData(naming_convention=NAMES)
+runner_event, runner_head, runner_snapshot = log_tables(RUNNER)
+#: Runs that ended badly: a list of them must not read all the others. Of an index, so word for word.
+FAILED: Final[ColumnElement[bool]] = literal_column(
+    "(run.state IN ('error', 'refused', 'lost', 'halted') OR run.result = 'on_error')"
+)
+#: A run. `number` counts for people; `request_id` makes a start happen once; `summary` is the run as
+#: the list shows it; `archived_as` is where its events are once they are not here any more.
+run: Final = Table(
+    "run",
+    RUNNER,
+    Column("id", Text, primary_key=True),
+    Column("number", Integer, nullable=False, unique=True),
+    Column("graph", Text),
+    Column("graph_name", Text, nullable=False),
+    Column("version", Text),
+    Column("digest", Text, nullable=False),
+    Column("engine", Text, nullable=False),
+    Column("author_id", Text, nullable=False),
+    Column("author_name", Text, nullable=False),
+    Column("state", Text, nullable=False),
+    Column("desired", Text, nullable=False),
+    Column("simulated", Boolean(create_constraint=False), nullable=False),
+    Column("request_id", Text, nullable=False, unique=True),
+    Column("requested_at", BigInteger, nullable=False),
+    Column("started_at", BigInteger),
+    Column("ended_at", BigInteger),
+    Column("result", Text),
+    Column("stopped_by", Text),
+    Column("summary", JSON, nullable=False),
+    Column("archived_at", BigInteger),
+    Column("archived_as", Text),
+    Index(None, "graph", "number"),
+    Index(None, "graph_name", "number"),
+    Index(None, "engine", "number"),
+    Index(None, "state"),
+    Index(None, "archived_at", "ended_at"),
+    Index("ix_run_failed", "number", sqlite_where=text(str(FAILED).replace("run.", ""))),
+)
+#: A robot that somebody registered, under its wake word.
+robot: Final = Table(
+    "robot",
+    RUNNER,
+    Column("name", Text, primary_key=True),
+    Column("domain", Integer, nullable=False),
+    Column("rmw", Text, nullable=False),
+    Column("get_service", Text, nullable=False),
+    Column("profile", JSON, nullable=False),
+    Column("registered_at", BigInteger, nullable=False),
+    Column("retired_at", BigInteger),
+)
+#: What people noted about a run, and what may be searched of it once it is over (`summed`).
+review: Final = Table(
+    "review",
+    RUNNER,
+    Column("run", Text, primary_key=True),
+    Column("pinned", Boolean(create_constraint=False), nullable=False),
+    Column("note", Text, nullable=False),
+    Column("words", Text, nullable=False),
+    Column("summed", Boolean(create_constraint=False), nullable=False),
+)
+#: The labels of runs.
+run_label: Final = Table(
+    "run_label",
+    RUNNER,
+    Column("run", Text, primary_key=True),
+    Column("label", Text, primary_key=True),
+    Index(None, "label"),
+)
+#: What one action of a run that is over adds up to; `took` are microseconds.
+action_sum: Final = Table(
+    "action_sum",
+    RUNNER,
+    Column("run", Text, primary_key=True),
+    Column("action", Text, primary_key=True),
+    Column("aid", Text),
+    Column("visits", Integer, nullable=False),
+    Column("results", JSON, nullable=False),
+    Column("inferred", Integer, nullable=False),
+    Column("took", JSON, nullable=False),
+)
+#: A run that shall go the same for ever. Its graph, script and course stand in the event.
+expectation: Final = Table(
+    "expectation",
+    RUNNER,
+    Column("name", Text, primary_key=True),
+    Column("graph", Text),
+    Column("graph_name", Text, nullable=False),
+    Column("run", Text, nullable=False),
+    Column("at", BigInteger, nullable=False),
+    Column("seq", BigInteger, nullable=False),
+)

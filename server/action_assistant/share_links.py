@@ -1,0 +1,141 @@
+"""What `serve --share` prints: a link and a QR code for each role."""
+
+import io
+import ipaddress
+import secrets
+import ssl
+import urllib.error
+import urllib.request
+from http.client import HTTPException
+from typing import Any, Final
+
+import msgspec
+import segno
+
+from action_assistant.web.auth.keys import Keys, ServerProof
+from action_assistant.web.auth.roles import may
+
+_ROLES: Final = ("viewer", "editor", "operator")
+_PATIENCE_S: Final = 10.0
+_PROOF: Final = 10_000  # bytes
+
+
+class ShareLink(msgspec.Struct, frozen=True):
+    """An invitation, as far as it is printed."""
+
+    role: str
+    path: str | None = None
+    label: str = ""
+
+
+class Links(msgspec.Struct, frozen=True):
+    """What the editor knows about sharing."""
+
+    origins: list[str]
+    invitations: list[ShareLink]
+
+
+def invitations_as_text(
+    base: str, keys: Keys, trust: ssl.SSLContext | None = None, *, secret: bool = False
+) -> str:
+    """The links of a running editor, made where a role has none yet; or why there are none. If they
+    are `secret`, only where they are to be found."""
+    try:
+        links = msgspec.json.decode(_ask(base, keys, trust, "GET"), type=Links)
+        if not links.origins:
+            return (
+                "others cannot reach this computer: it has no address on a network. "
+                "Name one in ACTION_ASSISTANT_HOSTS, or share again once it is connected."
+            )
+        open_ = [link for link in reversed(links.invitations) if link.path and not link.label]
+        found = {link.role: link for link in open_}
+        for role in _ROLES:
+            if role not in found:
+                made = _ask(base, keys, trust, "POST", {"role": role})
+                found[role] = msgspec.json.decode(made, type=ShareLink)
+    except (OSError, urllib.error.URLError, msgspec.DecodeError) as error:
+        return f"the links for others could not be made: {error}"
+    if secret:
+        return (
+            f"others come in at {links.origins[0]} by the links of `action-assistant people list`."
+        )
+    return "\n".join(
+        [
+            "others on this network come in by these links; whoever has one may use it:",
+            *(_text(links.origins, found[role]) for role in _ROLES),
+            "Revoke a link under Share in the page, or with `action-assistant people revoke`.",
+            *_warning(links.origins[0]),
+        ]
+    )
+
+
+def is_ours(base: str, keys: Keys, trust: ssl.SSLContext | None = None) -> bool:
+    """Whether what answers there knows the token, and is to be told it."""
+    challenge = secrets.token_urlsafe(32)
+    url = f"{base}/api/server?challenge={challenge}"
+    try:
+        with _opener(trust).open(url, timeout=1) as answer:
+            proof = msgspec.json.decode(answer.read(_PROOF), type=ServerProof)
+    except (OSError, urllib.error.URLError, msgspec.DecodeError, HTTPException):
+        return False
+    host, _, port = base.partition("://")[2].rpartition(":")
+    at = f"{host.strip('[]')}:{port}"
+    return keys.proven(challenge, proof, at=at if _is_address(host.strip("[]")) else None)
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True
+
+
+def _warning(origin: str) -> list[str]:
+    if origin.startswith("https:"):
+        return []
+    return ["What is sent is not encrypted: on a network with strangers, use --tls.", ""]
+
+
+def _text(origins: list[str], link: ShareLink) -> str:
+    first, *others = (f"{origin}{link.path}" for origin in origins)
+    lines = [f"\n  {link.role}: may {may_of(link.role)}", f"\n    {first}\n", _drawn(first)]
+    if others:
+        lines.append("    also: " + ", ".join(origin for origin in origins[1:]))
+    return "\n".join(lines)
+
+
+def may_of(role: str) -> str:
+    """What a role may do, in words."""
+    match role:
+        case "viewer" | "editor" | "operator" | "owner":
+            return may(role)
+        case _:
+            return "do what a newer version knows"
+
+
+def _drawn(link: str) -> str:
+    """A QR code of half blocks, light on dark terminals as on light ones."""
+    out = io.StringIO()
+    segno.make(link, error="l", micro=False).terminal(out, compact=True, border=2)
+    return "".join(f"    {line}\n" for line in out.getvalue().splitlines())
+
+
+def _opener(trust: ssl.SSLContext | None) -> urllib.request.OpenerDirector:
+    """Straight to our own processes: no proxy of the environment is shown the token."""
+    return urllib.request.build_opener(
+        urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=trust)
+    )
+
+
+def _ask(
+    base: str, keys: Keys, trust: ssl.SSLContext | None, method: str, body: object = None
+) -> bytes:
+    data = msgspec.json.encode(body) if body is not None else None
+    headers = {"authorization": f"Bearer {keys.token}", "content-type": "application/json"}
+    request = urllib.request.Request(
+        f"{base}/api/invitations", data=data, headers=headers, method=method
+    )
+    with _opener(trust).open(request, timeout=_PATIENCE_S) as answer:
+        found: Any = answer.read()
+        return bytes(found)

@@ -1,0 +1,280 @@
+"""Both processes under one command: started together, restarted when they die, ended together."""
+
+import os
+import signal
+import ssl
+import subprocess
+import sys
+import threading
+import time
+import webbrowser
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.interpreter import Interpreter, for_runner
+from action_assistant.private_files import opener
+from action_assistant.settings import EVERYWHERE, Reachability, more_hosts
+from action_assistant.share_links import invitations_as_text, is_ours
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.network.addresses import addresses_of
+from action_assistant.web.network.certificate import Certificate
+from action_assistant.web.server.listen import bound
+
+_PATIENCE: Final = 30.0  # seconds until a start that does not answer is called failed
+_STEADY: Final = 30.0  # seconds after which a process counts as healthy again
+_BACK_OFF: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # seconds before the n-th restart in a row
+_TICK: Final = 0.1
+_ENDING: Final = 8.0  # seconds that a process gets to end by itself
+
+
+class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
+    """What to serve, and where. The runner listens on the port after the editor's."""
+
+    data: Path
+    database: str | None
+    switch_database: bool
+    host: str
+    port: int
+    share: bool
+    tls: bool
+    opens: bool
+    reached: Reachability = Reachability()
+
+
+class EndSignal:
+    """Whether one of these signals has come.
+
+    A handler runs in the main thread wherever that is just then, also while it holds a lock, as it
+    does in parts of `threading.Event.wait`. A handler that took the same lock would wait for itself,
+    for ever. This one takes none.
+    """
+
+    def __init__(self, *signals: signal.Signals) -> None:
+        self._came = False
+        for number in signals:
+            signal.signal(number, self._hear)
+
+    def _hear(self, *_: object) -> None:
+        self._came = True
+
+    def within(self, seconds: float) -> bool:
+        """Whether one has come, at the latest after so many seconds."""
+        if not self._came:
+            time.sleep(seconds)
+        return self._came
+
+
+class Child:
+    """One of the two processes, as often as it takes."""
+
+    def __init__(
+        self,
+        name: str,
+        arguments: list[str],
+        port: int,
+        interpreter: Interpreter,
+        settings: Mapping[str, str],
+    ) -> None:
+        self.name = name
+        self.port = port
+        self._settings = settings  # everybody may read arguments; environments are ours alone
+        self._interpreter = interpreter
+        self._arguments = arguments
+        self._process: subprocess.Popen[bytes] | None = None
+        self._deaths = 0
+        self._starts = 0
+        self._born = 0.0
+        self._again = 0.0  # when to start, by the monotonic clock
+
+    def start(self, parent: int) -> None:
+        """Start it. `parent` is the reading end of a pipe that closes when we die."""
+        environment = {**self._interpreter.environment(os.environ), **self._settings}
+        environment["_ACTION_ASSISTANT_PARENT"] = str(parent)
+        self._born = time.monotonic()
+        self._starts += 1
+        self._process = subprocess.Popen(
+            [self._interpreter.path, "-m", "action_assistant", *self._arguments],
+            env=environment,
+            pass_fds=[parent],
+            stdin=subprocess.DEVNULL,
+        )
+
+    def tend(self, parent: int) -> int | None:
+        """Notice a death and start again after a while; the exit code if starting is hopeless."""
+        now = time.monotonic()
+        if self._process is None:
+            if now >= self._again:
+                self.start(parent)
+            return None
+        code = self._process.poll()
+        if code is None:
+            return None
+        self._process = None
+        # It said itself that it cannot start. Once both have worked, neither ends the other: a runner
+        # stops robots while the editor's database is away.
+        if code == 2 and self._starts == 1:
+            return code
+        self._deaths = 1 if now - self._born > _STEADY else self._deaths + 1
+        wait = _BACK_OFF[min(self._deaths, len(_BACK_OFF)) - 1]
+        self._again = now + wait
+        _say(f"{self.name} died ({_cause(code)}); starting it again in {wait:g} s")
+        return None
+
+    def end(self) -> None:
+        """Ask it to end, and see that it does."""
+        if self._process is None:
+            return
+        self._process.terminate()
+        try:
+            self._process.wait(_ENDING)
+        except subprocess.TimeoutExpired:
+            _say(f"{self.name} does not end; killing it")
+            self._process.kill()
+            self._process.wait()
+        self._process = None
+
+
+def serve(plan: ServePlan) -> int:
+    """Run until told to end; the exit code. Raises CannotStart when a port is taken."""
+    for port in (plan.port, plan.port + 1):
+        for probe in bound(plan.host, port):
+            probe.close()
+    keys = Keys.of(plan.data)
+    trust = _certified(plan)
+    enough = EndSignal(signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    # The writing end is never written to: it closes when this process dies, however it dies.
+    reading, _writing = os.pipe()
+    children = _children(plan)
+    _say("starting …")
+    for child in children:
+        child.start(reading)
+    threading.Thread(
+        target=_greet, args=(plan, keys, trust, children, enough), name="greet", daemon=True
+    ).start()
+    try:
+        while not enough.within(_TICK):
+            for child in children:
+                code = child.tend(reading)
+                if code is not None:
+                    return code
+        return 0
+    finally:
+        _say("ending …")
+        for child in children:
+            child.end()
+
+
+def _children(plan: ServePlan) -> list[Child]:
+    """The runner last: it is the last to end."""
+    address = ["--data", str(plan.data), "--host", plan.host]
+    address += [flag for flag, on in (("--share", plan.share), ("--tls", plan.tls)) if on]
+    database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}
+    switch = ["--switch-database"] if plan.switch_database else []
+    ports = str(plan.port), str(plan.port + 1)
+    settings = _as_settings(plan.reached)
+    this = Interpreter(path=Path(sys.executable), origin="this")
+    speaking = for_runner()
+    if speaking.remark:
+        _say(speaking.remark)
+    return [
+        Child(
+            "editor",
+            ["editor", *address, *switch, "--port", ports[0], "--runner-port", ports[1]],
+            plan.port,
+            this,
+            {**settings, **database},
+        ),
+        Child(
+            "runner",
+            ["runner", *address, "--port", ports[1], "--page-port", ports[0]],
+            plan.port + 1,
+            speaking,
+            settings,
+        ),
+    ]
+
+
+def _as_settings(reached: Reachability) -> dict[str, str]:
+    """For the environment of both: an argument might contain a word by which people find processes."""
+    return {
+        "ACTION_ASSISTANT_PUBLIC_URL": f"{reached.public.page}/" if reached.public else "",
+        "ACTION_ASSISTANT_TRUSTED_PROXIES": ",".join(str(each) for each in reached.proxies),
+    }
+
+
+def _certified(plan: ServePlan) -> ssl.SSLContext | None:
+    """With --tls, how to trust ourselves; the certificate is there before the processes are."""
+    if not plan.tls:
+        return None
+    addresses = addresses_of(
+        host=plan.host, page_port=plan.port, hosts=more_hosts(), share=plan.share, secure=True
+    )
+    certificate = Certificate(plan.data)
+    certificate.renew(addresses.certified())
+    _say(
+        "browsers warn until they trust the authority that signs for this computer: import\n"
+        f"    {certificate.authority}\n    SHA-256 {certificate.fingerprint()}"
+    )
+    return certificate.trusting()
+
+
+def _greet(
+    plan: ServePlan,
+    keys: Keys,
+    trust: ssl.SSLContext | None,
+    children: list[Child],
+    enough: EndSignal,
+) -> None:
+    """Say where the page is once both processes answer, and open it."""
+    here = plan.host if plan.host not in {"0.0.0.0", "::", "localhost", EVERYWHERE} else "127.0.0.1"
+    shown = f"[{here}]" if ":" in here else here
+    scheme = "https" if plan.tls else "http"
+    deadline = time.monotonic() + _PATIENCE
+    for child in children:
+        while not is_ours(f"{scheme}://{shown}:{child.port}", keys, trust):
+            if enough.within(_TICK):
+                return
+            if time.monotonic() > deadline:
+                _say(f"{child.name} does not answer yet; the messages above may say why")
+                deadline = float("inf")
+    base = f"{scheme}://{shown}:{plan.port}"
+    url = f"{base}/#t={keys.token}"
+    shown_at = f"{plan.reached.public.page}/#t={keys.token}" if plan.reached.public else url
+    # Through a file that only this user can read: arguments of a browser are visible to all.
+    redirect = plan.data / "open.html"
+    opens = plan.opens and _has_screen()
+    try:
+        with open(redirect, "w", opener=opener) as out:
+            out.write(f'<!doctype html><meta http-equiv="refresh" content="0;url={url}">')
+    except OSError as error:
+        _say(f"{redirect} cannot be written: {error.strerror}")
+        opens = False
+    at_terminal = sys.stderr.isatty()  # a log is kept, and read by others
+    if at_terminal:
+        _say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {shown_at}\n")
+        if shown_at != url:
+            _say(f"or, on this computer and without the proxy:\n\n    {url}\n")
+    else:
+        _say(f"ready at {base}. {redirect} signs you in; the link is shown at a terminal only.")
+    if plan.share:
+        _say(invitations_as_text(base, keys, trust, secret=not at_terminal))
+    if opens:
+        webbrowser.open(redirect.as_uri())
+
+
+def _has_screen() -> bool:
+    if sys.platform in {"darwin", "win32"}:
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _cause(code: int) -> str:
+    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"action-assistant: {text}\n")
+    sys.stderr.flush()

@@ -1,0 +1,346 @@
+"""What becomes of a graph when one action ends otherwise, followed only where it differs.
+
+An action's end reaches other actions by arrows only, and when an action ends depends on when it began
+only. So a course with one other end is the usual one apart from the states that differ from it, and
+those are few: they are kept by place, and only the instants that touch one of them are gone through
+again. When none is left, the rest is the usual course; when only one action runs and everything behind
+it is as at the start, the rest is as of anybody else who came there (decision 45).
+"""
+
+from bisect import bisect_left
+from heapq import heappop, heappush
+from typing import Final
+
+from action_assistant.umrf.courses.course import LAPS, MORE, Course, Outcome, stuck
+from action_assistant.umrf.courses.instants import ACTIVE, DUE, IDLE, RUNS, Instant, State
+from action_assistant.umrf.courses.network import Mask
+from action_assistant.umrf.model import Precondition
+
+#: Differences that are remembered with what came of them.
+_FEW: Final = 8
+
+
+class Tied(Exception):
+    """Two actions end at one moment, in an order that is known to the engine only."""
+
+
+_Key = tuple[int, frozenset[tuple[int, State]]]
+
+
+class Deviations:
+    """Courses beside the usual one. `work`: states that were looked at, the measure of what it took."""
+
+    def __init__(self, course: Course) -> None:
+        self.course = course
+        self.net = course.net
+        self.work = 0
+        #: How it goes on when only this action runs, and nothing behind it has been touched.
+        self.alone: dict[int, Outcome] = {}
+        #: How it goes on from these differences; and who had been left out of them till then.
+        self.known: dict[_Key, tuple[Outcome, Mask]] = {}
+        for number, active in enumerate(course.active[:-1]):  # with the last it ended
+            if active == 1:
+                self._note_alone(number)
+
+    def _note_alone(self, number: int) -> None:
+        """The usual course is one that came there, too."""
+        course = self.course
+        for place in course.touched[number]:
+            if place == self.net.exit or course.state(place, number + 1).does != RUNS:
+                continue
+            if place not in self.alone and not course.came[number] & self.net.behind[place]:
+                self.alone[place] = course.outcome
+
+    def outcome(self, place: int, result: Precondition) -> Outcome:
+        """How a graph ends in which the first run of an action ends with `result`."""
+        instant = self.course.first_end(place)
+        if instant is None:
+            return self.course.outcome
+        return _Way(self).followed(instant, result)
+
+
+class _Way:
+    """One course that differs. `apart`: the states that do, by place; `forgotten`: who waits of those
+    that nothing can reach any more."""
+
+    def __init__(self, all_: Deviations) -> None:
+        self.all = all_
+        self.course = all_.course
+        self.net = all_.net
+        self.apart: dict[int, State] = {}
+        self.mask: Mask = 0
+        self.forgotten: Mask = 0
+        self.dropped: Mask = 0
+        self.last = -1
+        self._sums: dict[int, tuple[int, int]] = {}
+        self._running = 0
+        self._active = 0
+        self._queue: list[tuple[float, int]] = []
+        self._passed: list[int] = []
+        self._met: list[tuple[_Key, Mask, Mask]] = []
+        self._is_over = False
+        self._steps = 0
+        self._power = 1
+        self._point: tuple[int, dict[int, State]] = (-1, {})
+        self._since = 0  # instants since it was last asked what can be left out
+
+    def followed(self, instant: int, result: Precondition) -> Outcome:
+        found = self._at(self.course.times[instant], self.course.roots[instant], result)
+        if instant < len(self.course.times) - 1:
+            self._push(len(self.course.times) - 1)
+        limit = LAPS * len(self.net.nodes) + MORE
+        while found is None:
+            limit -= 1
+            if not limit:
+                found = Outcome("endless", cut=True)
+                break
+            if not self._queue:
+                found = self._quiet(len(self.course.times))
+                break
+            at = self._queue[0][0]
+            root = -1
+            while self._queue and self._queue[0][0] == at:
+                place = heappop(self._queue)[1]
+                if place >= 0 and self._is_due(place, at):
+                    if root not in (-1, place):
+                        raise Tied
+                    root = place
+            found = self._at(at, root, "on_true")
+            if found is None and root >= 0 and self._is_over and self._is_lap(at, root):
+                found = Outcome("endless")
+        return self._remembered(found)
+
+    def _is_lap(self, at: float, root: int) -> bool:
+        """Whether it has come to a point where it was before, when the usual course is over."""
+        self._steps += 1
+        again = root == self._point[0] and self._differing(at) == self._point[1]
+        if self._steps >= self._power:
+            self._power *= 2
+            self._point = root, self._differing(at)
+        return again
+
+    def _differing(self, at: float) -> dict[int, State]:
+        start = at // self.net.round_ms * self.net.round_ms
+        return {
+            place: state._replace(due=state.due - start) if state.does in DUE else state
+            for place, state in self.apart.items()
+        }
+
+    def _is_due(self, place: int, at: float) -> bool:
+        state = self.apart.get(place)
+        return state is not None and state.does in DUE and state.due == at
+
+    def _push(self, instant: int) -> None:
+        heappush(self._queue, (self.course.times[instant], -1))
+
+    # One instant
+
+    def _at(self, at: float, root: int, result: Precondition) -> Outcome | None:
+        """Goes through what happens at a moment, here and usually. None: it goes on."""
+        course = self.course
+        here = bisect_left(course.times, at)
+        usual = here < len(course.times) and course.times[here] == at
+        if usual:
+            usually = course.roots[here]
+            if root not in (-1, usually) and usually not in self.apart:
+                raise Tied
+            if root < 0 and usually not in self.apart:
+                root = usually
+        elif root < 0:
+            return None
+        states: dict[int, State] = {}
+        if root >= 0:
+            before = here - 1
+            running = course.running[before] + self._running
+            instant = Instant(
+                self.net, lambda place: self._state(place, here), at, running,
+                course.active[before] + self._active,
+            )  # fmt: skip
+            instant.ends(root, result)
+            states = instant.states
+            self.last = instant.last if instant.last >= 0 else self.last
+            self.all.work += 1 + len(states)
+            if instant.end is not None:
+                return Outcome(instant.end, instant.early)
+        after = here + usual
+        touched = course.touched[here] if usual else ()
+        for place in states.keys() | touched:
+            own = states.get(place)
+            self._compare(place, own if own is not None else self._state(place, here), after)
+        self.all.work += 1 + len(touched)
+        self._await_halt(after)
+        if course.active[after - 1] + self._active == 0:
+            return self._quiet(after)
+        if after == len(course.times):
+            return self._beyond()
+        self._since += 1
+        if self._since >= len(self.apart) - _FEW:
+            self._since = 0
+            return self._forget(after)
+        return None
+
+    def _state(self, place: int, before: int) -> State:
+        own = self.apart.get(place)
+        return own if own is not None else self.course.state(place, before)
+
+    def _compare(self, place: int, state: State, after: int) -> None:
+        """Whether a state is the usual one now."""
+        usual = self.course.state(place, after)
+        running, active = self._sums.pop(place, (0, 0))
+        self._running -= running
+        self._active -= active
+        if state == usual and not (self._is_over and state.does in DUE):
+            if self.apart.pop(place, None) is not None:
+                self.mask ^= 1 << place
+            return
+        if place not in self.apart:
+            self.mask |= 1 << place
+        self._own(place, state)
+        sums = (
+            (state.does == RUNS) - (usual.does == RUNS),
+            (state.does in ACTIVE) - (usual.does in ACTIVE),
+        )
+        if sums != (0, 0):
+            self._sums[place] = sums
+            self._running += sums[0]
+            self._active += sums[1]
+        instants = self.course.instants[place]
+        following = bisect_left(instants, after)
+        if following < len(instants):
+            self._push(instants[following])
+
+    def _await_halt(self, after: int) -> None:
+        """The usual end that halts the graph here, where fewer run, is one to go through."""
+        if self._running < 0:
+            halting = self.course.halting.get(-self._running, ())
+            following = bisect_left(halting, after)
+            if following < len(halting):
+                self._push(halting[following])
+
+    def _own(self, place: int, state: State) -> None:
+        old = self.apart.get(place)
+        self.apart[place] = state
+        if state.does in DUE and (old is None or old.due != state.due or old.does != state.does):
+            heappush(self._queue, (state.due, place))
+
+    def _beyond(self) -> Outcome | None:
+        """The usual course has ended, or was followed no further; this one has not ended."""
+        course = self.course
+        end = len(course.times)
+        if course.outcome.kind == "endless":
+            places = range(len(self.net.nodes))
+            due = any(self._state(place, end).does in DUE for place in places)
+            return Outcome("endless", cut=True) if due else self._quiet(end)
+        if not self._is_over:
+            self._is_over = True
+            for place in range(len(self.net.nodes)):
+                state = course.state(place, end)
+                if place not in self.apart and state.does in DUE:
+                    self.mask |= 1 << place
+                    self._own(place, state)
+        return self._as_before(end)
+
+    # What is left of the difference
+
+    def _forget(self, after: int) -> Outcome | None:
+        """Leaves out what can make no difference any more. An outcome if nothing is left, or if
+        that is known."""
+        course = self.course
+        lively: Mask = 0
+        idle: list[int] = []
+        for place, state in self.apart.items():
+            instants = course.instants[place]
+            if state.does in ACTIVE or (instants and instants[-1] >= after):
+                lively |= self._behind(place)
+            elif place != self.net.exit and course.state(place, after).does == IDLE:
+                idle.append(place)
+        self.all.work += len(self.apart)
+        for place in idle:
+            if not lively >> place & 1:
+                self._drop(place)
+        if not self.apart:
+            return self._joined(
+                course.outcome, self.forgotten | course.outcome.waiting & ~self.dropped
+            )
+        return self._as_before(after)
+
+    def _behind(self, place: int) -> Mask:
+        return 0 if place == self.net.exit else self.net.behind[place]
+
+    def _drop(self, place: int) -> None:
+        state = self.apart.pop(place)
+        self.mask ^= 1 << place
+        self.dropped |= 1 << place
+        if state.waiting:
+            self.forgotten |= 1 << place
+
+    def _as_before(self, after: int) -> Outcome | None:
+        """What another course came to from the same point."""
+        if self.course.active[after - 1] + self._active == 1:
+            alone = [place for place, state in self.apart.items() if state.does == RUNS]
+            if alone and self._is_fresh(alone[0], after):
+                known = self.all.alone.get(alone[0])
+                if known is not None:
+                    return self._came_alone(alone[0], known, after)
+                self._passed.append(alone[0])
+        if len(self.apart) <= _FEW:
+            key = (after, frozenset(self.apart.items()))
+            met = self.all.known.get(key)
+            if met is not None:
+                return self._met_again(*met, after)
+            self._met.append((key, self.forgotten, self.dropped))
+        return None
+
+    def _is_fresh(self, place: int, after: int) -> bool:
+        """Whether everything behind a running action is as at the start."""
+        behind = self.net.behind[place]
+        if self.course.came[after - 1] & behind & ~self.mask:
+            return False
+        initial = self.course.initial
+        return all(
+            state == initial[each] for each, state in self.apart.items() if behind >> each & 1
+        )
+
+    def _waiting(self, after: int) -> Mask:
+        own = sum(1 << place for place, state in self.apart.items() if state.waiting)
+        usual = self.course.waiting[after - 1] & ~(self.mask | self.dropped)
+        return usual | own | self.forgotten
+
+    # The end
+
+    def _quiet(self, after: int) -> Outcome:
+        """Nothing is left to happen."""
+        return stuck(
+            self.net, self._waiting(after), self._state(self.net.exit, after), self._last()
+        )
+
+    def _came_alone(self, place: int, known: Outcome, after: int) -> Outcome:
+        """What is not behind the one that runs stays as it is."""
+        behind = self.net.behind[place]
+        waiting = self._waiting(after) | known.waiting & behind
+        if known.kind == "stuck" and not behind >> self.net.exit & 1:
+            return self._quiet(after)._replace(waiting=waiting)
+        return self._joined(known, waiting)
+
+    def _met_again(self, known: Outcome, dropped: Mask, after: int) -> Outcome:
+        """`dropped`: who was left out of what was followed, and here may be as usual."""
+        usual = self.course.waiting[after - 1] & dropped & ~(self.dropped | self.mask)
+        return self._joined(known, self.forgotten | known.waiting & ~self.dropped | usual)
+
+    def _joined(self, known: Outcome, waiting: Mask) -> Outcome:
+        """An outcome that is known from here on, with who waits in the end."""
+        if known.kind != "stuck":
+            return known
+        last = known.last if known.last >= 0 else self._last()
+        return known._replace(waiting=waiting, last=last)
+
+    def _last(self) -> int:
+        return self.last if self.last >= 0 else self.course.last[-1]
+
+    def _remembered(self, found: Outcome) -> Outcome:
+        for place in self._passed:
+            self.all.alone.setdefault(place, found)
+        for key, forgotten, dropped in self._met:
+            kept = found._replace(waiting=found.waiting & ~forgotten)
+            self.all.known.setdefault(key, (kept, dropped))
+        return found

@@ -1,0 +1,220 @@
+"""What one end of an action sets in motion at its instant, over states that are plain values.
+
+The rules are those of `core` (docs/umrf-and-the-engine.md 2.3 to 2.7); a property test holds the two
+together. Only what matters later is kept: whether an action goes on, and until when; which required
+parents have reported; which inputs hold a value; whether outputs do.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Final, Literal, NamedTuple, TypeAlias
+
+from action_assistant.umrf.courses.network import EdgeQuestion, Mask, Network
+from action_assistant.umrf.model import Precondition
+
+#: What an action does: nothing; runs until `due`; ends a stop at `due`; is paused; was stopped while
+#: it was paused and is given up at `due`; is given up, its thread never ends.
+IDLE: Final = 0
+RUNS: Final = 1
+STOPS: Final = 2
+PAUSED: Final = 3
+GIVING_UP: Final = 4
+GIVEN_UP: Final = 5
+ACTIVE: Final = frozenset({RUNS, STOPS, PAUSED, GIVING_UP})
+DUE: Final = frozenset({RUNS, STOPS, GIVING_UP})
+#: After so long the engine gives up on a paused action that it stops.
+GIVING_UP_MS: Final = 5_000.0
+
+
+class State(NamedTuple):
+    """One action at one moment. `got`: inputs whose value came from a parent, gone after the run;
+    `waiting`: it was asked and was not ready."""
+
+    does: int = IDLE
+    due: float = 0.0
+    links: Mask = 0
+    has: Mask = 0
+    got: Mask = 0
+    filled: bool = False
+    waiting: bool = False
+
+
+#: How a graph ends: `locked`: a bypass goes round in circles.
+End: TypeAlias = Literal["finished", "halted", "crashed", "locked"]
+Reader: TypeAlias = Callable[[int], State]
+
+
+class Instant:
+    """Everything that happens at one moment, and its sums. `states`: of what was asked or ended.
+
+    `end`: how the graph ended, if it did; `early`: it is FINISHED while something runs; `last`: who
+    asked the exit last without ending the graph, by place; -1 nobody; `others`: how many others ran
+    when all children of one that ended ignored it, which halts the graph if there are none.
+    """
+
+    __slots__ = ("_bypassed", "_net", "_now", "_read", "_tasks", "active", "early", "end", "last",
+                 "others", "running", "states")  # fmt: skip
+
+    def __init__(self, net: Network, read: Reader, now_ms: float, running: int, active: int):
+        self._net = net
+        self._read = read
+        self._now = now_ms
+        self._tasks: deque[tuple[int, Precondition]] = deque()
+        self._bypassed: set[tuple[int, Precondition]] = set()
+        self.states: dict[int, State] = {}
+        self.running = running
+        self.active = active
+        self.end: End | None = None
+        self.early = False
+        self.last = -1
+        self.others: list[int] = []
+
+    def begin(self) -> None:
+        """The graph starts."""
+        self._inform(-1, "on_true", self._net.entry)
+        self._settle()
+
+    def ends(self, place: int, result: Precondition) -> None:
+        """The action that runs, stops or is given up here ends; `result`: of one that runs."""
+        state = self._state(place)
+        match state.does:
+            case 1:
+                self._returns(place, state, result)
+            case 2:
+                self._returns(place, state, "on_stopped")
+            case _:
+                self._put(place, state._replace(does=GIVEN_UP, due=0.0))
+                self._inform(place, "on_error", self._net.edges[place])
+        self._settle()
+
+    def _returns(self, place: int, state: State, result: Precondition) -> None:
+        failed = result == "on_error"
+        does = IDLE if failed else state.does
+        self._put(place, state._replace(does=does, filled=state.filled or not failed))
+        self._inform(place, result, self._net.edges[place])
+        if self.end == "crashed":
+            return
+        state = self._state(place)
+        does = state.does if failed else IDLE  # one that failed may have begun anew
+        due = state.due if does else 0.0
+        self._put(place, state._replace(does=does, due=due, has=state.has & ~state.got, got=0))
+
+    def _state(self, place: int) -> State:
+        state = self.states.get(place)
+        return self._read(place) if state is None else state
+
+    def _put(self, place: int, state: State) -> None:
+        old = self._state(place).does
+        if old != state.does:
+            self.running += (state.does == RUNS) - (old == RUNS)
+            self.active += (state.does in ACTIVE) - (old in ACTIVE)
+        self.states[place] = state
+
+    def _settle(self) -> None:
+        if self._tasks and self._only_ends():
+            self.end = "finished"
+            self.early = self.active > 0
+            return
+        while self._tasks and self.end is None:
+            place, result = self._tasks.popleft()
+            self._inform(place, result, self._net.edges[place])
+        if self.end is None and self._bypassed:
+            circling = self._net.circling
+            if any(circling[result] >> place & 1 for place, result in self._bypassed):
+                self.end = "locked"
+
+    def _only_ends(self) -> bool:
+        """Whether these bypasses do nothing but lead to the exit, however far."""
+        plain, ends = self._net.plain, self._net.ends
+        if not any(ends[result] >> place & 1 for place, result in self._tasks):
+            return False
+        if any(not plain[result] >> place & 1 for place, result in self._tasks):
+            return False
+        # Whoever leads to the exit may run itself, and would not be one of the others then.
+        return not self.active or not any(
+            self._state(place).does in ACTIVE for place in self._net.last
+        )
+
+    def _inform(self, place: int, result: Precondition, edges: list[EdgeQuestion | None]) -> None:
+        ignored = 0
+        for edge in edges:
+            if edge is None:
+                self.end = "crashed"
+                return
+            ignored += self._ask(place, edge, result)
+            if self.end is not None:
+                return
+        own = place >= 0 and self._state(place).does == RUNS
+        if ignored == len(edges):
+            self.others.append(self.running - own)
+            if self.running == own:
+                self.end = "halted"
+
+    def _ask(self, place: int, edge: EdgeQuestion, result: Precondition) -> bool:
+        """One edge; whether the child ignores it."""
+        child, net = edge.child, self._net
+        before = state = self._state(child)
+        if edge.link & ~state.links:
+            state = state._replace(links=state.links | edge.link)
+        response = edge.responses[result]
+        if response == "ignore" or response == "bypass":
+            if state is not before or child not in self.states:
+                self.states[child] = state
+            if response == "bypass":
+                self._bypass(place, child, result)
+            return response == "ignore"
+        if edge.given is None:
+            self.end = "crashed"
+            return False
+        given = edge.given[place >= 0 and self._state(place).filled]
+        ready = not net.needs[child] & ~state.links and not net.wants[child] & ~(state.has | given)
+        if given or state.waiting == ready:
+            has, got = state.has | given, state.got | given
+            state = state._replace(has=has, got=got, waiting=not ready)
+        self.states[child] = state
+        if child == net.exit:
+            if ready:
+                self._finish(place)
+            else:
+                self.last = place
+        elif ready:
+            self._dispatch(child, state, response)
+        return False
+
+    def _bypass(self, place: int, child: int, result: Precondition) -> None:
+        """What a bypass of one action with one result does is done once: that it comes by several
+        ways changes nothing."""
+        if child == self._net.exit:
+            self._finish(place)
+        elif (child, result) not in self._bypassed:
+            self._bypassed.add((child, result))
+            self._tasks.append((child, result))
+
+    def _finish(self, place: int) -> None:
+        self.end = "finished"
+        own = place >= 0 and self._state(place).does in ACTIVE
+        self.early = self.active > own
+
+    def _dispatch(self, child: int, state: State, response: str) -> None:
+        does = state.does
+        match response:
+            case "run":
+                if does == RUNS or not self._net.able[child]:
+                    return
+                if does != IDLE:
+                    self.end = "crashed"
+                    return
+                due = self._net.due(child, self._now)
+                self._put(child, state._replace(does=RUNS, due=due))
+            case "stop" if does in (STOPS, GIVING_UP):
+                self.end = "crashed"
+            case "stop" if does == RUNS:
+                due = min(state.due, self._now + self._net.stopping_ms[child])
+                self._put(child, state._replace(does=STOPS, due=due))
+            case "stop" if does == PAUSED:
+                due = self._now + GIVING_UP_MS
+                self._put(child, state._replace(does=GIVING_UP, due=due))
+            case "pause" if does == RUNS:
+                self._put(child, state._replace(does=PAUSED, due=0.0))
+            case _:
+                pass

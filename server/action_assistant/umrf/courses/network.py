@@ -1,0 +1,262 @@
+"""A graph as numbers and bit masks, for following what changes when one action ends otherwise.
+
+Built from the same nodes and edges as the engine's (`parts.build`), so that both mean one graph. Places
+are those of the actions in it; `Network.exit` is one more. Times are milliseconds, all of them exact in
+a double: sums are compared.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Final, NamedTuple, TypeAlias
+
+from action_assistant.umrf.model import PRECONDITIONS, Graph, Precondition
+from action_assistant.umrf.semantics.parts import RESERVED, Edge, Node, Running, build
+from action_assistant.umrf.semantics.script import Behaviour
+from action_assistant.umrf.semantics.values import (
+    MISSING,
+    RemapUnknown,
+    Slot,
+    fill_outputs,
+    renamed,
+)
+
+#: How long an action takes about, and by how much places differ: nobody ends at the same time as
+#: another, so that what reports first is always the same.
+ROUND_MS: Final = 1_000.0
+STEP_MS: Final = 1 / 16
+STOP_MS: Final = 50.0
+
+Mask: TypeAlias = int
+
+
+class EdgeQuestion(NamedTuple):
+    """One edge as an end of its parent asks it. `link`: its bit among the child's required parents.
+    `given`: the child's inputs that it fills from outputs before and after the parent filled them;
+    None where the renaming kills the engine."""
+
+    child: int
+    responses: dict[str, str]
+    link: Mask
+    given: tuple[Mask, Mask] | None
+
+
+class Network:
+    """`behind[place]`: all places to which a way of arrows leads from there. `needs`: required parents,
+    `wants`: required inputs, `has`: inputs that have a value from the start. `able`: whether the
+    engine runs it at all. `late`: its place in a round; `rounds_ms`: how long one is."""
+
+    def __init__(self, graph: Graph, *, slower_first: bool = False) -> None:
+        running = Running(graph.name, graph, None, None)
+        build(running, {action.key: (Behaviour(),) for action in graph.actions})
+        self.nodes: list[Node] = list(running.nodes.values())
+        count = len(self.nodes)
+        self.exit = count
+        self.names = [node.full_name for node in self.nodes]
+        self.place = {name: number for number, name in enumerate(self.names)}
+        self.able = [node.name not in RESERVED for node in self.nodes]
+        self.round_ms = ROUND_MS * (1 + count // 8_000)
+        late = range(count, 0, -1) if slower_first else range(1, count + 1)
+        self.late = [number * STEP_MS for number in late]
+        # Stops end at moments of their own, too.
+        self.stopping_ms = [STOP_MS + number * STEP_MS / 2**15 for number in range(1, count + 1)]
+        every = [*self.nodes, running.exit]
+        bits = [_bits(node) for node in every]
+        self.required = [{bit: name for name, bit in own.items()} for own in bits]
+        self.needs = [sum(own.values()) for own in bits]
+        slots = [{name: 1 << n for n, name in enumerate(node.inputs)} for node in every]
+        self.wants = [
+            sum(own[name] for name, slot in node.inputs.items() if slot.required)
+            for node, own in zip(every, slots, strict=True)
+        ]
+        self.has = [
+            sum(own[name] for name, slot in node.inputs.items() if slot.has_value())
+            for node, own in zip(every, slots, strict=True)
+        ]
+        places = {id(node): number for number, node in enumerate(every)}
+        empty: dict[str, Slot] = {}
+        self.entry = [_asked(edge, running.entry, (empty, empty), places, bits, slots) for edge in running.entry.children]  # fmt: skip
+        self.edges: list[list[EdgeQuestion | None]] = []
+        self._bypasses: dict[Precondition, dict[int, list[int]]] = {}
+        for node in self.nodes:
+            before = {name: slot for name, slot in node.outputs.items() if slot.has_value()}
+            kinds = before, node.outputs
+            row = [_asked(edge, node, kinds, places, bits, slots) for edge in node.children]
+            fill_outputs(node.outputs, None)
+            self.edges.append(row)
+
+    def due(self, place: int, now_ms: float) -> float:
+        """When an action that begins now ends: each at its own time of the next round."""
+        return (now_ms // self.round_ms + 1) * self.round_ms + self.late[place]
+
+    @cached_property
+    def behind(self) -> list[Mask]:
+        """See the class."""
+        return behind([[e.child for e in row if e is not None] for row in self.edges])
+
+    @cached_property
+    def circling(self) -> dict[str, Mask]:
+        """For each outcome the actions that a bypass of it leads back to."""
+        return {outcome: self._circling(outcome) for outcome in PRECONDITIONS}
+
+    @cached_property
+    def plain(self) -> dict[str, Mask]:
+        """For each outcome the actions whose bypass sets nothing in motion but further bypasses."""
+        return {outcome: self._plain(outcome) for outcome in PRECONDITIONS}
+
+    @cached_property
+    def ends(self) -> dict[str, Mask]:
+        """For each outcome the actions whose bypass leads to the exit by bypasses alone."""
+        mask = (1 << len(self.nodes)) - 1
+        return {o: self._leading(o, {self.exit}) & mask for o in PRECONDITIONS}
+
+    @cached_property
+    def last(self) -> list[int]:
+        """The actions with an arrow to the exit."""
+        rows = enumerate(self.edges)
+        return [place for place, row in rows if any(e and e.child == self.exit for e in row)]
+
+    def _plain(self, outcome: Precondition) -> Mask:
+        other = {
+            place
+            for place, row in enumerate(self.edges)
+            if not all(e and e.responses[outcome] in ("bypass", "ignore") for e in row)
+            or all(e and e.responses[outcome] == "ignore" for e in row)
+        }
+        every: Mask = (1 << len(self.nodes)) - 1
+        return every & ~self._leading(outcome, other)
+
+    def _leading(self, outcome: Precondition, to: set[int]) -> Mask:
+        """Who leads to one of these by bypasses, and they themselves."""
+        found, stack = set(to), list(to)
+        while stack:
+            for place in self._bypassing(outcome).get(stack.pop(), ()):
+                if place not in found:
+                    found.add(place)
+                    stack.append(place)
+        return sum(1 << place for place in found)
+
+    def _bypassing(self, outcome: Precondition) -> dict[int, list[int]]:
+        """Who bypasses whom, by the one that is bypassed."""
+        if outcome not in self._bypasses:
+            found: dict[int, list[int]] = {}
+            for place, row in enumerate(self.edges):
+                for e in row:
+                    if e is not None and e.responses[outcome] == "bypass":
+                        found.setdefault(e.child, []).append(place)
+            self._bypasses[outcome] = found
+        return self._bypasses[outcome]
+
+    def _circling(self, outcome: Precondition) -> Mask:
+        ways = [
+            [e.child for e in row if e is not None and e.responses[outcome] == "bypass"]
+            for row in self.edges
+        ]
+        if not any(ways):
+            return 0
+        return sum(1 << place for place, mask in enumerate(behind(ways)) if mask >> place & 1)
+
+
+def _bits(node: Node) -> dict[str, Mask]:
+    required = [name for name, link in node.links.items() if link.required]
+    return {name: 1 << number for number, name in enumerate(required)}
+
+
+def _asked(
+    edge: Edge,
+    parent: Node,
+    outputs: tuple[dict[str, Slot], dict[str, Slot]],
+    places: dict[int, int],
+    bits: Sequence[dict[str, Mask]],
+    slots: Sequence[dict[str, Mask]],
+) -> EdgeQuestion | None:
+    """None where the engine aborts: no such child, or one that does not list its parent."""
+    link = edge.child.links.get(parent.full_name) if edge.child is not None else None
+    if edge.child is None or link is None:
+        return None
+    child = places[id(edge.child)]
+    responses: dict[str, str] = {o: link.conditions.answer(o) for o in PRECONDITIONS}
+    bit = bits[child].get(parent.full_name, 0)
+    try:
+        found = renamed(parent.outputs, edge.remap, edge.child.inputs)
+    except RemapUnknown:
+        return EdgeQuestion(child, responses, bit, None)
+    before = after = 0
+    for name, source in found.items():
+        slot = parent.outputs[source]
+        if _takes(edge.child.inputs[name], slot):
+            after |= slots[child][name]
+            before |= slots[child][name] if source in outputs[0] else 0
+    return EdgeQuestion(child, responses, bit, (before, after))
+
+
+def _takes(target: Slot, source: Slot) -> bool:
+    """Whether an input takes what this output holds once its action has run."""
+    filled = {source.name: _copy(source)}
+    fill_outputs(filled, None)
+    probe = _copy(target)
+    probe.value = MISSING
+    probe.receive(source.type, filled[source.name].value)
+    return probe.has_value()
+
+
+def _copy(slot: Slot) -> Slot:
+    same = Slot(slot.name, {"pvf_type": slot.type})
+    same.value, same.updatable, same.allowed = slot.value, slot.updatable, slot.allowed
+    return same
+
+
+def behind(ways: Sequence[Sequence[int]]) -> list[Mask]:
+    """What is reached from each place, itself only by a loop (Tarjan's components, iterative)."""
+    found = [0] * len(ways)
+    index = [-1] * len(ways)
+    low = [0] * len(ways)
+    stack: list[int] = []
+    held = [False] * len(ways)
+    counter = 0
+    for root in range(len(ways)):
+        if index[root] >= 0:
+            continue
+        work = [(root, iter(ways[root]))]
+        index[root] = low[root] = counter
+        counter += 1
+        stack.append(root)
+        held[root] = True
+        while work:
+            place, children = work[-1]
+            for child in children:
+                if child >= len(ways):
+                    continue
+                if index[child] < 0:
+                    index[child] = low[child] = counter
+                    counter += 1
+                    stack.append(child)
+                    held[child] = True
+                    work.append((child, iter(ways[child])))
+                    break
+                if held[child]:
+                    low[place] = min(low[place], index[child])
+            else:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[place])
+                if low[place] == index[place]:
+                    _close(place, stack, held, ways, found)
+    return found
+
+
+def _close(
+    first: int, stack: list[int], held: list[bool], ways: Sequence[Sequence[int]], found: list[Mask]
+) -> None:
+    """One component is whole: all of it reaches the same."""
+    members = [stack.pop()]
+    while members[-1] != first:
+        members.append(stack.pop())
+    own = sum(1 << place for place in members)
+    mask = own if len(members) > 1 or first in ways[first] else 0
+    for place in members:
+        held[place] = False
+        for child in ways[place]:
+            if not own >> child & 1:
+                mask |= 1 << child | (found[child] if child < len(ways) else 0)
+    for place in members:
+        found[place] = mask

@@ -1,0 +1,128 @@
+"""One course of a graph as the engine goes through it, from its start to its end.
+
+What `deviations` finds by differences is found here the plain way: for graphs with spontaneous actions,
+which stop others as they please, and to hold the two together.
+"""
+
+from action_assistant.umrf.courses.course import LAPS, MORE, Kind, Outcome
+from action_assistant.umrf.courses.network import Network
+from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics.engine import Engine
+from action_assistant.umrf.semantics.graphs import GraphRefused
+from action_assistant.umrf.semantics.parts import EXIT_NODE, Node, Running
+from action_assistant.umrf.semantics.parts import Outcome as Result
+from action_assistant.umrf.semantics.script import Behaviour, Script
+from action_assistant.umrf.semantics.trace import (
+    Dispatch,
+    EdgeEval,
+    GraphStateEvent,
+    HazardEvent,
+    NodeStateEvent,
+    NotReady,
+    Trace,
+)
+
+
+class _Timed(Engine):
+    """An engine whose actions end when those of a network do, and that does a bypass of one action
+    with one result once in an instant."""
+
+    def __init__(self, net: Network, script: Script) -> None:
+        super().__init__(script=script, serial=False)
+        self.net = net
+        self.circles = False
+        self._bypassed: set[tuple[str, str]] = set()
+        self._instant = -1.0
+
+    def _takes_ms(self, node: Node) -> float:
+        return self.net.due(self.net.place[node.full_name], self.now) - self.now
+
+    def _stops_ms(self, node: Node) -> float:
+        return self.net.stopping_ms[self.net.place[node.full_name]]
+
+    def _bypass(self, graph: Running, child: Node, result: Result) -> None:
+        if self._instant != self.now:
+            self._instant = self.now
+            self._bypassed.clear()
+        place = self.net.place[child.full_name]
+        self.circles = self.circles or bool(self.net.circling[result] >> place & 1)
+        if (child.full_name, result) not in self._bypassed:
+            self._bypassed.add((child.full_name, result))
+            super()._bypass(graph, child, result)
+
+
+def whole(net: Network, graph: Graph, full_name: str, result: str) -> tuple[Outcome, int]:
+    """How a graph ends in which the first run of an action ends with `result`, and how many events
+    that took. "" is nobody."""
+    calls: dict[str, tuple[Behaviour, ...]] = {}
+    if full_name:
+        calls[full_name] = (Behaviour(result=result), Behaviour())
+    engine = _Timed(net, Script(calls))
+    seen = _Seen(net)
+    try:
+        traces = engine.start(graph, 0.0)
+    except GraphRefused:  # nothing of it begins, whoever ends how
+        return Outcome("never", seen.early, cut=False), 0
+    events = len(traces)
+    kind = seen.take(traces)
+    left = LAPS * len(net.nodes) + MORE
+    while kind is None and not engine.crashed and not engine.circles:
+        due = engine.due
+        if due is None or left <= 0:
+            break
+        traces = engine.advance(due)
+        events += len(traces)
+        left -= any(
+            isinstance(t, NodeStateEvent) and t.state in ("FINISHED", "ERROR") for t in traces
+        )
+        kind = seen.take(traces)
+    if kind in (None, "stuck") and (engine.crashed or engine.locked or engine.circles):
+        kind = "crashed" if engine.crashed else "locked"
+    if kind is None:
+        kind = "endless" if engine.graphs[graph.name].state == "RUNNING" else "never"
+    if kind != "stuck":
+        return Outcome(kind, seen.early, cut=kind == "endless"), events
+    running = engine.graphs[graph.name]
+    ended = running.exit
+    lacking = frozenset(n for n, link in ended.links.items() if link.required and not link.received)
+    inputs = not ended.has_inputs()
+    return Outcome(kind, seen.early, seen.waiting, lacking, inputs, seen.last), events
+
+
+class _Seen:
+    """What a trace told of who waits, and of the end."""
+
+    def __init__(self, net: Network) -> None:
+        self.net = net
+        self.waiting = 0
+        self.early = False
+        self.last = -1
+        self._asked = -1
+
+    def take(self, traces: list[Trace]) -> Kind | None:
+        """The end, if it is among these."""
+        kind: Kind | None = None
+        for trace in traces:
+            match trace:
+                case EdgeEval(edge=edge):
+                    self._asked = self.net.place.get(edge.partition(" => ")[0], -1)
+                case NotReady(node=node):
+                    self.waiting |= 1 << self._place(node)
+                    if node == EXIT_NODE:
+                        self.last = self._asked
+                case Dispatch(node=node):
+                    self.waiting &= ~(1 << self._place(node))
+                case GraphStateEvent(state="FINISHED"):
+                    kind = "finished"
+                case GraphStateEvent(state="HALTED"):
+                    kind = "halted"
+                case HazardEvent(code="H12"):
+                    self.early = True
+                case HazardEvent(code="H8"):
+                    kind = "stuck"
+                case _:
+                    pass
+        return kind
+
+    def _place(self, node: str) -> int:
+        return self.net.exit if node == EXIT_NODE else self.net.place[node]

@@ -1,0 +1,1 @@
+"""UMRF files of every dialect, read and written."""

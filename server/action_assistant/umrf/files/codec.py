@@ -1,0 +1,132 @@
+"""UMRF files: every dialect read into one graph, canonical D3 written (docs/contracts.md 2)."""
+
+from collections.abc import Iterable
+
+import msgspec
+
+from action_assistant.umrf.files.action_files import (
+    ACTION_DIALECTS,
+    ActionReading,
+    read_action,
+    write_action,
+)
+from action_assistant.umrf.files.dialects import dialect_of, translated
+from action_assistant.umrf.files.origins import located, moved, placed
+from action_assistant.umrf.files.reading import Tree, read_tree
+from action_assistant.umrf.files.writing import Stamp, write
+from action_assistant.umrf.json.text import Json, Unreadable, decoded, parse, pointer
+from action_assistant.umrf.model import Graph, Key, Note, Problem, Where
+
+__all__ = [
+    "ActionReading", "Reading", "Stamp", "Unreadable", "read", "read_action", "stamp_of", "write",
+    "write_action",
+]  # fmt: skip
+
+
+class Reading(msgspec.Struct, frozen=True):
+    """A graph, and what is to be said about the text it came from.
+
+    `remarks`: what was translated, left out, or has no place in D3. `problems`: what is wrong in the
+    text as it stands and cannot be seen in the graph any more (H1 among it); `check` finds the rest.
+    Both have their places in the text. `states`, `graph_state`: run states that the text carries
+    (other than UNINITIALIZED). `steps` lead from the canonical text of the graph to `text`
+    (`places.Steps`).
+    """
+
+    graph: Graph
+    dialect: str
+    remarks: tuple[Note, ...] = ()
+    problems: tuple[Problem, ...] = ()
+    states: dict[Key, str] = {}
+    graph_state: str | None = None
+    text: str = ""
+    steps: tuple[dict[str, str], ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The remarks as sentences."""
+        return tuple(note.sentence for note in self.remarks)
+
+    def placed(self, problems: Iterable[Problem]) -> list[Problem]:
+        """Problems of the graph with their places in the text that was read."""
+        return placed(problems, self.text, self.steps)
+
+
+def read(text: str | bytes) -> Reading:
+    """Reads a graph. Raises `Unreadable` for what is no UMRF or beyond the limits; everything else
+    is read, and reported where it is wrong."""
+    text = decoded(text)
+    value = parse(text)
+    if not isinstance(value, dict):
+        raise Unreadable("not-umrf", _no_object(value))
+    dialect = dialect_of(value)
+    if dialect is None:
+        raise Unreadable(
+            "not-umrf", "This is JSON, but no UMRF graph: it has neither a graph_name nor actions."
+        )
+    file, notes, problems, given = translated(value, dialect)
+    tree = read_tree(file)
+    found, told = located(
+        text,
+        [
+            *problems,
+            *(moved(problem, [given]) for problem in tree.problems),
+            *(moved(problem, [tree.origins, given]) for problem in _carried_states(tree)),
+        ],
+        [*notes, *(moved(note, [given]) for note in tree.notes)],
+    )
+    return Reading(
+        graph=tree.graph,
+        dialect=dialect,
+        remarks=told,
+        problems=tuple(found),
+        states=tree.states,
+        graph_state=tree.graph_state,
+        text=text,
+        steps=(tree.origins, given),
+    )
+
+
+def _no_object(value: Json) -> str:
+    """Why a text that is no object is no graph."""
+    items = [item for item in value if isinstance(item, dict)] if isinstance(value, list) else []
+    dialects = [found for found in map(dialect_of, items) if found is not None]
+    if not dialects:
+        return "This is JSON, but no UMRF graph: the text is no object."
+    actions = sum(dialect in ACTION_DIALECTS for dialect in dialects)
+    counted = [
+        f"{count} {what}{'s' if count > 1 else ''}"
+        for count, what in ((len(dialects) - actions, "graph"), (actions, "single action"))
+        if count
+    ]
+    return (
+        f"This is no UMRF graph: the text is no object, but a list with {' and '.join(counted)}. "
+        "A file has one graph: give each a file of its own."
+    )
+
+
+def _carried_states(tree: Tree) -> list[Problem]:
+    """H1: an engine that is given a node's state takes the action for loaded."""
+    return [
+        Problem(
+            code="H1",
+            severity="error",
+            where=Where(path=pointer("actions", index, "state"), aid=action.key),
+            message=f"The file says that {action.full_name} is {tree.states[action.key]}: started as "
+            "it stands, the engine aborts with every running graph, or the action never runs. "
+            "Reading the file and writing it again leaves the state out.",
+        )
+        for index, action in enumerate(tree.graph.actions)
+        if action.key in tree.states
+    ]
+
+
+def stamp_of(text: str | bytes) -> Stamp:
+    """The stamp that a file carries; empty where there is none. Raises `Unreadable`."""
+    value = parse(text)
+    attributes = value.get("gui_attributes") if isinstance(value, dict) else None
+    ours = attributes.get("action_assistant") if isinstance(attributes, dict) else None
+    if not isinstance(ours, dict):
+        return Stamp()
+    named = {key: ours.get(key) for key in ("graph", "version", "run")}
+    return Stamp(**{key: text for key, text in named.items() if isinstance(text, str)})

@@ -1,0 +1,98 @@
+"""Single fields of files, read without losing what does not fit."""
+
+import re
+from typing import Final, TypeAlias
+
+from action_assistant.umrf.json.text import Json, Number, dump
+from action_assistant.umrf.model import Parameter, Position
+from action_assistant.umrf.parameters import flatten
+from action_assistant.umrf.relations import whole_of
+
+AID: Final = re.compile(r"[A-Za-z0-9]{12}")
+ZERO: Final = Number("0")
+
+#: Unknown fields and known ones whose value does not fit, as text.
+Extra: TypeAlias = list[tuple[str, str]]
+
+
+def text_of(item: dict[str, Json], field: str, extra: Extra, default: str = "") -> str:
+    """A text; anything else goes to `extra`."""
+    value = item.get(field, default)
+    if isinstance(value, str):
+        return value
+    extra.append((field, dump(value)))
+    return default
+
+
+def number_of(item: dict[str, Json], extra: Extra) -> int:
+    """The `instance_id`; one that is none also goes to `extra`."""
+    value = item.get("instance_id", ZERO)
+    number, fits = whole_of(value)
+    if not fits:
+        extra.append(("instance_id", dump(value)))
+    return number
+
+
+def parameters_of(item: dict[str, Json], field: str, extra: Extra) -> tuple[Parameter, ...]:
+    """One side's parameters; what is no object goes to `extra`."""
+    value = item.get(field, {})
+    if isinstance(value, dict):
+        return flatten(value)
+    extra.append((field, dump(value)))
+    return ()
+
+
+def is_runtime(value: Json) -> bool:
+    """Whether the engine can read a run log."""
+    messages = value.get("messages") if isinstance(value, dict) else None
+    return isinstance(messages, list) and all(
+        isinstance(message, dict)
+        and isinstance(message.get("timestamp"), Number)
+        and isinstance(message.get("message"), str)
+        for message in messages
+    )
+
+
+def graph_attributes(file: dict[str, Json]) -> tuple[dict[str, Json], str | None]:
+    """Our part of a graph's `gui_attributes`, and the text of the rest."""
+    if "gui_attributes" not in file:
+        return {}, None
+    value = file["gui_attributes"]
+    ours = value.get("action_assistant") if isinstance(value, dict) else None
+    if not isinstance(value, dict) or not isinstance(ours, dict):
+        return {}, dump(value)
+    rest = {key: member for key, member in value.items() if key != "action_assistant"}
+    return ours, dump(rest) if rest else None
+
+
+def action_attributes(
+    item: dict[str, Json],
+) -> tuple[Position | None, str | None, str | None]:
+    """Position and identity out of an action's `gui_attributes`, and the text of the rest."""
+    if "gui_attributes" not in item:
+        return None, None, None
+    value = item["gui_attributes"]
+    if not isinstance(value, dict):
+        return None, None, dump(value)
+    ours, point = value.get("action_assistant"), value.get("position")
+    aid = ours.get("aid") if isinstance(ours, dict) else None
+    position = position_of(point)
+    rest = dict(value)
+    if isinstance(ours, dict):
+        del rest["action_assistant"]
+    if position is not None and isinstance(point, dict):
+        rest["position"] = {key: member for key, member in point.items() if key not in ("x", "y")}
+        if not rest["position"]:
+            del rest["position"]
+    known = aid if isinstance(aid, str) and AID.fullmatch(aid) else None
+    return position, known, dump(rest) if rest or not value else None
+
+
+def position_of(value: Json) -> Position | None:
+    """A place on the canvas."""
+    if not isinstance(value, dict):
+        return None
+    x, y = value.get("x"), value.get("y")
+    if not isinstance(x, Number) or not isinstance(y, Number):
+        return None
+    return x.value, y.value

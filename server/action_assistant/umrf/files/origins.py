@@ -1,0 +1,72 @@
+"""Where what is said of a file stands in the text that was given (docs/umrf-and-the-engine.md 1.5).
+
+Problems and notes name places of the graph's canonical text, or of a file that was translated.
+`Origins` lead from there to the given text, where the place is looked up; it is the one way for all.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeAlias, TypeVar
+
+from msgspec.structs import replace
+
+from action_assistant.umrf.json.places import places_of
+from action_assistant.umrf.model import Note, Problem, Where
+
+#: Where values came from, in one step: a pointer → the pointer before it. What is not named stands
+#: where what is around it came from.
+Origins: TypeAlias = Mapping[str, str]
+#: Steps that lead to the given text, one after the other.
+Steps: TypeAlias = Sequence[Origins]
+
+Told = TypeVar("Told", Problem, Note)
+
+
+def origin(origins: Origins, path: str) -> str:
+    """The pointer from which what stands at `path` came, by one step."""
+    head = path
+    while head not in origins:
+        cut = head.rfind("/")
+        if cut < 0:
+            return path
+        head = head[:cut]
+    return origins[head] + path[len(head) :]
+
+
+def placed(problems: Iterable[Problem], text: str, steps: Steps = ()) -> list[Problem]:
+    """The problems with their places in the given text, to which `steps` lead."""
+    return located(text, [moved(problem, steps) for problem in problems])[0]
+
+
+def moved(told: Told, steps: Steps) -> Told:
+    """A problem or note with the pointers of the given text, to which `steps` lead."""
+
+    def lead(where: Where) -> Where:
+        path = where.path
+        for origins in steps:
+            path = origin(origins, path)
+        return replace(where, path=path)
+
+    where, also = lead(told.where), tuple(map(lead, told.also))
+    return replace(told, where=where, also=also)
+
+
+def located(
+    text: str, problems: Sequence[Problem], notes: Sequence[Note] = ()
+) -> tuple[list[Problem], tuple[Note, ...]]:
+    """Problems and notes that have pointers of this text, with lines and columns; of what is not
+    there the place is what it would be in. Without a text they stay as they are."""
+    every = [where for problem in problems for where in (problem.where, *problem.also)]
+    every += [where for note in notes for where in (note.where, *note.also)]
+    if not text or not every:
+        return list(problems), tuple(notes)
+    places = places_of(text, {where.path for where in every})
+
+    def find(where: Where) -> Where:
+        place = places[where.path]
+        return replace(where, path=place.path, line=place.line, column=place.column)
+
+    def all_found(told: Told) -> Told:
+        where, also = find(told.where), tuple(map(find, told.also))
+        return replace(told, where=where, also=also)
+
+    return [all_found(problem) for problem in problems], tuple(all_found(note) for note in notes)

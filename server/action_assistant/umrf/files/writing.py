@@ -1,0 +1,149 @@
+"""Graphs as canonical D3 files (docs/contracts.md 2)."""
+
+from collections.abc import Iterable
+from operator import attrgetter
+
+import msgspec
+
+from action_assistant.umrf.json.text import Json, Number, dump_indented, number, parse_small
+from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Key, Position, Relation
+from action_assistant.umrf.parameters import nest
+from action_assistant.umrf.relations import conditions_text
+
+
+class Stamp(msgspec.Struct, frozen=True):
+    """Which graph, version and run a file belongs to."""
+
+    graph: str | None = None
+    version: str | None = None
+    run: str | None = None
+
+
+def write(graph: Graph, stamp: Stamp | None = None) -> str:
+    """The canonical file of a graph. Never fails, whatever the graph says."""
+    return dump_indented(tree_of(graph, stamp)) + "\n"
+
+
+def tree_of(graph: Graph, stamp: Stamp | None = None) -> dict[str, Json]:
+    """The canonical file as nested values."""
+    return _Writer(graph, stamp).graph()
+
+
+def name_order(relation: Relation) -> tuple[str, int]:
+    """What decides between relations with equal order."""
+    return f"{relation.parent}>{relation.child}", relation.listing
+
+
+class _Writer:
+    def __init__(self, graph: Graph, stamp: Stamp | None) -> None:
+        self.source = graph
+        self.stamp = stamp
+        self.actions: dict[Key, Action] = {action.key: action for action in graph.actions}
+        self.parents: dict[Key, list[Relation]] = {}
+        self.children: dict[Key, list[Relation]] = {}
+        ordered = sorted(graph.relations, key=name_order)
+        for relation in sorted(ordered, key=attrgetter("child_order")):
+            if relation.only != "children" and self._exists(relation.parent):
+                self.parents.setdefault(relation.child, []).append(relation)
+        for relation in sorted(ordered, key=attrgetter("parent_order")):
+            if relation.only != "parents" and self._exists(relation.child):
+                self.children.setdefault(relation.parent, []).append(relation)
+
+    def _exists(self, key: Key) -> bool:
+        """Whether a relation's other end can be named in a file."""
+        return key in self.actions
+
+    def graph(self) -> dict[str, Json]:
+        graph = self.source
+        fields: dict[str, Json] = {"graph_name": graph.name}
+        if graph.description:
+            fields["graph_description"] = graph.description
+        entries = self.children.get(ENTRY, [])
+        exits = self.parents.get(EXIT, [])
+        fields["graph_entry"] = [self._child(r) for r in entries]
+        fields["graph_exit"] = [self._parent(r) for r in exits]
+        fields["actions"] = [self._action(a) for a in graph.actions if not a.missing]
+        ours = self._graph_attributes()
+        return _with_extra(fields, graph.extra, {"action_assistant": ours} if ours else {})
+
+    def _graph_attributes(self) -> dict[str, Json]:
+        graph, stamp = self.source, self.stamp
+        ours: dict[str, Json] = {}
+        if stamp is not None:
+            named = {"graph": stamp.graph, "version": stamp.version, "run": stamp.run}
+            ours.update({key: value for key, value in named.items() if value is not None})
+        if graph.entry_position is not None:
+            ours["entry"] = _point(graph.entry_position)
+        if graph.exit_position is not None:
+            ours["exit"] = _point(graph.exit_position)
+        if graph.notes:
+            ours["notes"] = {key: parse_small(text) for key, text in graph.notes}
+        return ours
+
+    def _action(self, action: Action) -> dict[str, Json]:
+        fields: dict[str, Json] = {"name": action.name}
+        fields["instance_id"] = Number(str(action.instance_id))
+        fields["type"] = action.type
+        if action.actor:
+            fields["actor"] = action.actor
+        if action.description:
+            fields["description"] = action.description
+        if action.inputs:
+            fields["input_parameters"] = nest(action.inputs)
+        if action.outputs:
+            fields["output_parameters"] = nest(action.outputs)
+        if parents := self.parents.get(action.key):
+            fields["parents"] = [self._parent(r) for r in parents]
+        if children := self.children.get(action.key):
+            fields["children"] = [self._child(r) for r in children]
+        return _with_extra(fields, action.extra, self._action_attributes(action))
+
+    def _action_attributes(self, action: Action) -> dict[str, Json]:
+        ours: dict[str, Json] = {}
+        if action.position is not None:
+            ours["position"] = _point(action.position)
+        if self.stamp is not None:
+            named = {"aid": action.key, "version": self.stamp.version, "run": self.stamp.run}
+            ours["action_assistant"] = {k: v for k, v in named.items() if v is not None}
+        return ours
+
+    def _parent(self, relation: Relation) -> dict[str, Json]:
+        fields = _reference(self.actions[relation.parent])
+        fields["required"] = relation.required
+        fields["conditions"] = conditions_text(relation.conditions)
+        return _with_extra(fields, relation.parents_extra, {})
+
+    def _child(self, relation: Relation) -> dict[str, Json]:
+        fields = _reference(self.actions[relation.child])
+        if relation.remap:
+            fields["remap"] = [{"from": r.source, "to": r.target} for r in relation.remap]
+        return _with_extra(fields, relation.children_extra, {})
+
+
+def _reference(action: Action) -> dict[str, Json]:
+    return {"name": action.name, "instance_id": Number(str(action.instance_id))}
+
+
+def _point(position: Position) -> dict[str, Json]:
+    return {"x": number(position[0]), "y": number(position[1])}
+
+
+def _with_extra(
+    fields: dict[str, Json], extra: Iterable[tuple[str, str]], attributes: dict[str, Json]
+) -> dict[str, Json]:
+    """Adds what the model does not know, which wins, and our part of `gui_attributes`."""
+    for field, text in extra:
+        fields[field] = parse_small(text)
+    if attributes:
+        theirs = fields.pop("gui_attributes", None)
+        joined = dict(theirs) if isinstance(theirs, dict) else {}
+        for key, value in attributes.items():
+            joined[key] = _joined(value, joined.get(key))
+        fields["gui_attributes"] = joined
+    return fields
+
+
+def _joined(ours: Json, theirs: Json) -> Json:
+    if isinstance(ours, dict) and isinstance(theirs, dict):
+        return {**ours, **theirs, **ours}
+    return ours

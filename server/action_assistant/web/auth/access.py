@@ -1,0 +1,418 @@
+"""Access control of both processes: Host, Origin and credentials, before any route and any
+upgrade.
+"""
+
+import asyncio
+import getpass
+import logging
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any, Final, NamedTuple
+
+import anyio
+from litestar.connection import ASGIConnection
+from litestar.enums import ScopeType
+from litestar.handlers.base import BaseRouteHandler
+from litestar.types import ASGIApp, HTTPScope, Message, Receive, Scope, Send, WebSocketScope
+
+from action_assistant.errors import (
+    Forbidden,
+    Refused,
+    Unauthenticated,
+    Withdrawn,
+    WrongHost,
+    WrongOrigin,
+)
+from action_assistant.web.auth.keys import Keys, Person, Session
+from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards
+from action_assistant.web.auth.roles import OWNER, Deed, allowed, may
+from action_assistant.web.http import cookies
+from action_assistant.web.http.problems import problem_of
+from action_assistant.web.network.addresses import Addresses
+
+log: Final = logging.getLogger(__name__)
+
+#: Under this name the state of a request has what wants to be told who asks.
+KNOWN: Final = "known"
+_CALLS: Final = frozenset({"http", "websocket"})
+_SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+_STOPS: Final = re.compile(r"/api/stop|/api/(runs|robots)/[^/]+/stop")
+_LIVE: Final = "/api/live"
+_GOODBYE: Final = 1.0  # seconds that a close frame gets
+_HEADERS: Final = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"x-frame-options", b"DENY"),
+)
+#: Of a refused upgrade: who gets the same refusal without it is behind a proxy that passes none on.
+REFUSED_SOCKET: Final = (b"x-refused", b"websocket")
+
+
+def cookie_name(page_port: int) -> str:
+    """Cookies ignore ports, so the name carries the page's."""
+    return f"aa_{page_port}"
+
+
+def person_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Person:
+    """Who is asking. Every route behind the door may call this."""
+    person: Person = connection.scope["state"]["person"]
+    return person
+
+
+def session_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None:
+    """The browser's session; None for programs with a token."""
+    session: Session | None = connection.scope["state"].get("session")
+    return session
+
+
+def require(connection: ASGIConnection[Any, Any, Any, Any], deed: Deed) -> None:
+    """Refuse whoever's role does not allow this. Raises Forbidden."""
+    role = person_of(connection).role
+    if not allowed(role, deed):
+        raise Forbidden(f"You are here as {role}: you may {may(role)}.")
+
+
+class Needs:
+    """For `guards=[…]` of a route: who may not is refused before the request is looked at."""
+
+    def __init__(self, deed: Deed) -> None:
+        self.deed: Final = deed
+
+    async def __call__(
+        self, connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler
+    ) -> None:
+        """Raises Forbidden. Plain functions would be called in a thread, for which Stop had to wait."""
+        require(connection, self.deed)
+
+
+def known_person(connection: ASGIConnection[Any, Any, Any, Any]) -> Person | None:
+    """Who this browser speaks for, or spoke for until the session expired."""
+    state = connection.scope["state"]
+    session: Session | None = state.get("session") or state.get("expired")
+    return session.person if session is not None else None
+
+
+def live_session(connection: ASGIConnection[Any, Any, Any, Any]) -> Session:
+    """The browser's session. Raises, where the door is open to anybody, why there is none."""
+    state = connection.scope["state"]
+    session: Session | None = state.get("session")
+    if session is None:
+        ended: Refused = state.get("ended") or _ended(None)
+        raise ended
+    return session
+
+
+class Caller(NamedTuple):
+    """Who waits for what is being done now. What is done for nobody may end."""
+
+    person: str
+    receive: Receive | None = None  # a socket's messages are not ours to read
+
+    async def gone(self) -> None:
+        """Wait until they have gone. Only after the request was read."""
+        if self.receive is None:
+            await anyio.sleep_forever()
+        else:
+            while (await self.receive())["type"] != "http.disconnect":
+                pass
+
+
+_CALLER: Final[ContextVar[Caller | None]] = ContextVar("caller", default=None)
+
+
+def caller() -> Caller | None:
+    """Whoever asked for what this task does; None when nobody did."""
+    return _CALLER.get()
+
+
+def done_for_person() -> None:
+    """From here on this task goes on also when the connection ends that it was begun for."""
+    asking = _CALLER.get()
+    _CALLER.set(None if asking is None else Caller(asking.person))
+
+
+@contextmanager
+def acting_for(person: str) -> Iterator[None]:
+    """What is asked for inside is asked for by this person."""
+    token = _CALLER.set(Caller(person))
+    try:
+        yield
+    finally:
+        _CALLER.reset(token)
+
+
+def done_for_nobody() -> None:
+    """From here on this task, and those that it begins, go on for themselves."""
+    _CALLER.set(None)
+
+
+class Plain(NamedTuple):
+    """A connection as the server below gave it: for sockets whose every message counts."""
+
+    receive: Receive
+    send: Send
+
+
+def plain(connection: ASGIConnection[Any, Any, Any, Any]) -> Plain:
+    """Without what stands around the application; answers to requests need all of that."""
+    found: Plain = connection.scope["state"]["plain"]
+    return found
+
+
+class Access:
+    """An ASGI middleware that lets in who may come in.
+
+    `is_open(path, accepts_html)` says what answers without credentials; `policy(host)` is the
+    Content-Security-Policy for a page asked for under that Host header.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        keys: Keys,
+        addresses: Addresses,
+        page_port: int,
+        is_open: Callable[[str, bool], bool],
+        policy: Callable[[str], str],
+        revoked: Revocations,
+    ) -> None:
+        self._app = app
+        self._keys = keys
+        self._addresses = addresses
+        self._cookie = cookie_name(page_port)
+        self._is_open = is_open
+        self._policy = policy
+        self._revoked = revoked
+        self._leashes = SessionGuards(revoked)
+        self._local = Person("local", _user_name(), OWNER)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Refuse, or pass on with `state.person` set."""
+        if scope["type"] not in _CALLS:  # lifespan
+            await self._app(scope, receive, send)
+            return
+        headers = _headers(scope)
+        scope.setdefault("state", {})["plain"] = Plain(receive, send)
+        send = self._dressed(headers, send)
+        try:
+            preflight = self._admit(scope, headers)
+        except Refused as refused:
+            await refuse(scope, receive, send, refused)
+            return
+        known: Person | None = scope["state"].get("person")
+        asked = receive if scope["type"] == ScopeType.HTTP else None
+        if known is not None:
+            scope["state"].get(KNOWN, _nobody)(known.id)
+        _CALLER.set(None if known is None else Caller(known.id, asked))
+        if preflight:
+            await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
+            return
+        session: Session | None = scope["state"].get("session")
+        if session is None or not _lasts(scope, headers):
+            await self._app(scope, receive, send)
+        else:
+            await self._leashed(session, scope, receive, send)
+
+    async def _leashed(
+        self, session: Session, scope: HTTPScope | WebSocketScope, receive: Receive, send: Send
+    ) -> None:
+        """Pass on, but only as long as the session lasts. Stop outlives one that merely expired."""
+        begun = over = False
+
+        async def sent(message: Message) -> None:
+            nonlocal begun, over
+            begun = True
+            over = message["type"] == "websocket.close" or message.get("more_body") is False
+            await send(message)
+
+        with self._leashes.hold(session, outlives=scope["path"] == _LIVE) as leash:
+            try:
+                await self._app(scope, receive, sent)
+                if not leash.is_cut:
+                    return
+                await asyncio.sleep(0)  # the cancellation may still be on its way
+            except asyncio.CancelledError:
+                if not leash.is_cut:
+                    raise
+        leash.let_go()
+        log.info("a session has ended: %s is closed", scope["path"])
+        last: Any = {"type": "http.response.body", "body": b"", "more_body": False}
+        if scope["type"] == ScopeType.WEBSOCKET:
+            last = {"type": "websocket.close", "code": SESSION_ENDED, "reason": "session ended"}
+        elif not begun:
+            signed_out = self._revoked.ended(session)
+            await refuse(scope, receive, send, _ended(session, signed_out=signed_out))
+            return
+        if not over:
+            with anyio.move_on_after(_GOODBYE):
+                await send(last)
+
+    def _admit(self, scope: HTTPScope | WebSocketScope, headers: dict[str, str]) -> bool:
+        """Raise a refusal, or return whether this is a preflight that needs no route."""
+        if not self._addresses.allows_host(headers.get("host")):
+            raise WrongHost(f"This server is not called {headers.get('host', '')!r}.")
+        origin = headers.get("origin")
+        if origin is not None and not self._addresses.allows_origin(origin):
+            raise WrongOrigin(f"Pages of {origin!r} may not talk to this server.")
+        if origin is not None and scope["path"].startswith(
+            "/api/"
+        ):  # the page itself has to say it
+            replaced = self._addresses.replaced_host(headers.get("host"), origin)
+            if replaced is not None:
+                raise WrongHost(replaced)
+        method = scope.get("method", "GET") if scope["type"] == ScopeType.HTTP else "WEBSOCKET"
+        if method == "OPTIONS" and "access-control-request-method" in headers:
+            return True
+        self._identify(scope, headers, method=str(method), origin=origin)
+        return False
+
+    def _identify(
+        self,
+        scope: HTTPScope | WebSocketScope,
+        headers: dict[str, str],
+        *,
+        method: str,
+        origin: str | None,
+    ) -> None:
+        state = scope.setdefault("state", {})
+        path = scope["path"]
+        scheme, _, token = headers.get("authorization", "").partition(" ")
+        if scheme.lower() == "bearer" and self._keys.opens(token.strip()):
+            state["person"] = self._local
+            return
+        genuine = self._sessions(headers)
+        state["sessions"] = genuine
+        session = self._lasting(genuine)
+        ended = session is not None and self._revoked.ends(session)
+        if session is not None and not ended and (not session.expired or _is_stop(method, path)):
+            if origin is None and method not in _SAFE:
+                raise WrongOrigin("A browser says which page is asking; this request does not.")
+            if headers.get("sec-fetch-site") == "cross-site" and path.startswith("/api/"):
+                raise WrongOrigin("Other sites may not use this session.")
+            state["person"] = session.person
+            state["session"] = session
+            return
+        signed_out = session is not None and self._revoked.ended(session)
+        if session is not None and not signed_out:
+            state["expired"] = session  # good for nothing but being the same person again
+        state["ended"] = _ended(session, signed_out=signed_out)
+        if not self._is_open(path, "text/html" in headers.get("accept", "")):
+            raise state["ended"]
+
+    def _sessions(self, headers: dict[str, str]) -> list[Session]:
+        """All whose seal is ours: there may be one for each path that this server has had."""
+        tried = map(self._keys.session, cookies.values(headers.get("cookie", ""), self._cookie))
+        return [each for each in tried if each is not None]
+
+    def _lasting(self, genuine: list[Session]) -> Session | None:
+        """The first one that lasts, else the first."""
+        lasting = (each for each in genuine if not (each.expired or self._revoked.ends(each)))
+        return next(lasting, genuine[0] if genuine else None)
+
+    def _dressed(self, headers: dict[str, str], send: Send) -> Send:
+        """Add the headers that every answer carries, also refusals."""
+        extra = list(_HEADERS)
+        origin = headers.get("origin")
+        if origin is not None and self._addresses.allows_origin(origin):
+            extra += [
+                (b"access-control-allow-origin", origin.encode()),
+                (b"access-control-allow-credentials", b"true"),
+                (b"access-control-allow-methods", b"GET, POST, PATCH, PUT, DELETE"),
+                (b"access-control-allow-headers", b"content-type, last-event-id"),
+                (b"access-control-expose-headers", b"location"),
+                (b"access-control-max-age", b"600"),
+                (b"vary", b"origin"),
+            ]
+        policy = self._policy(headers.get("host", "")).encode("latin-1", "replace")
+        extra.append((b"content-security-policy", policy))
+
+        async def dressed(message: Message) -> None:
+            if message["type"] in {"http.response.start", "websocket.http.response.start"}:
+                message["headers"] = [*message.get("headers", []), *extra]
+            await send(message)
+
+        return dressed
+
+
+def _nobody(_: str) -> None:
+    """Nobody wants to know."""
+
+
+def _ended(session: Session | None, *, signed_out: bool = False) -> Refused:
+    """Why somebody without a session that lasts is not let in."""
+    if session is None:
+        return Unauthenticated(
+            "Open the link that the server printed, or send its token as a Bearer token."
+        )
+    if signed_out:
+        return Unauthenticated("This session was ended: come in by a link again.")
+    if session.expired:
+        return Unauthenticated("Your session has ended: open the link that the server printed.")
+    return Withdrawn("The link that you came in by was revoked. Ask for another one.")
+
+
+def _lasts(scope: HTTPScope | WebSocketScope, headers: dict[str, str]) -> bool:
+    """Whether this may stay open: sockets, and streams of events."""
+    if scope["type"] == ScopeType.WEBSOCKET:
+        return True
+    return "text/event-stream" in headers.get("accept", "") or scope["path"].endswith("/events")
+
+
+def _is_stop(method: str, path: str) -> bool:
+    return method == "POST" and _STOPS.fullmatch(path) is not None
+
+
+def _headers(scope: HTTPScope | WebSocketScope) -> dict[str, str]:
+    """Header fields by lower-case name. A repeated Host or Origin is a trick: it matches nothing."""
+    found: dict[str, str] = {}
+    for raw, value in scope["headers"]:
+        name = raw.decode("latin-1").lower()
+        text = value.decode("latin-1")
+        joiner = "; " if name == "cookie" else ", "
+        found[name] = f"{found[name]}{joiner}{text}" if name in found else text
+    return found
+
+
+async def refuse(
+    scope: HTTPScope | WebSocketScope, receive: Receive, send: Send, refused: Refused
+) -> None:
+    """Answer a request, or one for an upgrade, with a refusal."""
+    log.info("refused %s: %s", scope["path"], refused.detail)
+    body = problem_of(refused)
+    fields = [(b"content-type", b"application/problem+json")]
+    if scope["type"] == ScopeType.WEBSOCKET:
+        fields.append(REFUSED_SOCKET)
+    if refused.status == 401:
+        fields.append((b"www-authenticate", b"Bearer"))
+    if refused.status == 429:
+        fields.append((b"retry-after", b"5"))
+    if scope["type"] == ScopeType.WEBSOCKET:
+        await receive()  # websocket.connect
+        await _answer(send, refused.status, fields, body, prefix="websocket.")
+    else:
+        await _answer(send, refused.status, fields, body)
+
+
+async def _answer(
+    send: Send, status: int, fields: list[tuple[bytes, bytes]], body: bytes, prefix: str = ""
+) -> None:
+    length = (b"content-length", str(len(body)).encode())
+    start: Any = {
+        "type": f"{prefix}http.response.start",
+        "status": status,
+        "headers": [*fields, length] if status != 204 else fields,
+    }
+    end: Any = {"type": f"{prefix}http.response.body", "body": body, "more_body": False}
+    await send(start)
+    await send(end)
+
+
+def _user_name() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # no such user in this container
+        return "operator"

@@ -1,0 +1,212 @@
+"""The secret of local mode: a token for programs, and sessions sealed with it for browsers.
+
+A session cookie is `payload.signature`, both base64url; the payload is JSON `[id, person id, name,
+expires, role, invitation]`. Either process can verify it by itself, because both read the same token.
+Cookies of before there were roles end after `expires`: they were traded for the token, so they are an
+owner's.
+"""
+
+import base64
+import hashlib
+import hmac
+import os
+import secrets
+import time
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.errors import CannotStart
+from action_assistant.web.auth.roles import OWNER, Role
+
+TOKEN_FILE: Final = "token"
+SESSION_SECONDS: Final = 30 * 24 * 3600
+_MIN_TOKEN: Final = 32  # characters; the tokens made here have 43 (256 bit)
+
+
+class PersonRef(msgspec.Struct, frozen=True):
+    """Somebody who acted. `id` is opaque and stable for a browser; `name` is theirs to choose."""
+
+    id: str
+    name: str
+
+
+class Person(PersonRef, frozen=True):
+    """Somebody who acts now, and may do what the role allows."""
+
+    role: Role = "viewer"
+
+
+class Session(msgspec.Struct, frozen=True):
+    """A browser that once presented the token, or an invitation. `expires` is in seconds since 1970.
+
+    `invitation` is the id of the one it came in by; None for the token.
+    """
+
+    id: str
+    person: Person
+    expires: float
+    invitation: str | None = None
+
+    @property
+    def expired(self) -> bool:
+        """Whether it opens nothing but Stop any more."""
+        return time.time() >= self.expires
+
+
+class Sealed(msgspec.Struct, frozen=True, array_like=True):
+    """What a cookie carries."""
+
+    id: str
+    person: str
+    name: str
+    expires: float
+    role: Role = OWNER
+    invitation: str | None = None
+
+
+class ServerProof(msgspec.Struct, frozen=True):
+    """That a server knows the token: an HMAC over a challenge and the address, `HOST:PORT`, at which
+    the connection was taken."""
+
+    address: str
+    proof: str
+
+
+class Keys:
+    """Checks tokens and seals sessions. `origin` is where a token was found, for people."""
+
+    def __init__(self, token: str, origin: str = "The token") -> None:
+        if len(token) < _MIN_TOKEN:
+            what = "is empty" if not token else f"has {len(token)} characters"
+            raise CannotStart(
+                f"{origin} {what}; a token must have at least {_MIN_TOKEN} characters. Without one, "
+                "the next start makes it; links and sessions of another one end."
+            )
+        self.token: Final = token
+        self._seal: Final = hashlib.sha256(b"action-assistant session\0" + token.encode()).digest()
+
+    @classmethod
+    def of(cls, data: Path) -> "Keys":
+        """The keys of a data folder; made when it has none. The environment's token wins."""
+        return cls._given() or cls(_token_in(data), _named(data))
+
+    @classmethod
+    def known(cls, data: Path) -> "Keys":
+        """The keys of a data folder that has some, as `of` would find them. Raises CannotStart."""
+        given = cls._given()
+        if given is not None:
+            return given
+        try:
+            return cls((data / TOKEN_FILE).read_text().strip(), _named(data))
+        except (OSError, UnicodeDecodeError) as error:
+            why = error.strerror if isinstance(error, OSError) else "it is no text"
+            raise CannotStart(
+                f"No token in {data} ({why}); name the data folder of the server with --data, or "
+                "set ACTION_ASSISTANT_TOKEN."
+            ) from error
+
+    @classmethod
+    def _given(cls) -> "Keys | None":
+        given = os.environ.get("ACTION_ASSISTANT_TOKEN")
+        return cls(given, "ACTION_ASSISTANT_TOKEN") if given else None
+
+    def opens(self, token: str) -> bool:
+        """Whether this is the token."""
+        return hmac.compare_digest(token.encode(errors="replace"), self.token.encode())
+
+    def new_session(
+        self,
+        name: str,
+        *,
+        role: Role = OWNER,
+        invitation: str | None = None,
+        person_id: str | None = None,
+        session_id: str | None = None,
+    ) -> Session:
+        """A session from now on; with `person_id` for somebody who is known already, with
+        `session_id` for a browser whose session goes on, so that one end ends all cookies of it."""
+        person = Person(person_id or secrets.token_urlsafe(9), name, role)
+        expires = time.time() + SESSION_SECONDS
+        return Session(session_id or secrets.token_urlsafe(12), person, expires, invitation)
+
+    def secret_of(self, invitation: str) -> str:
+        """The secret of a link (256 bit): only who knows the token can tell it from the id."""
+        return _text(hmac.digest(self._seal, b"invitation\0" + invitation.encode(), "sha256"))
+
+    def prove(self, challenge: str, address: str) -> ServerProof:
+        """For a client that is to show us the token."""
+        return ServerProof(address, self._proof(challenge, address))
+
+    def proven(self, challenge: str, proof: ServerProof, *, at: str | None = None) -> bool:
+        """Whether somebody else knows the token; `at` which address, if it has to be that one."""
+        if at is not None and proof.address != at:
+            return False
+        expected = self._proof(challenge, proof.address)
+        return hmac.compare_digest(expected.encode(), proof.proof.encode(errors="replace"))
+
+    def _proof(self, challenge: str, address: str) -> str:
+        text = f"{challenge}\0{address}".encode(errors="replace")
+        return _text(hmac.digest(self._proving, text, "sha256"))
+
+    @cached_property
+    def _proving(self) -> bytes:
+        """Strangers may ask for proofs: a token that somebody thought of must be slow to guess."""
+        salt = b"action-assistant server"
+        return hashlib.scrypt(self.token.encode(), salt=salt, n=1 << 14, r=8, p=1, dklen=32)
+
+    def sealed(self, session: Session) -> str:
+        """The cookie's value."""
+        person = session.person
+        fields = Sealed(
+            session.id, person.id, person.name, session.expires, person.role, session.invitation
+        )
+        payload = _text(msgspec.json.encode(fields))
+        return f"{payload}.{_text(self._sign(payload))}"
+
+    def session(self, cookie: str) -> Session | None:
+        """The session behind a cookie, expired or not; None when we did not seal it."""
+        payload, _, signature = cookie.partition(".")
+        if not hmac.compare_digest(_text(self._sign(payload)).encode(), signature.encode()):
+            return None
+        try:
+            raw = base64.urlsafe_b64decode(payload + "=" * (-len(payload) % 4))
+            found = msgspec.json.decode(raw, type=Sealed)
+        except (ValueError, msgspec.DecodeError):
+            return None
+        person = Person(found.person, found.name, found.role)
+        return Session(found.id, person, found.expires, found.invitation)
+
+    def _sign(self, payload: str) -> bytes:
+        return hmac.digest(self._seal, payload.encode(errors="replace"), "sha256")
+
+
+def _text(raw: bytes) -> str:
+    return base64.urlsafe_b64encode(raw).rstrip(b"=").decode()
+
+
+def _named(data: Path) -> str:
+    return f"The token in {data / TOKEN_FILE}"
+
+
+def _token_in(data: Path) -> str:
+    """The token kept in a folder. Two processes may ask at once: the first file to appear wins."""
+    file = data / TOKEN_FILE
+    try:
+        if not file.exists():
+            fresh = data / f".{TOKEN_FILE}-{os.getpid()}"
+            descriptor = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+            with os.fdopen(descriptor, "w") as out:
+                out.write(secrets.token_urlsafe(32) + "\n")
+            try:
+                os.link(fresh, file)
+            except FileExistsError:
+                pass  # the other process was first; its token is read below
+            finally:
+                fresh.unlink()
+        return file.read_text().strip()
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else f"{file} is no text"
+        raise CannotStart(f"Cannot keep the token in {data}: {why}.") from error

@@ -1,0 +1,1 @@
+"""HTTP without regard to who asks: problem details, cookies, the built page."""

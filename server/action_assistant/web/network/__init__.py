@@ -1,0 +1,1 @@
+"""Connections and addresses: how many there may be, and under which names."""

@@ -1,0 +1,205 @@
+"""The names under which this process may be called, and the origins that may call it."""
+
+import ipaddress
+import socket
+import time
+from collections.abc import Callable, Iterable
+from typing import Final
+from urllib.parse import urlsplit
+
+import ifaddr
+
+from action_assistant.public_url import PublicUrl
+from action_assistant.settings import EVERYWHERE, LOOPBACK
+
+_ANYWHERE: Final = frozenset({"0.0.0.0", "::", EVERYWHERE})
+_LOOK_AGAIN_S: Final = 5.0
+#: Interfaces to containers and virtual machines of this computer: nobody comes by them.
+_INNER: Final = ("docker", "br-", "veth", "virbr", "cni", "podman", "lxc", "lxd")
+
+
+def host_name(host: str) -> str:
+    """The name in a Host header or URL authority, without port, lower case; "" if it is none."""
+    return _host_and_port(host)[0]
+
+
+def _host_and_port(host: str) -> tuple[str, int | None]:
+    try:
+        parts = urlsplit(f"//{host.strip()}")
+        port = parts.port
+    except ValueError:
+        return "", None
+    if parts.username is not None or parts.path or parts.query or parts.fragment:
+        return "", None
+    return parts.hostname or "", port
+
+
+def lan_names() -> tuple[str, ...]:
+    """What others on the network can call this computer, the likeliest first: its addresses, and
+    its name as multicast DNS knows it."""
+    found: list[ipaddress.IPv4Address | ipaddress.IPv6Address] = []
+    for adapter in ifaddr.get_adapters():
+        if adapter.name.startswith(_INNER):
+            continue
+        for each in adapter.ips:
+            text = each.ip if isinstance(each.ip, str) else each.ip[0]
+            address = ipaddress.ip_address(text)
+            if not (address.is_loopback or address.is_link_local or address in found):
+                found.append(address)
+    found.sort(key=lambda address: address.version)
+    name = socket.gethostname().lower()
+    names = [name] if "." in name else [f"{name}.local", name]
+    old, new = (
+        [str(address) for address in found if address.version == version] for version in (4, 6)
+    )
+    return (*old, *(name for name in names if name not in LOOPBACK), *new)
+
+
+class Addresses:
+    """Host names that may be asked for, and the origins of pages that may ask.
+
+    `page_port` is the port of the page. Where host names were given on purpose the page may stand
+    behind a proxy, so for those any port and scheme are accepted. With `lan`, exactly the names that
+    it gives now are accepted too: it is asked again when an unknown one comes. `public` is the address
+    under which a proxy shows the page; whoever names it is answered as at that address, and nobody
+    else is.
+    """
+
+    def __init__(
+        self,
+        *,
+        host: str,
+        page_port: int,
+        hosts: Iterable[str] = (),
+        secure: bool = False,
+        lan: Callable[[], tuple[str, ...]] | None = None,
+        public: PublicUrl | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._public = public
+        self._named = tuple(name.lower() for name in hosts)
+        self._hosts = LOOPBACK | set(self._named) | ({host.lower()} - _ANYWHERE)
+        self._host = host.lower()
+        self._page_port = page_port
+        self.secure: Final = secure
+        self._scheme: Final = "https" if secure else "http"
+        self._lan = lan
+        self._found: tuple[str, ...] = lan() if lan is not None else ()
+        self._clock = clock
+        self._looked = clock()
+
+    @property
+    def is_proxied(self) -> bool:
+        """Whether a proxy shows the page at a public address."""
+        return self._public is not None
+
+    @property
+    def is_encrypted(self) -> bool:
+        """Whether what is sent to the address that others use first cannot be read on its way."""
+        return self.secure if self._public is None else self._public.is_secure
+
+    def allows_host(self, header: str | None) -> bool:
+        """Whether a request may name this host (DNS rebinding comes with another)."""
+        if header is None:
+            return False
+        return self.public_at(header) is not None or self._knows(host_name(header))
+
+    def allows_origin(self, origin: str) -> bool:
+        """Whether a page of this origin may talk to us."""
+        if self._public is not None and origin == self._public.origin:
+            return True
+        try:
+            parts = urlsplit(origin)
+            port = parts.port
+        except ValueError:
+            return False
+        name = (parts.hostname or "").lower()
+        if origin != f"{parts.scheme}://{parts.netloc}" or "@" in parts.netloc:
+            return False
+        if name in self._named:
+            return parts.scheme in {"http", "https"}
+        if parts.scheme != self._scheme or not self._knows(name):
+            return False
+        return (port or (443 if parts.scheme == "https" else 80)) == self._page_port
+
+    def public_at(self, header: str) -> PublicUrl | None:
+        """The public address, if this is what a Host header names; None for everything else."""
+        public = self._public
+        return public if public is not None and public.is_named(*_host_and_port(header)) else None
+
+    def replaced_host(self, header: str | None, origin: str) -> str | None:
+        """Why a page of an origin that may ask us cannot: a proxy in between told us another Host,
+        which would make of its page one of this computer. None if all is well."""
+        public = self._public
+        if public is None or origin != public.origin or self.public_at(header or ""):
+            return None
+        return (
+            f"The page is at {public.page}, and the proxy before it asked for {header or ''!r}: it has "
+            "to pass on the Host header (nginx: proxy_set_header Host $http_host)."
+        )
+
+    def runner_at(self, header: str, port: int) -> str:
+        """Where the runner is for whoever named this host; without a slash at the end."""
+        public = self.public_at(header)
+        return public.runner if public is not None else self.direct(header, port)
+
+    def direct(self, header: str, port: int) -> str:
+        """A port of ours under the name that somebody used; without a slash at the end."""
+        return f"{self._scheme}://{_shown(host_name(header) or '127.0.0.1')}:{port}"
+
+    def jar(self, header: str) -> tuple[bool, str]:
+        """Whether cookies are `Secure` for whoever named this host, and for which path they are."""
+        public = self.public_at(header)
+        return (self.secure, "/") if public is None else (public.is_secure, f"{public.path}/")
+
+    def is_page(self, url: str) -> bool:
+        """Whether the page can be found there."""
+        return self.allows_origin(url) or (self._public is not None and url == self._public.page)
+
+    def names(self) -> tuple[str, ...]:
+        """By which others reach this computer, the likeliest first; empty when they cannot."""
+        own = {self._host} - _ANYWHERE - LOOPBACK
+        return tuple(dict.fromkeys((*self._named, *own, *self._found)))
+
+    def certified(self) -> tuple[str, ...]:
+        """Every name that a certificate has to carry."""
+        if self._lan is not None:
+            self._found = self._lan()
+        return tuple(dict.fromkeys((*sorted(LOOPBACK), *self.names())))
+
+    def origins(self) -> tuple[str, ...]:
+        """Of the page, as others have to call it; of a public address also the path to it."""
+        public = () if self._public is None else (self._public.page,)
+        direct = (f"{self._scheme}://{_shown(name)}:{self._page_port}" for name in self.names())
+        return (*public, *direct)
+
+    def _knows(self, name: str) -> bool:
+        if name in self._hosts or name in self._found:
+            return True
+        now = self._clock()
+        if not name or self._lan is None or now - self._looked < _LOOK_AGAIN_S:
+            return False
+        self._looked = now  # the network may be another by now
+        self._found = self._lan()
+        return name in self._found
+
+
+def _shown(name: str) -> str:
+    return f"[{name}]" if ":" in name else name
+
+
+def addresses_of(
+    *,
+    host: str,
+    page_port: int,
+    hosts: tuple[str, ...],
+    share: bool,
+    secure: bool,
+    public: PublicUrl | None = None,
+) -> Addresses:
+    """What the settings of a process come to."""
+    listens_everywhere = share and host in _ANYWHERE
+    lan = lan_names if listens_everywhere else None
+    return Addresses(
+        host=host, page_port=page_port, hosts=hosts, secure=secure, lan=lan, public=public
+    )

@@ -1,0 +1,280 @@
+"""Connections: how many there may be, for how long they may be silent, and who has to go first.
+
+Descriptors are what a process has fewest of, and every connection takes one before it has said who
+it is. So strangers get a share, the oldest of whoever holds most makes room for the next, and what
+is left over is for those who are signed in, and for files.
+"""
+
+import asyncio
+import contextlib
+import logging
+import os
+import resource
+import socket
+import ssl
+import time
+from collections.abc import Callable, Coroutine, Iterator
+from itertools import islice
+from typing import Any, Final
+
+log: Final = logging.getLogger(__name__)
+
+_KEPT: Final = 96  # descriptors for files, the database, workers and robots
+_MOST: Final = 8_192  # connections; more would only cost memory
+_MOST_STRANGERS: Final = 2_048
+_SILENT_S: Final = 10.0  # until a request has come, with a handshake before it
+_SWEEP_S: Final = 1.0
+_AT_ONCE: Final = 50  # accepted between two turns of the loop
+_LOOKED_AT: Final = 16  # of somebody's oldest ones, for one that nothing is being done for
+_PAUSE_S: Final = 0.05  # when the system has no descriptor left
+
+Peer = tuple[str, int]
+Factory = Callable[[], asyncio.Protocol]
+
+
+def raise_limit() -> int:
+    """Have as many descriptors as the system allows; how many that is."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = 1 << 16 if hard == resource.RLIM_INFINITY else hard
+    if soft != resource.RLIM_INFINITY and soft < most:
+        with contextlib.suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
+            soft = most
+    return most if soft == resource.RLIM_INFINITY else soft
+
+
+class Connection:
+    """One that was accepted. `holder`: the person who is signed in on it, else the address."""
+
+    def __init__(self, wire: socket.socket, peer: Peer) -> None:
+        self.holder = f"@{peer[0]}"
+        self.answering = 0  # requests that are being answered
+        self.since = time.monotonic()  # when it began to wait for a request
+        self.transport: asyncio.BaseTransport | None = None  # after the handshake
+        self.is_silent = True  # nothing at all has come yet
+        self._wire = wire
+
+    @property
+    def is_over(self) -> bool:
+        """Whether its descriptor is free again."""
+        return self._wire.fileno() < 0
+
+    def end(self) -> None:
+        """Now, whatever waits to be sent."""
+        if self.is_silent:
+            asyncio.get_running_loop().remove_reader(self._wire)
+            self._wire.close()
+        elif isinstance(self.transport, asyncio.WriteTransport):
+            self.transport.abort()
+        else:
+            with contextlib.suppress(OSError):
+                self._wire.shutdown(socket.SHUT_RDWR)
+
+
+class ConnectionsByHolder:
+    """Connections by who holds them, and the oldest first."""
+
+    def __init__(self) -> None:
+        self._by: dict[str, dict[Peer, Connection]] = {}
+        self._peers: dict[Peer, Connection] = {}
+
+    def __len__(self) -> int:
+        return len(self._peers)
+
+    def __iter__(self) -> Iterator[tuple[Peer, Connection]]:
+        return iter(self._peers.items())
+
+    def get(self, peer: Peer) -> Connection | None:
+        """The one with this other end."""
+        return self._peers.get(peer)
+
+    def most(self) -> dict[Peer, Connection]:
+        """Those of whoever holds most."""
+        return max(self._by.values(), key=len)
+
+    def add(self, peer: Peer, connection: Connection) -> None:
+        """One more."""
+        before = self._peers.get(peer)
+        if before is not None:  # its end was not noticed yet
+            self.remove(peer, before)
+        self._peers[peer] = connection
+        self._by.setdefault(connection.holder, {})[peer] = connection
+
+    def remove(self, peer: Peer, connection: Connection) -> None:
+        """One less, if it is there."""
+        if self._peers.get(peer) is not connection:
+            return
+        del self._peers[peer]
+        theirs = self._by[connection.holder]
+        del theirs[peer]
+        if not theirs:
+            del self._by[connection.holder]
+
+
+class Connections:
+    """All of a process. The door says who is known on which."""
+
+    def __init__(self, limit: int) -> None:
+        self._most = max(32, min(_MOST, limit - _in_use() - _KEPT))
+        self._most_strangers = max(16, min(_MOST_STRANGERS, self._most * 2 // 3))
+        self._all = ConnectionsByHolder()
+        self._strangers = ConnectionsByHolder()
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._listeners: list[socket.socket] = []
+
+    # --- coming in ----------------------------------------------------------------------------
+
+    def listen(
+        self, listener: socket.socket, factory: Factory, context: ssl.SSLContext | None
+    ) -> None:
+        """Accept from now on."""
+        listener.setblocking(False)
+        self._listeners.append(listener)
+        asyncio.get_running_loop().add_reader(listener, self._accept, listener, factory, context)
+        if len(self._listeners) == 1:
+            self._keep(self._sweep())
+
+    def close(self) -> None:
+        """Accept nobody any more. Connections that are there stay."""
+        loop = asyncio.get_running_loop()
+        for listener in self._listeners:
+            loop.remove_reader(listener)
+            listener.close()
+        for _, each in tuple(self._all):
+            if each.is_silent:
+                each.end()
+        for task in self._tasks:
+            task.cancel()
+
+    def _accept(
+        self, listener: socket.socket, factory: Factory, context: ssl.SSLContext | None
+    ) -> None:
+        loop = asyncio.get_running_loop()
+        for _ in range(_AT_ONCE):
+            try:
+                wire, address = listener.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError as error:  # no descriptor is left
+                log.warning("a connection cannot be accepted: %s", error.strerror)
+                self._make_room(self._strangers, max(0, len(self._strangers) // 2))
+                self._keep(self._accept_again(listener, factory, context))
+                return
+            wire.setblocking(False)
+            peer = (str(address[0]), int(address[1]))
+            connection = Connection(wire, peer)
+            self._all.add(peer, connection)
+            self._strangers.add(peer, connection)
+            self._make_room(self._strangers, self._most_strangers)
+            self._make_room(self._all, self._most)
+            loop.add_reader(wire, self._spoke, connection, wire, factory, context)
+
+    def _spoke(
+        self,
+        connection: Connection,
+        wire: socket.socket,
+        factory: Factory,
+        context: ssl.SSLContext | None,
+    ) -> None:
+        """Something has come. Until then a connection costs next to nothing: many that say nothing
+        would take the time of those that do."""
+        asyncio.get_running_loop().remove_reader(wire)
+        connection.is_silent = False
+        self._keep(self._open(connection, wire, factory, context))
+
+    async def _accept_again(
+        self, listener: socket.socket, factory: Factory, context: ssl.SSLContext | None
+    ) -> None:
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(listener)
+        await asyncio.sleep(_PAUSE_S)
+        loop.add_reader(listener, self._accept, listener, factory, context)
+
+    async def _open(
+        self,
+        connection: Connection,
+        wire: socket.socket,
+        factory: Factory,
+        context: ssl.SSLContext | None,
+    ) -> None:
+        try:
+            connection.transport, _ = await asyncio.get_running_loop().connect_accepted_socket(
+                factory,
+                wire,
+                ssl=context,
+                ssl_handshake_timeout=_SILENT_S if context is not None else None,
+            )
+        except (OSError, asyncio.CancelledError):  # gone before it was there, or no handshake
+            wire.close()
+
+    def _keep(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    # --- going --------------------------------------------------------------------------------
+
+    def _make_room(self, among: ConnectionsByHolder, most: int) -> None:
+        """The oldest of whoever holds most goes, those first that nothing is being done for."""
+        while len(among) > most:
+            of_them = among.most()
+            first = tuple(islice(of_them.items(), _LOOKED_AT))
+            peer, connection = min(first, key=lambda item: item[1].answering > 0)
+            connection.end()
+            self._forget(peer, connection)
+
+    def _forget(self, peer: Peer, connection: Connection) -> None:
+        self._all.remove(peer, connection)
+        self._strangers.remove(peer, connection)
+
+    def _forget_gone(self) -> None:
+        for peer, each in tuple(self._all):
+            if each.is_over:
+                self._forget(peer, each)
+
+    async def _sweep(self) -> None:
+        """Whoever has asked for nothing in time has had it."""
+        while True:
+            await asyncio.sleep(_SWEEP_S)
+            self._forget_gone()
+            late = time.monotonic() - _SILENT_S
+            for _, each in tuple(self._all):
+                if not each.answering and each.since < late:
+                    each.end()
+
+    # --- what is known ------------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def answering(self, peer: Peer | None) -> Iterator[Callable[[str], None]]:
+        """A request on a connection is answered, as long as you are inside. Gives what to call with
+        the id of the person when that is known."""
+        connection = None if peer is None else self._all.get(peer)
+        if peer is None or connection is None:
+            yield lambda _: None
+            return
+
+        def known(person: str) -> None:
+            if connection.holder != person:
+                self._forget(peer, connection)
+                connection.holder = person
+                self._all.add(peer, connection)
+
+        connection.answering += 1
+        try:
+            yield known
+        finally:
+            connection.answering -= 1
+            connection.since = time.monotonic()
+
+    def drop(self, peer: Peer | None) -> None:
+        """End a connection whose other side does not go on."""
+        if peer is not None and (connection := self._all.get(peer)) is not None:
+            connection.end()
+
+
+def _in_use() -> int:
+    """Descriptors."""
+    try:
+        return len(os.listdir("/proc/self/fd"))  # noqa: PTH208 - counted, not visited
+    except OSError:
+        return 64

@@ -1,0 +1,1 @@
+"""How a process listens, what stands before it, and the application it serves."""

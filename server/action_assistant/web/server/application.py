@@ -1,0 +1,256 @@
+"""The ASGI application of either process: Litestar inside, access control around it."""
+
+import logging
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import msgspec
+from litestar import Litestar, MediaType, Request, Response, get
+from litestar.connection import ASGIConnection
+from litestar.handlers.base import BaseRouteHandler
+from litestar.openapi import OpenAPIConfig
+from litestar.openapi.plugins import JsonRenderPlugin
+from litestar.openapi.spec import Components, SecurityScheme
+from litestar.params import Parameter
+from litestar.routes import HTTPRoute
+from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive, Scope, Send
+
+from action_assistant.version import VERSION
+from action_assistant.web.auth.access import Access, Needs, require
+from action_assistant.web.auth.keys import Keys, ServerProof
+from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.roles import Deed
+from action_assistant.web.http.page import Page
+from action_assistant.web.http.problems import problem_handlers
+from action_assistant.web.network.addresses import Addresses, host_name
+from action_assistant.web.server.proxy import MOUNT, Mounted, misrouted
+
+log: Final = logging.getLogger(__name__)
+
+BODY_LIMIT: Final = 10_000_000  # bytes; a graph file of 10 MB is refused with 413
+_OPEN: Final = frozenset(
+    {"/healthz", "/readyz", "/api/session", "/api/session/invitation", "/api/server"}
+)
+_SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+
+
+class Readiness(msgspec.Struct, frozen=True):
+    """Whether the process can do its work, and what stands in the way."""
+
+    ready: bool
+    problems: tuple[str, ...] = ()
+
+
+Check = Callable[[], Awaitable[Readiness]]
+Measures = Callable[[], dict[str, float]]
+Lifespan = Callable[[Litestar], AbstractAsyncContextManager[None]]
+
+
+def application(
+    route_handlers: Sequence[ControllerRouterHandler],
+    *,
+    title: str,
+    keys: Keys,
+    revoked: Revocations,
+    addresses: Addresses,
+    page_port: int,
+    lifespan: Sequence[Lifespan] = (),
+    ready: Check | None = None,
+    measures: Measures | None = None,
+    page: Path | None = None,
+    runner_port: int | None = None,
+    mount: str = "",
+    body_limit: int = BODY_LIMIT,
+) -> ASGIApp:
+    """The whole application. Routes may read less or more than `body_limit` bytes. `page` and
+    `runner_port` are the editor's: it serves the page, whose Content-Security-Policy names the
+    runner. `mount` is the path at which a proxy shows this process."""
+    decisions: dict[tuple[str, str], Deed] = {}
+    api = _OpenApiText(decisions)
+    inner = Litestar(
+        [
+            *route_handlers,
+            *_health(ready, measures),
+            _proving(keys),
+            *([misrouted(runner_port)] if runner_port is not None else []),
+        ],
+        guards=[_undecided],
+        exception_handlers=problem_handlers(),
+        lifespan=list(lifespan),
+        openapi_config=_openapi(title, api),
+        request_max_body_size=body_limit,
+        logging_config=None,
+    )
+    decisions.update(_decisions(inner))
+    api.prepare(inner.openapi_schema.to_schema())
+
+    def root_of(scope: HTTPScope) -> str:
+        state: dict[str, Any] = scope.get("state", {})
+        public = addresses.public_at(_host(scope))
+        return str(state.get(MOUNT) or (public.path if public is not None else ""))
+
+    shown = Page(inner, page, root_of) if page is not None else None
+    outer: ASGIApp = Access(
+        shown or inner,
+        keys=keys,
+        addresses=addresses,
+        page_port=page_port,
+        is_open=lambda path, html: (
+            _answers_strangers(path) or (shown is not None and shown.knows(path, html))
+        ),
+        policy=lambda host: _policy(addresses, host, page_port, runner_port),
+        revoked=revoked,
+    )
+    return _NamedRoute(Mounted(outer, mount), inner)
+
+
+def _host(scope: HTTPScope) -> str:
+    return dict(scope["headers"]).get(b"host", b"").decode("latin-1")
+
+
+def _answers_strangers(path: str) -> bool:
+    return path in _OPEN
+
+
+def _decisions(inner: Litestar) -> dict[tuple[str, str], Deed]:
+    """What one must be allowed to do to call a route, by path and method.
+
+    Reading is everybody's who is signed in. Other routes have to say; those that do not are missing
+    here, and are for owners only.
+    """
+    found: dict[tuple[str, str], Deed] = {}
+    for route in inner.routes:
+        if not isinstance(route, HTTPRoute) or _answers_strangers(route.path_format):
+            continue
+        for handler in route.route_handlers:
+            said = _said(handler)
+            for method in handler.http_methods:
+                if said is not None:
+                    found[route.path_format, method.lower()] = said
+                elif method in _SAFE:
+                    found[route.path_format, method.lower()] = "see"
+    return found
+
+
+def _said(handler: BaseRouteHandler) -> Deed | None:
+    for guard in handler.guards or ():
+        if isinstance(guard, Needs):
+            return guard.deed
+    return None
+
+
+async def _undecided(
+    connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler
+) -> None:
+    """A guard: what nobody decided about is not for everybody."""
+    if connection.scope.get("method", "GET") in _SAFE or _said(handler) is not None:
+        return
+    if not _answers_strangers(connection.scope["path"]):
+        require(connection, "restore")
+
+
+class _NamedRoute:
+    """The application, with Litestar's own one in reach for those who make its OpenAPI text."""
+
+    def __init__(self, outer: ASGIApp, inner: Litestar) -> None:
+        self._outer = outer
+        self.litestar = inner
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await self._outer(scope, receive, send)
+
+
+def _policy(addresses: Addresses, host: str, page_port: int, runner_port: int | None) -> str:
+    connect = "'self'"
+    public = addresses.public_at(host)
+    if runner_port is not None and public is not None:
+        connect += f" {_socket(public.origin)}"  # for older browsers it is not part of 'self'
+    elif runner_port is not None and host_name(host):
+        page, runner = (addresses.direct(host, port) for port in (page_port, runner_port))
+        connect += f" {_socket(page)} {runner} {_socket(runner)}"
+    return (
+        "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+        f"img-src 'self' data: blob:; font-src 'self'; connect-src {connect}; object-src 'none'; "
+        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    )
+
+
+def _socket(url: str) -> str:
+    return url.replace("http", "ws", 1)
+
+
+class _OpenApiText(JsonRenderPlugin):
+    """OpenAPI as JSON. Litestar leaves out an empty `security`, which is how a route says that it
+    is open to strangers; the others say in `x-needs` what one must be allowed to do."""
+
+    def __init__(self, decisions: Mapping[tuple[str, str], Deed]) -> None:
+        super().__init__(path="/openapi.json")
+        self._decisions = decisions
+        self._text = b""
+
+    def render(self, request: Request[Any, Any, Any], openapi_schema: dict[str, Any]) -> bytes:
+        """The text of the schema."""
+        return self._text or self.prepare(openapi_schema)
+
+    def prepare(self, openapi_schema: dict[str, Any]) -> bytes:
+        """Make the text, once and before anybody asks: that takes a tenth of a second."""
+        for path, item in openapi_schema["paths"].items():
+            for method, operation in item.items():
+                if _answers_strangers(path):
+                    operation["security"] = []
+                elif (path, method) in self._decisions:
+                    operation["x-needs"] = self._decisions[path, method]
+        self._text = msgspec.json.encode(openapi_schema)
+        return self._text
+
+
+def _openapi(title: str, api: _OpenApiText) -> OpenAPIConfig:
+    schemes: dict[str, Any] = {"token": SecurityScheme(type="http", scheme="bearer")}
+    return OpenAPIConfig(
+        title=title,
+        version=VERSION,
+        path="/schema",
+        render_plugins=[api],
+        components=Components(security_schemes=schemes),
+        security=[{"token": []}],
+    )
+
+
+_PASSED_ON: Final = ("x-forwarded-for", "forwarded", "via")
+
+
+def _proving(keys: Keys) -> ControllerRouterHandler:
+    keys.prove("", "")  # takes a moment, once
+
+    @get("/api/server", summary="That this server knows the token, before anybody shows it")
+    async def prove(
+        request: Request[Any, Any, Any],
+        challenge: Annotated[str, Parameter(min_length=20, max_length=100)],
+    ) -> Response[ServerProof]:
+        host, port = request.scope.get("server") or ("", 0)
+        # Of whoever comes through a proxy the address proves nothing: anybody could pass it on.
+        passed_on = any(name in request.headers for name in _PASSED_ON)
+        proof = keys.prove(challenge, "" if passed_on else f"{host}:{port}")
+        return Response(proof, headers={"cache-control": "no-store"})
+
+    return prove
+
+
+def _health(ready: Check | None, measures: Measures | None) -> list[ControllerRouterHandler]:
+    @get("/healthz", summary="Whether the process answers")
+    async def healthz() -> dict[str, str]:
+        return {"status": "ok", "version": VERSION}
+
+    @get("/readyz", summary="Whether the process can do its work")
+    async def readyz() -> Response[Readiness]:
+        found = await ready() if ready is not None else Readiness(ready=True)
+        return Response(found, status_code=200 if found.ready else 503)
+
+    @get("/metrics", media_type=MediaType.TEXT, summary="Measures, as Prometheus reads them")
+    async def metrics() -> str:
+        values = measures() if measures is not None else {}
+        return "".join(f"{name} {value:g}\n" for name, value in sorted(values.items()))
+
+    return [healthz, readyz, metrics]

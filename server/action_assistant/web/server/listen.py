@@ -1,0 +1,379 @@
+"""Listening: sockets bound first, so that a taken port is one clear sentence; then uvicorn."""
+
+import asyncio
+import errno
+import gc
+import logging
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextvars import ContextVar
+from typing import Any, Final
+
+import h11
+import uvicorn
+from litestar.enums import ScopeType
+from litestar.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from action_assistant.errors import BadInput, CannotStart
+from action_assistant.public_url import Network
+from action_assistant.settings import EVERYWHERE
+from action_assistant.web.auth.access import KNOWN
+from action_assistant.web.network.certificate import Certificate
+from action_assistant.web.network.connections import Connections, raise_limit
+from action_assistant.web.server.proxy import Forwarded
+
+log: Final = logging.getLogger(__name__)
+
+WEBSOCKET_LIMIT: Final = 1_114_112  # bytes; an update of 1 MiB and its frame
+GRACE: Final = 5  # seconds that open requests get when the process is told to end
+HEAD_LIMIT: Final = 32_768  # bytes of a request line and its header fields
+_CALLS: Final = frozenset({"http", "websocket"})
+#: Processor time and time (seconds) when what is answered came in.
+_RECEIVED: Final[ContextVar[tuple[float, float]]] = ContextVar("received", default=(0.0, 0.0))
+_FAILED: Final = 3  # exit code when the application could not be set up
+_BODY_S: Final = 30.0  # between two pieces of a body
+_ENDED_EARLY: Final = "The body ended early."
+_LENGTH_REQUIRED: Final = (
+    b"HTTP/1.1 411 Length Required\r\ncontent-type: text/plain; charset=utf-8\r\n"
+    b"connection: close\r\ncontent-length: 21\r\n\r\nA body has a length.\n"
+)
+_LOOK_S: Final = 60.0  # between two looks at the certificate
+_GARBAGE: Final = (10_000, 10, 10)  # objects, and collections of the younger generations
+UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it was sent is gone
+
+
+def serve(
+    make: Callable[[], ASGIApp],
+    *,
+    host: str,
+    port: int,
+    identity: "TlsIdentity | None" = None,
+    proxies: tuple[Network, ...] = (),
+) -> None:
+    """Serve what `make` makes until told to end; nothing is touched before the address is ours.
+    With an `identity` over TLS. `proxies` are believed about who asks.
+
+    Raises CannotStart when the address is taken or unknown.
+    """
+    sockets = bound(host, port)
+    try:
+        if identity is not None:
+            identity.certificate.renew(identity.names())
+        endings = StreamEndings(make())
+    except BaseException:
+        for listener in sockets:
+            listener.close()
+        raise
+    connections = Connections(raise_limit())
+    config = uvicorn.Config(
+        ActivityTracker(Forwarded(endings, proxies), connections),
+        http=_Http,
+        h11_max_incomplete_event_size=HEAD_LIMIT,
+        lifespan="on",
+        log_config=None,
+        access_log=False,
+        proxy_headers=False,
+        server_header=False,
+        ws="websockets-sansio",
+        ws_max_size=WEBSOCKET_LIMIT,
+        ws_per_message_deflate=False,
+        ws_ping_interval=10,
+        ws_ping_timeout=10,
+        timeout_graceful_shutdown=GRACE,
+        ssl_certfile=identity.certificate.chain if identity is not None else None,
+        ssl_keyfile=str(identity.certificate.key) if identity is not None else None,
+    )
+    if identity is not None:
+        identity.keep(config)
+    logging.getLogger("uvicorn.error").addFilter(_in_one_line)
+    server = _Server(config, endings, connections)
+    _end_with_parent(server)
+    server.run(sockets=sockets)
+    if not server.started:
+        raise CannotStart("The process could not be set up; the log above says why.")
+
+
+class TlsIdentity:
+    """Who we are under TLS: a certificate, renewed in time and when our names have changed."""
+
+    def __init__(self, certificate: Certificate, names: Callable[[], Sequence[str]]) -> None:
+        self.certificate: Final = certificate
+        self.names: Final = names
+        self._loaded = 0  # when the certificate that is in use was written
+
+    def keep(self, config: uvicorn.Config) -> None:
+        """Look now and then. New connections get the new certificate, open ones stay."""
+
+        def look() -> None:
+            while True:
+                time.sleep(_LOOK_S)
+                try:
+                    fresh = self.certificate.renew(self.names())
+                    loaded = self.certificate.chain.stat().st_mtime_ns
+                except (CannotStart, OSError) as error:
+                    log.error("the certificate was not renewed: %s", error)
+                    continue
+                if (fresh or loaded != self._loaded) and config.ssl is not None:
+                    config.ssl.load_cert_chain(self.certificate.chain, self.certificate.key)
+                    self._loaded = loaded
+                    log.info("a new certificate is in use")
+
+        self._loaded = self.certificate.chain.stat().st_mtime_ns
+        threading.Thread(target=look, name="certificate", daemon=True).start()
+
+
+class StreamEndings:
+    """Around an application: when the process is told to end, streams without an end get one.
+
+    A listener to server-sent events is told that its peer has gone, which is how it would end
+    anyway; requests that are being answered are left alone.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+        self._told = asyncio.Event()
+
+    def begin(self) -> None:
+        """End every stream."""
+        self._told.set()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on."""
+        if scope["type"] != ScopeType.HTTP:
+            await self._app(scope, receive, send)
+            return
+        asked = streaming = False
+
+        async def received() -> Any:
+            nonlocal asked
+            if not asked:
+                message = await receive()
+                asked = not message.get("more_body", False)
+                return message
+            return await self._next(receive)
+
+        async def sent(message: Message) -> None:
+            nonlocal streaming
+            streaming = bool(message.get("more_body", message["type"] == "http.response.start"))
+            await send(message)
+
+        await self._app(scope, received, sent)
+        if streaming and self._told.is_set():
+            await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+    async def _next(self, receive: Receive) -> Any:
+        """What comes after a request is only that the peer has gone; or that we go."""
+        gone = asyncio.ensure_future(receive())
+        told = asyncio.ensure_future(self._told.wait())
+        try:
+            await asyncio.wait({gone, told}, return_when=asyncio.FIRST_COMPLETED)
+            return gone.result() if gone.done() else {"type": "http.disconnect"}
+        finally:
+            gone.cancel()
+            told.cancel()
+
+
+class ActivityTracker:
+    """Around everything: says for which connection something is being done, and for whom. A request
+    whose body does not come is not waited for."""
+
+    def __init__(self, app: ASGIApp, connections: Connections) -> None:
+        self._app = app
+        self._connections = connections
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on."""
+        if scope["type"] not in _CALLS:  # lifespan
+            await self._app(scope, receive, send)
+            return
+        peer: Any = scope.get("client")
+        whole = scope["type"] == ScopeType.WEBSOCKET or not _has_body(scope)
+
+        async def received() -> Any:
+            nonlocal whole
+            if whole:
+                return await receive()
+            try:
+                async with asyncio.timeout(_BODY_S):
+                    message: Any = await receive()
+            except TimeoutError:
+                self._connections.drop(peer)
+                raise BadInput(_ENDED_EARLY) from None
+            if message["type"] == "http.disconnect":
+                raise BadInput(_ENDED_EARLY)
+            whole = not message.get("more_body", False)
+            return message
+
+        async def sent(message: Message) -> None:
+            if message["type"] == "http.response.start" and scope["path"].endswith("/stop"):
+                message["headers"] = [*message.get("headers", []), _own_share()]
+            await send(message)
+
+        with self._connections.answering(peer and tuple(peer)) as known:
+            scope.setdefault("state", {})[KNOWN] = known
+            await self._app(scope, received, sent)
+
+
+def _has_body(scope: Scope) -> bool:
+    """Whether a body was announced."""
+    return any(name == b"content-length" and value != b"0" for name, value in scope["headers"])
+
+
+def _own_share() -> tuple[bytes, bytes]:
+    """What this process has done, and how long it took, since a Stop came in (milliseconds)."""
+    cpu, wall = _RECEIVED.get()
+    spent, took = time.process_time() - cpu, time.perf_counter() - wall
+    return b"server-timing", f"cpu;dur={1e3 * spent:.3f}, total;dur={1e3 * took:.3f}".encode()
+
+
+class _Http(H11Protocol):
+    """HTTP as everybody speaks it who has business here: bodies with a length."""
+
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **more)
+        self._strict = self.conn = _Strict(h11.SERVER, HEAD_LIMIT)
+
+    def data_received(self, data: bytes) -> None:
+        """Something has come."""
+        _RECEIVED.set((time.process_time(), time.perf_counter()))
+        super().data_received(data)
+
+    def send_400_response(self, msg: str) -> None:
+        """The refusal that fits."""
+        if not self._strict.in_crumbs:
+            super().send_400_response(msg)
+            return
+        self.transport.write(_LENGTH_REQUIRED)
+        self.transport.close()
+
+
+class _Strict(h11.Connection):
+    """Refuses a body without a length: a chunk of one byte costs us a thousand times more than it
+    costs to send, before anybody could say whose it is."""
+
+    in_crumbs = False
+
+    def next_event(self) -> Any:
+        """The next one. Raises RemoteProtocolError."""
+        event = super().next_event()
+        if isinstance(event, h11.Request):
+            names = [name for name, _ in event.headers]
+            if b"transfer-encoding" in names:
+                self.in_crumbs = True
+                raise h11.RemoteProtocolError("a body needs a length", error_status_hint=411)
+        return event
+
+
+class _Server(uvicorn.Server):
+    """Ends streams before it waits for them."""
+
+    def __init__(
+        self, config: uvicorn.Config, endings: StreamEndings, connections: Connections
+    ) -> None:
+        super().__init__(config)
+        self._endings = endings
+        self._connections = connections
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Called once, before anyone is let in. Connections are accepted by ourselves: uvicorn
+        counts them when it is too late, after a handshake and with the last descriptor gone."""
+        await self.lifespan.startup()
+        if self.lifespan.should_exit:
+            sys.exit(_FAILED)
+        self.servers = []
+        for listener in sockets or []:
+            self._connections.listen(listener, self._protocol, self.config.ssl)
+        self.started = True
+        # What is there now stays: looking through it for garbage again and again costs a busy
+        # process a fifth of its time.
+        gc.collect()
+        gc.freeze()
+        gc.set_threshold(*_GARBAGE)
+
+    def _protocol(self) -> asyncio.Protocol:
+        return _Http(
+            config=self.config, server_state=self.server_state, app_state=self.lifespan.state
+        )
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Called once, when the process is told to end."""
+        self._endings.begin()
+        self._connections.close()
+        await super().shutdown(sockets)
+
+
+def _in_one_line(record: logging.LogRecord) -> bool:
+    """A filter: what peers send wrongly is told, without our stack."""
+    if "Invalid UTF-8" in record.msg:
+        record.exc_info = None
+        record.levelno, record.levelname = logging.WARNING, "WARNING"
+    return True
+
+
+def bound(host: str, port: int) -> list[socket.socket]:
+    """Sockets for the address; both loopback families for a loopback name, so that nobody else
+    can stand in for us under `localhost`; both families for everywhere."""
+    hosts = [host]
+    if host in {"127.0.0.1", "localhost"}:
+        hosts = ["127.0.0.1", "::1"]
+    elif host == EVERYWHERE:
+        hosts = ["0.0.0.0", "::"]
+    found: list[socket.socket] = []
+    for name in hosts:
+        family = socket.AF_INET6 if ":" in name else socket.AF_INET
+        try:
+            listener = socket.socket(family, socket.SOCK_STREAM)
+        except OSError:  # no IPv6 on this machine
+            continue
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        _forget_silent_peers(listener)
+        if family == socket.AF_INET6:
+            listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+        try:
+            listener.bind((name, port))
+            listener.listen(2048)
+        except OSError as error:
+            listener.close()
+            if name in {"::1", "::"} and found and error.errno != errno.EADDRINUSE:
+                continue  # IPv6 is known to the kernel but switched off
+            for other in found:
+                other.close()
+            raise CannotStart(_why(name, port, error)) from error
+        found.append(listener)
+    return found
+
+
+def _forget_silent_peers(listener: socket.socket) -> None:
+    """Have the kernel drop peers that vanished, and those that read nothing: what waits for them
+    would be kept for ever. Connections inherit this from the socket that accepts them."""
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    options = {"TCP_USER_TIMEOUT": UNHEARD * 1000, "TCP_KEEPIDLE": UNHEARD, "TCP_KEEPINTVL": 5}
+    for name, value in options.items():
+        number = getattr(socket, name, None)  # not every system has them
+        if number is not None:
+            listener.setsockopt(socket.IPPROTO_TCP, number, value)
+
+
+def _why(host: str, port: int, error: OSError) -> str:
+    if error.errno == errno.EADDRINUSE:
+        return f"Port {port} is taken on {host}; choose another with --port."
+    return f"Cannot listen on {host}, port {port}: {error.strerror}."
+
+
+def _end_with_parent(server: uvicorn.Server) -> None:
+    """End when the process that started us dies, however it dies: its end of the pipe closes."""
+    descriptor = os.environ.pop("_ACTION_ASSISTANT_PARENT", None)
+    if descriptor is None:
+        return
+
+    def wait() -> None:
+        with os.fdopen(int(descriptor), "rb") as pipe:
+            pipe.read()
+        server.should_exit = True
+
+    threading.Thread(target=wait, name="parent", daemon=True).start()

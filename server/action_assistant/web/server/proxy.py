@@ -1,0 +1,157 @@
+"""Behind a proxy: the address of a request, and the part of its path that is the proxy's."""
+
+import ipaddress
+import re
+from typing import Any, Final
+
+from litestar import route
+from litestar.params import FromPath
+from litestar.types import (
+    ASGIApp,
+    ControllerRouterHandler,
+    HTTPScope,
+    Message,
+    Receive,
+    Scope,
+    Send,
+    WebSocketScope,
+)
+
+from action_assistant.errors import Misrouted
+from action_assistant.public_url import RUNNER, Network
+from action_assistant.web.auth.access import Needs
+
+#: Under this name the state of a request has the path at which the page lies for whoever asks.
+MOUNT: Final = "mount"
+_CALLS: Final = frozenset({"http", "websocket"})
+_WITH_PORT: Final = re.compile(r"\[(.+)\](?::\d+)?|([0-9.]+):\d+")
+_Address = ipaddress.IPv4Address | ipaddress.IPv6Address
+
+
+class Forwarded:
+    """An ASGI middleware: `scope["client"]` is who asked the last proxy that is believed.
+
+    Of `X-Forwarded-For` only what believed proxies wrote counts, from its end; everybody can write
+    the beginning. Nothing else of what proxies say is read: the public address is a setting.
+    """
+
+    def __init__(self, app: ASGIApp, proxies: tuple[Network, ...]) -> None:
+        self._app = app
+        self._proxies = proxies
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on."""
+        if scope["type"] in _CALLS and self._proxies:
+            peer: Any = scope.get("client")
+            found = self._asker(peer[0], _forwarded(scope)) if peer else None
+            if found is not None:
+                changed: Any = {**scope, "client": (found, 0)}
+                scope = changed
+        await self._app(scope, receive, send)
+
+    def _asker(self, peer: str, chain: list[str]) -> str | None:
+        """Who asked; None when it was the peer itself."""
+        found = None
+        address = _address(peer)
+        while address is not None and self._believes(address) and chain:
+            address = _address(chain.pop())
+            found = str(address) if address is not None else found
+        return found
+
+    def _believes(self, address: _Address) -> bool:
+        return any(address in each for each in self._proxies)
+
+
+class Mounted:
+    """An ASGI middleware: a path below `mount` is one of ours without it.
+
+    Proxies pass paths on as they are. What comes without the mount is answered, too: from this
+    computer, or through a proxy that takes it off.
+    """
+
+    def __init__(self, app: ASGIApp, mount: str) -> None:
+        self._app = app
+        self._mount = mount
+        self._raw = mount.encode()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on."""
+        if not self._mount or scope["type"] not in _CALLS:
+            await self._app(scope, receive, send)
+            return
+        call: Any = scope
+        path: str = call["path"]
+        if path == self._mount and call["type"] == "http":
+            await _lead(send, f"{path}/")
+            return
+        if path.startswith(f"{self._mount}/"):
+            raw: bytes = call.get("raw_path") or path.encode()
+            call = {
+                **call,
+                "path": path.removeprefix(self._mount),
+                "raw_path": raw.removeprefix(self._raw),
+            }
+            call.setdefault("state", {})[MOUNT] = self._mount
+            send = self._located(send)
+        await self._app(call, receive, send)
+
+    def _located(self, send: Send) -> Send:
+        """What was made is where the proxy shows it."""
+
+        async def located(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [
+                    (name, self._raw + value)
+                    if name.lower() == b"location" and value.startswith(b"/")
+                    else (name, value)
+                    for name, value in message.get("headers", [])
+                ]
+            await send(message)
+
+        return located
+
+
+def misrouted(runner_port: int) -> ControllerRouterHandler:
+    """For the editor: what a proxy leads here and should lead to the runner."""
+
+    @route(
+        f"{RUNNER}/{{rest:path}}",
+        http_method=["GET", "POST", "PATCH", "DELETE"],
+        guards=[Needs("see")],
+        include_in_schema=False,
+    )
+    async def astray(rest: FromPath[str]) -> None:
+        raise Misrouted(
+            f"The proxy leads what is below {RUNNER}/ to the editor; it has to lead it to the runner, "
+            f"on port {runner_port}."
+        )
+
+    return astray
+
+
+async def _lead(send: Send, location: str) -> None:
+    fields = [(b"location", location.encode()), (b"content-length", b"0")]
+    start: Any = {"type": "http.response.start", "status": 308, "headers": fields}
+    end: Any = {"type": "http.response.body", "body": b"", "more_body": False}
+    await send(start)
+    await send(end)
+
+
+def _forwarded(scope: HTTPScope | WebSocketScope) -> list[str]:
+    """The chain of addresses, the one that asked the last proxy at its end."""
+    fields = (
+        value.decode("latin-1")
+        for name, value in scope["headers"]
+        if name.lower() == b"x-forwarded-for"
+    )
+    return [each.strip() for field in fields for each in field.split(",")]
+
+
+def _address(text: str) -> _Address | None:
+    """An address, also with a port as some proxies write it."""
+    found = _WITH_PORT.fullmatch(text)
+    try:
+        address = ipaddress.ip_address(found[1] or found[2] if found else text)
+    except ValueError:
+        return None
+    return getattr(address, "ipv4_mapped", None) or address

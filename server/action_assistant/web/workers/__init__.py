@@ -1,0 +1,1 @@
+"""Worker processes: lanes of them, and what one is from within."""

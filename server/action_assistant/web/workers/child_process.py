@@ -1,0 +1,115 @@
+"""A worker process from within: low priority, bounded memory, one task after the other.
+
+Imports little, since every worker begins with it.
+"""
+
+import contextlib
+import gc
+import logging
+import multiprocessing
+import os
+import pickle
+import resource
+import signal
+import threading
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerProcess
+from pathlib import Path
+from typing import Any, Final
+
+from action_assistant.errors import TooLarge
+from action_assistant.safe_text import make_streams_printable
+
+_MEMORY: Final = 768 << 20  # bytes that a worker may take beyond what it begins with
+_TIRED: Final = 256 << 20  # bytes in use after which a worker makes room for a fresh one
+
+_context: Final = multiprocessing.get_context("forkserver")
+
+
+def wire() -> tuple[Connection, Connection]:
+    """Two ends, ours and that of a worker."""
+    ours, theirs = _context.Pipe()
+    return ours, theirs
+
+
+def child(
+    work: Callable[..., None], *args: Any, name: str, nice: int, preloaded: Sequence[str]
+) -> ForkServerProcess:
+    """A process of low priority that ends with this one, in which `work(*args)` runs. Waits for it
+    to exist. `preloaded`: the modules that the server process imports before it forks the first one.
+    Raises OSError, EOFError."""
+    _context.set_forkserver_preload(list(preloaded))
+    process = _context.Process(target=_humbly, args=(work, args, nice), name=name, daemon=True)
+    process.start()
+    return process
+
+
+def _humbly(work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
+    """In the process: others first, when time or memory runs short."""
+    make_streams_printable()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for our parent, which ends us
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    with contextlib.suppress(OSError):
+        os.nice(nice)
+    with contextlib.suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text("1000")
+    with contextlib.suppress(OSError, ValueError):
+        limit = _mapped() + _MEMORY
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    gc.freeze()
+    work(*args)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(0)
+
+
+def _mapped() -> int:
+    """Bytes of address space in use."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+
+
+def _in_use() -> int:
+    """Bytes of memory in use; 0 where nobody says."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    except OSError:
+        return 0
+
+
+_MORE: Final = b"+"
+LAST: Final = b"."  # this worker does nothing more
+
+
+def serve(wire: Connection) -> None:
+    """Do one thing after the other, until whoever asks has gone."""
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            wire.send_bytes(_reply(wire.recv_bytes()))
+
+
+def _reply(request: bytes) -> bytes:
+    try:
+        work, args = pickle.loads(request)
+        reply = pickle.dumps(("returned", work(*args)), pickle.HIGHEST_PROTOCOL)
+    except MemoryError:
+        large = TooLarge("This takes more memory than one request may have.")
+        return LAST + pickle.dumps(("raised", large))
+    except Exception as error:  # noqa: BLE001 - it is raised where it was asked for
+        reply = _raised(error)
+    return (LAST if _in_use() > _TIRED else _MORE) + reply
+
+
+def _raised(error: Exception) -> bytes:
+    """An error that reaches the other side as it is, where that is possible."""
+    try:
+        reply = pickle.dumps(("raised", error))
+        pickle.loads(reply)
+    except Exception:
+        logging.getLogger(__name__).exception("a worker cannot say what went wrong")
+        reply = pickle.dumps(("raised", RuntimeError(repr(error)[:2000])))
+    return reply

@@ -1,0 +1,249 @@
+"""Worker processes: whatever may take long happens in them, so that the event loop stays free.
+
+A thread would not do: it shares the interpreter lock with the loop. Workers are forked by a server
+process that `multiprocessing` starts afresh, so they hold nothing of ours, no rclpy, no locks of its
+threads, and a new one is there within milliseconds. What is asked of them has to be a function of a
+module, with values that can be pickled.
+"""
+
+import asyncio
+import logging
+import pickle
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerProcess
+from typing import Any, Final, Protocol, TypeVar
+
+import anyio
+from anyio import CapacityLimiter, to_thread
+
+from action_assistant.errors import TooLarge, TooMany, Unavailable
+from action_assistant.web.auth.access import Caller, caller
+from action_assistant.web.workers.child_process import LAST, child, serve, wire
+
+__all__ = ["HOPELESS", "Crashed", "GaveUp", "Lane", "RunInWorker", "child", "kept_warm", "run_here"]
+
+log: Final = logging.getLogger(__name__)
+
+T = TypeVar("T")
+
+_WAITING: Final = 32  # requests of one person
+_ALL_WAITING: Final = 256
+_START_S: Final = 30.0
+
+
+class RunInWorker(Protocol):
+    """A way to do work that takes long without holding up a Stop, or other people: in another
+    process, so that it is a function of a module, and what it is given and returns are values."""
+
+    def __call__(self, work: Callable[..., T], /, *args: Any) -> Awaitable[T]:
+        """The outcome of `work(*args)`."""
+        ...
+
+
+async def run_here(work: Callable[..., T], /, *args: Any) -> T:
+    """No way aside: the work is done at once, in this process."""
+    return work(*args)
+
+
+class Crashed(Unavailable):
+    """What would have worked on this has died"""
+
+
+class GaveUp(Unavailable):
+    """Not available now"""
+
+    @property
+    def type(self) -> str:
+        """For programs it is unavailable like anything else."""
+        return "unavailable"
+
+
+#: What is wrong with the work itself, so that it will not go better next time.
+HOPELESS: Final = (Crashed, GaveUp, TooLarge)
+
+
+class Lane:
+    """Some workers, and who waits for them: in the order they came, of each person one at a time.
+
+    Calling it is the way to have something done: `await lane(function, *values)`. Nothing of it
+    outlives whoever asked: when they have gone, or after `patience` seconds, the worker is killed.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        processes: int,
+        patience: float,
+        nice: int,
+        threads: CapacityLimiter,
+        preloaded: Sequence[str],
+    ) -> None:
+        self._name = name
+        self._nice = nice
+        self._preloaded = preloaded
+        self._patience = patience
+        self._threads = threads
+        self._idle: list[_Worker] = []
+        self._busy: set[_Worker] = set()
+        self._free = anyio.Semaphore(processes)
+        self._turns: dict[str, anyio.Lock] = {}
+        self._waiting: dict[str, int] = {}
+
+    async def __call__(self, work: Callable[..., T], /, *args: Any) -> T:
+        """The outcome of `work(*args)`. Raises what it raises, Unavailable, TooLarge, TooMany."""
+        asking = caller()
+        request = pickle.dumps((work, args), pickle.HIGHEST_PROTOCOL)
+        with self._queued(asking.person if asking is not None else "") as turn:
+            reply, gone = b"", False
+            failed: Exception | None = None
+            async with anyio.create_task_group() as tasks:
+
+                async def leave(asking: Caller) -> None:
+                    nonlocal gone
+                    await asking.gone()
+                    gone = True
+                    tasks.cancel_scope.cancel()
+
+                if asking is not None:
+                    tasks.start_soon(leave, asking)
+                try:
+                    async with turn, self._free:
+                        reply = await self._done(request)
+                except Exception as error:  # noqa: BLE001 - raised below, outside of the group
+                    failed = error
+                tasks.cancel_scope.cancel()
+        if gone:
+            raise Unavailable("Whoever asked for this has gone.")
+        if failed is not None:
+            raise failed
+        kind, value = pickle.loads(reply[1:])
+        if kind == "raised":
+            raise value
+        outcome: T = value
+        return outcome
+
+    @contextmanager
+    def _queued(self, person: str) -> Iterator[anyio.Lock]:
+        """A place in the queue. Raises TooMany."""
+        waiting = self._waiting.get(person, 0)
+        if person and (waiting >= _WAITING or sum(self._waiting.values()) >= _ALL_WAITING):
+            raise TooMany("Too much waits to be worked on already; wait some seconds.")
+        self._waiting[person] = waiting + 1
+        try:
+            yield self._turns.setdefault(person, anyio.Lock())
+        finally:
+            self._waiting[person] -= 1
+            if not self._waiting[person]:
+                del self._waiting[person], self._turns[person]
+
+    async def _done(self, request: bytes) -> bytes:
+        """The reply of the worker. Raises Crashed, Unavailable."""
+        self._idle = [each for each in self._idle if each.lives]
+        worker = self._idle.pop() if self._idle else await self._hired()
+        self._busy.add(worker)
+        finished = False
+        try:
+            with anyio.fail_after(self._patience):
+                reply = await to_thread.run_sync(
+                    worker.asked, request, abandon_on_cancel=True, limiter=self._threads
+                )
+            finished = reply[:1] != LAST
+        except TimeoutError as late:
+            raise GaveUp(
+                f"This took longer than {self._patience:.0f} s and was given up."
+            ) from late
+        except (OSError, EOFError) as error:
+            log.error("%s: a worker has died (%r)", self._name, error)
+            raise Crashed(
+                "The process that worked on this has died; nothing came of it."
+            ) from error
+        finally:
+            self._busy.discard(worker)
+            if finished:
+                self._idle.append(worker)
+            else:
+                worker.kill()
+        return reply
+
+    async def warm(self) -> None:
+        """Have a worker ready."""
+        if not self._idle and not self._busy:
+            self._idle.append(await self._hired())
+
+    async def _hired(self) -> "_Worker":
+        try:
+            with anyio.fail_after(_START_S):
+                return await to_thread.run_sync(
+                    _Worker.born,
+                    self._name,
+                    self._nice,
+                    self._preloaded,
+                    abandon_on_cancel=True,
+                    limiter=self._threads,
+                )
+        except (OSError, EOFError, TimeoutError) as error:
+            raise Crashed(f"No process can be started to work on this: {error!r}.") from error
+
+    def close(self) -> None:
+        """Let all of them go."""
+        for worker in (*self._idle, *self._busy):
+            worker.kill()
+        self._idle.clear()
+
+
+@asynccontextmanager
+async def kept_warm(*lanes: Lane) -> AsyncIterator[None]:
+    """Workers for these lanes, as long as you are inside. The first ones are made meanwhile."""
+    tasks = [asyncio.create_task(_keep_warm(lane)) for lane in lanes]
+    try:
+        yield
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
+        for lane in lanes:
+            lane.close()
+
+
+async def _keep_warm(lane: Lane) -> None:
+    """Whoever comes next shall not have to wait for a worker to be made."""
+    while True:
+        try:
+            await lane.warm()
+        except Crashed as error:
+            log.error("%s", error.detail)
+        await anyio.sleep(0.5)
+
+
+class _Worker:
+    """A process, as whoever asks it sees it."""
+
+    def __init__(self, process: ForkServerProcess, wire: Connection) -> None:
+        self._process = process
+        self._wire = wire
+
+    @classmethod
+    def born(cls, name: str, nice: int, preloaded: Sequence[str]) -> "_Worker":
+        """Start one. Takes milliseconds, but for the first."""
+        ours, theirs = wire()
+        process = child(serve, theirs, name=name, nice=nice, preloaded=preloaded)
+        theirs.close()
+        return cls(process, ours)
+
+    @property
+    def lives(self) -> bool:
+        """Whether it has not died meanwhile, for want of memory say."""
+        return self._process.is_alive()
+
+    def asked(self, request: bytes) -> bytes:
+        """Have one thing done. Raises OSError, EOFError when the process has died."""
+        self._wire.send_bytes(request)
+        return self._wire.recv_bytes()
+
+    def kill(self) -> None:
+        """End it, whatever it does. Who waits for it learns at once."""
+        if self._process.is_alive():  # a number that has been given back may be somebody else's
+            self._process.kill()
+        # Its thread may still read from the wire: that ends by itself, since the other end is closed.

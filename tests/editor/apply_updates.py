@@ -1,0 +1,56 @@
+"""What the scanner lets pass, fed to the CRDT library in a process of its own that may die of it.
+
+`python -m editor.devour` reads lines of hexadecimal updates; for each it prints `ready N` first and
+then what became of it: `taken`, `refused`, `panicked`, and the milliseconds and megabytes it cost.
+"""
+
+import resource
+import sys
+import time
+
+from pycrdt import Map
+
+from action_assistant.editor.crdt.messages import Malformed
+from action_assistant.editor.crdt.replica import Panicked, Replica
+from action_assistant.editor.documents import document
+
+
+def fate(base: bytes, update: bytes) -> str:
+    """What becomes of an update in a document like the room's, and of everything done with it."""
+    replica = Replica()
+    replica.take(base, "ada")
+    try:
+        replica.take(update, "ada")
+        document.maps_of(replica.doc)
+        state = replica.doc.get_update()
+        replica.lacking(b"\x00")
+        copy = Replica()
+        copy.take(state, "ada")
+        things = copy.doc.get("things", type=Map)
+        for key in list(things.keys()):
+            del things[key]
+        copy.close()
+    except Malformed:
+        return "refused"
+    except Panicked:
+        return "panicked"
+    finally:
+        replica.close()
+    return "taken"
+
+
+def main() -> None:
+    base = bytes.fromhex(sys.stdin.readline())
+    for n, line in enumerate(sys.stdin):
+        sys.stdout.write(f"ready {n}\n")
+        sys.stdout.flush()
+        begun, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        found = fate(base, bytes.fromhex(line))
+        spent = (time.process_time() - begun) * 1000
+        grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+        sys.stdout.write(f"{found} {spent:.1f} {grown:.1f}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

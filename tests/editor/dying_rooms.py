@@ -1,0 +1,162 @@
+"""Rooms on a real journal in small processes that die where they are told to.
+
+`python -m editor.dying_rooms FOLDER` reads lines `STREAM POINT COUNT`, and for each forks a process that
+serves the room of STREAM on FOLDER/socket and kills itself with SIGKILL when it passes POINT for the
+COUNT-th time. It prints the number of each process, then `dead`. The product knows nothing of this.
+"""
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.rooms.member import Member
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.room import Room
+from action_assistant.journal.events import nothing
+from action_assistant.journal.journal import Journal
+from action_assistant.journal.sqlite import SqliteSession
+from action_assistant.web.auth.keys import Person
+
+#: Where a process can die, as an edit passes through.
+POINTS: Final = (
+    "before the edit is applied",
+    "before the append",
+    "within the transaction",
+    "before the commit",
+    "after the commit",
+    "before the broadcast",
+    "within the broadcast",
+    "before the acknowledgement",
+    "after the acknowledgement",
+)
+NOWHERE: Final = "nowhere"
+
+
+class Trap:
+    """Springs when a point has been passed so many times."""
+
+    def __init__(self, point: str, count: int) -> None:
+        self._point = point
+        self._left = count
+
+    def passes(self, point: str) -> None:
+        if point == self._point:
+            self._left -= 1
+            if self._left == 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    def around(
+        self, owner: Any, name: str, before: str | None = None, after: str | None = None
+    ) -> None:
+        """Pass a point before or after a method of a class."""
+        method: Callable[..., Any] = getattr(owner, name)
+
+        def trapped(*arguments: Any, **named: Any) -> Any:
+            if before is not None:
+                self.passes(before)
+            result = method(*arguments, **named)
+            if after is not None:
+                self.passes(after)
+            return result
+
+        setattr(owner, name, trapped)
+
+    def set(self) -> None:
+        """Put it into the way of every edit."""
+        self.around(Room, "_take", before="before the edit is applied")
+        self.around(Journal, "append", before="before the append")
+        self.around(SqliteSession, "store", after="after the commit")
+        self.around(Room, "_tell", before="before the broadcast")
+        self.around(Member, "post", after="within the broadcast")
+        self.around(Member, "post_ack", before="before the acknowledgement")
+        original = SqliteSession.__init__
+
+        def opened(session: Any, *arguments: Any) -> None:
+            original(session, *arguments)
+            session._raw.set_trace_callback(self._said)
+
+        SqliteSession.__init__ = opened  # type: ignore[method-assign]
+
+    def _said(self, statement: str) -> None:
+        if statement.startswith("INSERT INTO event"):
+            self.passes("within the transaction")
+        if statement == "COMMIT":
+            self.passes("before the commit")
+
+
+class Pipe:
+    """Frames over a stream: the length, then the bytes."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader = reader
+        self._writer = writer
+
+    async def receive_bytes(self) -> bytes:
+        size = int.from_bytes(await self._reader.readexactly(4), "big")
+        return await self._reader.readexactly(size)
+
+    async def send_bytes(self, frame: bytes) -> None:
+        self._writer.write(len(frame).to_bytes(4, "big") + frame)
+        await self._writer.drain()
+
+    def close(self) -> None:
+        self._writer.close()
+
+
+async def serve(folder: Path, stream: str, trap: Trap) -> None:
+    """Until killed."""
+    journal = await Journal.open(f"sqlite:///{folder / 'editor.db'}", branch="editor", fold=nothing)
+    rooms = Rooms(journal)
+
+    async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        pipe = Pipe(reader, writer)
+        name = (await pipe.receive_bytes()).decode()
+        member = Member(Person(name, name), acks=True)
+        async with rooms.enter(stream) as room:
+            room.join(member)
+            speaking = asyncio.create_task(_speak(pipe, member, trap))
+            with contextlib.suppress(asyncio.IncompleteReadError, ConnectionError):
+                while message := messages.parse(await pipe.receive_bytes()):
+                    room.hear(member, message)
+                    await member.until_heard()
+            room.leave(member)
+            speaking.cancel()
+
+    server = await asyncio.start_unix_server(talk, folder / "socket.new")
+    (folder / "socket.new").rename(folder / "socket")  # there only when it listens
+    async with server:
+        await server.serve_forever()
+
+
+async def _speak(pipe: Pipe, member: Member, trap: Trap) -> None:
+    while True:
+        for frame in await member.take():
+            await pipe.send_bytes(frame)
+            if frame[0] == messages.ACKS:
+                trap.passes("after the acknowledgement")
+
+
+def main(folder: Path) -> None:
+    for line in sys.stdin:
+        stream, count, point = line.rstrip("\n").split(" ", 2)
+        (folder / "socket").unlink(missing_ok=True)
+        child = os.fork()
+        if child == 0:
+            trap = Trap(point, int(count))
+            trap.set()
+            asyncio.run(serve(folder, stream, trap))
+        sys.stdout.write(f"{child}\n")
+        sys.stdout.flush()
+        _, status = os.waitpid(child, 0)
+        sys.stdout.write("dead\n" if os.WIFSIGNALED(status) else f"ended {status}\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,110 @@
+"""Robots in virtual time that also tell what they hear and know, for tests of the registry."""
+
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+from action_assistant.runner.links.listeners import Listeners
+from action_assistant.runner.links.port import (
+    Answer,
+    Candidate,
+    Command,
+    EngineChanged,
+    EngineLog,
+    EngineState,
+    ForeignCommand,
+    Link,
+    Registration,
+    Report,
+    Standing,
+)
+from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import Action, Graph, Parameter
+from runner.harness import Robot, clock_us, engine
+
+WORK = codec.write_action(Action(key="work", name="Work"))
+
+
+class Open(Robot):
+    """A robot that says more: its index, its texts, who else is there."""
+
+    def __init__(self, script: dict[str, Any] | None = None) -> None:
+        super().__init__(engine(script))
+        self.others = 0
+        self.servers = 1
+        self.known_actions: tuple[str, ...] = (WORK,)
+        self.known_graphs: tuple[str, ...] = ()
+        self.texts: dict[str, str] = {}
+        self._subscribers = Listeners[Report]()
+
+    @property
+    def standing(self) -> Standing:
+        """As the engine stands, and who else is there."""
+        return msgspec.structs.replace(
+            self.engine.standing, others=self.others, servers=self.servers
+        )
+
+    async def get(self) -> Answer:
+        """With the index and the texts."""
+        return msgspec.structs.replace(
+            await super().get(),
+            texts=self.texts,
+            known_actions=self.known_actions,
+            known_graphs=self.known_graphs,
+        )
+
+    def listen(self, hear: Callable[[Report], None]) -> Any:
+        """Everything that `tell` is given."""
+        return self._subscribers.listening(hear)
+
+    def tell(self, report: Report) -> None:
+        """Report something."""
+        self._subscribers.tell(report)
+
+    def command(self, command: Command, graph: str, umrf: str = "") -> None:
+        """Somebody else publishes something."""
+        self.tell(
+            ForeignCommand(at=clock_us(), command=command, graph=graph, umrf=umrf, sender="them")
+        )
+
+    def become(self, state: EngineState, why: str) -> None:
+        """Discovery says that the engine is otherwise."""
+        self.tell(EngineChanged(at=clock_us(), state=state, why=why))
+
+    def log(self, text: str, graph: str | None = None) -> None:
+        """The engine logs a line."""
+        self.tell(EngineLog(at=clock_us(), text=text, graph=graph))
+
+
+class RegisteredRobots:
+    """A reach whose robots are there already, by name."""
+
+    rmw = "rmw_test"
+
+    def __init__(self, **robots: Link) -> None:
+        self.robots = robots
+        self.facts: dict[str, EngineFacts] = {}
+        self.sight: tuple[Candidate, ...] = ()
+
+    def link(self, registration: Registration, facts: EngineFacts) -> Link:
+        """The robot of that name."""
+        self.facts[registration.name] = facts
+        return self.robots[registration.name]
+
+    async def candidates(self) -> tuple[Candidate, ...]:
+        """Whatever is in sight."""
+        return self.sight
+
+    async def aclose(self) -> None:
+        """Nothing is shared."""
+
+
+def given(graph: Graph, name: str) -> Graph:
+    """The graph, each action with a required input that nobody has described."""
+    extra = Parameter(path=name, text='{"pvf_type":"string","pvf_value":"x"}')
+    actions = tuple(
+        msgspec.structs.replace(action, inputs=(*action.inputs, extra)) for action in graph.actions
+    )
+    return msgspec.structs.replace(graph, actions=actions)

@@ -1,0 +1,199 @@
+"""A run that was called stopped and moves again says so, and is stopped until that is proven anew.
+
+An action that takes three seconds to load begins two seconds after the stop was proven: nothing that
+an engine sends could have told. The real runner and stand-in robots, in virtual time.
+"""
+
+import json
+from typing import Any
+
+import anyio
+
+from action_assistant.runner.emulator.messages import EngineTraits
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.runs import queries
+from action_assistant.runner.runs.events import Ended, MovesAgain, Proof, StopSent
+from runner.fake_network import now_ms
+from runner.harness import ANN, BEN, until, virtual
+from runner.robots_in_network import RobotsInNetwork, asked, shown
+
+SLOW = EngineTraits(loading_ms=3_000.0)
+TWO_SECONDS = {"*": [{"after_s": 2.0}]}
+
+
+def scene(**more: Any) -> RobotsInNetwork:
+    return RobotsInNetwork(11, **({"quirks": SLOW, "script": TWO_SECONDS} | more))
+
+
+async def proven_stopped(control: ExecutionService) -> str:
+    """A run that was stopped while its first action was still being loaded."""
+    run = (await control.start(asked(), ANN)).run.id
+    await anyio.sleep(0.3)
+    await control.stop(run, BEN)
+    await until(lambda: run not in control.open)
+    told = await control.find(run)
+    assert (told.state, told.proof_at is not None) == ("stopped", True)
+    return run
+
+
+@virtual
+async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
+    here = scene()
+    async with here.played() as control:
+        run = await proven_stopped(control)
+        first = (await control.find(run)).proof_at
+        await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
+        await anyio.sleep(1.2)
+        told = shown(control, run)
+        assert (told.state, told.proof_at, told.ended_at) == ("stopping", None, None)
+        assert told.moves_again_at is not None
+        assert any("MOVES AGAIN: David shows Work_0" in each.text for each in told.alarms)
+        assert [row.id for row in await here.harness.ledger.query(queries.open_runs())] == [run]
+        await until(lambda: run not in control.open)
+        assert here.nodes["David"].robot.moving == ()
+        told = await control.find(run)
+        assert (told.state, told.moves_again_at) == ("stopped", None)
+        assert told.proof_at is not None
+        assert first is not None
+        assert told.proof_at > first
+    kinds = [type(each) for each in here.harness.ledger.told(run)]
+    again = kinds.index(MovesAgain)
+    assert kinds[again - 1] is Ended
+    assert [kinds.count(each) for each in (MovesAgain, Proof, Ended)] == [1, 2, 2]
+    assert StopSent in kinds[again:]
+    assert here.harness.ledger.history(run) == told
+    (row,) = await here.harness.ledger.query(queries.listed(queries.Filter(), 5))
+    assert (row.state, row.summary["proof_at"]) == ("stopped", told.proof_at)
+    assert [each["code"] for each in row.summary["alarms"]].count("moves_again") == 1
+
+
+@virtual
+async def test_answers_show_it_where_all_feedback_is_lost() -> None:
+    here = scene(quirks=EngineTraits(loading_ms=3_000.0, loss=1.0))
+    async with here.played() as control:
+        run = await proven_stopped(control)
+        await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
+        await until(lambda: run in control.open, patience=1.5)
+
+
+@virtual
+async def test_it_is_said_also_while_nothing_can_be_recorded() -> None:
+    here = scene()
+    async with here.played() as control:
+        run = await proven_stopped(control)
+        here.harness.ledger.down = True
+        await until(lambda: run in control.open)
+        await until(lambda: not control.open[run].recorder.recorded)
+        assert shown(control, run).moves_again_at is not None
+        await until(lambda: shown(control, run).state == "stopped")
+        here.harness.ledger.down = False
+        await until(lambda: run not in control.open)
+        assert here.harness.ledger.history(run) == await control.find(run)
+
+
+@virtual
+async def test_it_is_said_also_where_the_first_end_is_not_recorded_yet() -> None:
+    here = scene()
+    async with here.played() as control:
+        run = (await control.start(asked(), ANN)).run.id
+        await anyio.sleep(0.3)
+        here.harness.ledger.down = True
+        await control.stop(run, BEN)
+        await until(lambda: shown(control, run).state == "stopped")
+        await until(lambda: shown(control, run).moves_again_at is not None)
+        here.harness.ledger.down = False
+        await until(lambda: run not in control.open)
+        assert here.harness.ledger.history(run).state == "stopped"
+    kinds = [type(each) for each in here.harness.ledger.told(run)]
+    assert [kinds.count(each) for each in (MovesAgain, Ended)] == [1, 2]
+
+
+@virtual
+async def test_a_runner_that_was_restarted_meanwhile_stops_it() -> None:
+    here = scene()
+    async with anyio.create_task_group() as wind:
+        wind.start_soon(here.network.blow)
+        async with here.harness.runner() as control:
+            await anyio.sleep(0.5)
+            run = await proven_stopped(control)
+        async with here.harness.runner() as control:
+            await until(lambda: run in control.open)
+            assert shown(control, run).state == "stopping"
+            await until(lambda: run not in control.open)
+            assert (await control.find(run)).state == "stopped"
+        wind.cancel_scope.cancel()
+
+
+@virtual
+async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_one_of_ours() -> (
+    None
+):
+    here = scene()
+    read = here.harness.ledger.read
+
+    async def slowly(*given: Any, **more: Any) -> Any:
+        """A journal on a busy disk."""
+        await anyio.sleep(0.2)
+        return await read(*given, **more)
+
+    async with anyio.create_task_group() as wind:
+        wind.start_soon(here.network.blow)
+        async with here.harness.runner() as control:
+            await anyio.sleep(0.5)
+            run = (await control.start(asked(), ANN)).run.id
+            await until(lambda: "Work_0" in control.open[run].run.active)
+        here.harness.ledger.read = slowly  # type: ignore[method-assign]
+        async with here.harness.runner() as control:
+            await until(lambda: run in control.open)
+            await until(lambda: not control.open[run].run.active)  # the next one is being loaded
+            await control.stop(run, BEN)
+            await until(lambda: run not in control.open)
+            await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
+            await until(lambda: run in control.open, patience=3)
+            await until(lambda: run not in control.open)
+            assert (await control.find(run)).state == "stopped"
+        wind.cancel_scope.cancel()
+
+
+@virtual
+async def test_feedback_that_an_answer_contradicts_opens_nothing() -> None:
+    here = scene(quirks=EngineTraits(), script={"*": [{"never": True}]})
+    async with here.played() as control:
+        run = await proven_stopped(control)
+        _made_up(here)
+        await anyio.sleep(10)
+        assert run not in control.open
+
+
+@virtual
+async def test_feedback_that_nobody_can_contradict_is_believed_until_somebody_does() -> None:
+    here = scene(quirks=EngineTraits(), script={"*": [{"never": True}]})
+    async with here.played() as control:
+        run = await proven_stopped(control)
+        here.nodes["David"].robot.freeze(now_ms())
+        _made_up(here)
+        await until(lambda: run in control.open)
+        await until(lambda: shown(control, run).state == "unknown")
+        here.nodes["David"].robot.thaw(now_ms())
+        here.network.stir(here.nodes["David"])
+        await until(lambda: run not in control.open)
+        assert (await control.find(run)).state == "stopped"
+
+
+@virtual
+async def test_a_start_of_ours_that_somebody_plays_again_is_theirs() -> None:
+    here = scene(quirks=EngineTraits(), script={"*": [{"never": True}]})
+    async with here.played() as control:
+        run = await proven_stopped(control)
+        here.network.carry(here.starts()[0], "bag")
+        await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
+        await anyio.sleep(5)
+        assert run not in control.open
+        assert here.nodes["David"].robot.moving == ("patrol",)  # a Stop of it is asked for by name
+
+
+def _made_up(here: RobotsInNetwork) -> None:
+    """Feedback that shows the run moving, sent by nobody's engine."""
+    graph = json.loads(here.starts()[-1].graph_json) | {"graph_state": "STOPPED"}
+    graph["actions"] = [each | {"state": "RUNNING"} for each in graph["actions"]]
+    here.network.show("David", [json.dumps(graph)])

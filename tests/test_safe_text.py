@@ -1,0 +1,165 @@
+"""What strangers write steers no terminal, and what lets somebody in stands in no log and no list of
+processes."""
+
+import json
+import logging
+import os
+import pty
+import re
+import subprocess
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from action_assistant.safe_text import PrintableLog, one_line, printable
+from action_assistant.web.auth.keys import Keys
+from journal import servers
+from support.product import COMMAND, TOKEN, Product, free_ports
+
+EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202ename"
+_CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
+@given(st.recursive(st.text(), lambda some: st.lists(some) | st.dictionaries(st.text(), some)))
+def test_json_stays_the_same_json_and_steers_nothing(value: object) -> None:
+    shown = printable(json.dumps(value, ensure_ascii=False, indent=1))
+    assert json.loads(shown) == value
+    assert not _CONTROLS.search(shown)
+    shown.encode()
+
+
+def test_a_line_of_a_log_cannot_pretend_to_be_two() -> None:
+    formatted = PrintableLog()
+    record = logging.LogRecord("x", logging.INFO, "", 0, "refused %s", (f"/a\n{EVIL}",), None)
+    shown = formatted.format(record)
+    assert shown.endswith("refused /a\\n" + one_line(EVIL))
+    assert not _CONTROLS.search(shown)
+    try:
+        raise ValueError(f"first\n2026 INFO forged\r{EVIL}")
+    except ValueError as error:
+        raised = (type(error), error, error.__traceback__)
+    record = logging.LogRecord("x", logging.ERROR, "", 0, "failed", (), raised)
+    first, *rest = formatted.format(record).split("\n")
+    assert first.endswith("failed")
+    assert all(line.startswith("    ") for line in rest)
+    assert not _CONTROLS.search("".join(rest))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "/t={token}",
+        "/x?token={token}",
+        "Bearer {token}",
+        "'{token}'",
+        "/api/session/i={link}",
+        "{link}",
+        "aa_8000={cookie}",
+        "postgresql://me:{password}@db/x",
+        "postgresql://me:a/{password}@db/x",
+        "postgresql+psycopg://me:a:/{password}@db/x",
+        "postgresql://me@db/x?password={password}",
+    ],
+)
+def test_no_log_shows_what_lets_somebody_in(text: str, tmp_path: Path) -> None:
+    keys = Keys.of(tmp_path)
+    secret = {
+        "token": keys.token,
+        "link": f"trlQRDEFzMaX.{keys.secret_of('trlQRDEFzMaX')}",
+        "cookie": keys.sealed(keys.new_session("Ada")),
+        "password": "hunter2-and-more",
+    }
+    record = logging.LogRecord(
+        "x", logging.INFO, "", 0, "refused %s", (text.format(**secret),), None
+    )
+    shown = PrintableLog().format(record)
+    for each in secret.values():
+        assert each.rpartition(".")[2] not in shown
+
+
+def test_a_token_that_somebody_chose_is_not_shown_either() -> None:
+    record = logging.LogRecord("x", logging.INFO, "", 0, "at %s", (f"/wrong/{TOKEN}/",), None)
+    assert TOKEN not in PrintableLog(TOKEN).format(record)
+
+
+def test_neither_log_nor_processes_show_secrets_and_nothing_in_them_steers(tmp_path: Path) -> None:
+    flags = ["--share", "--host", "127.0.0.1"]
+    with_postgres = servers.binaries() is not None
+    if with_postgres:
+        with servers.server() as postgres:
+            url = postgres.new_database().replace("aa@", "aa:a/hunter2@")
+            _try_secrets(Product(tmp_path / "data", *flags, "--database", url, hosts="lab.test"))
+    else:
+        _try_secrets(Product(tmp_path / "data", *flags, hosts="lab.test"))
+
+
+def _try_secrets(product: Product) -> None:
+    product.start()
+    try:
+        with product.editor() as editor, product.runner() as runner:
+            name = f"patrol{EVIL}\nforged"
+            editor.post("/api/graphs", json={"name": name}).raise_for_status()
+            link = editor.post("/api/invitations", json={"role": "viewer", "label": "x"}).json()
+            proof = link["path"].removeprefix("/#i=")
+            for client in (editor, runner):
+                for path in ("/%1b[2J%0aINFO forged", f"/t={TOKEN}", f"/i={proof}", "/%C2%9b31m"):
+                    client.get(path, headers={"authorization": ""})
+                client.get("/", headers={"host": "evil\x7f.example"})
+        listed = product.cli("graphs")
+        assert listed.returncode == 0, listed.stderr
+        assert one_line(name) in listed.stdout
+        assert not _CONTROLS.search(listed.stdout)
+        family = psutil.Process(product.process("editor").ppid())
+        for process in (family, *family.children(recursive=True)):
+            arguments = " ".join(process.cmdline())
+            assert not any(word in arguments for word in ("hunter2", TOKEN, proof)), arguments
+        deadline = time.monotonic() + 20
+        while "people list" not in product.log.read_text():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+    finally:
+        product.end()
+    said = product.log.read_text()
+    assert "\\u001b[2J\\nINFO forged" in said
+    assert not _CONTROLS.search(said)
+    for word in ("hunter2", TOKEN, proof.partition(".")[2], "#i=", "#t="):
+        assert word not in said
+    assert TOKEN in (product.data / "open.html").read_text()
+
+
+@pytest.mark.long
+def test_what_prints_an_address_of_a_database_leaves_out_its_password(tmp_path: Path) -> None:
+    for command in ("migrate", "doctor", "verify"):
+        for url in ("postgresql://me:hunter2@127.0.0.1:1/x", "postgresql:/me:hunter2@[/x"):
+            answer = subprocess.run(
+                [*COMMAND, command, "--data", str(tmp_path), "--database", url],
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert answer.returncode != 0
+            assert "hunter2" not in answer.stdout + answer.stderr
+            assert "Traceback" not in answer.stderr
+
+
+def test_at_a_terminal_the_link_is_shown_to_its_owner(tmp_path: Path) -> None:
+    ours, theirs = pty.openpty()
+    port = free_ports()
+    serve = subprocess.Popen(
+        [*COMMAND, "serve", "--no-open", "--data", str(tmp_path / "data"), "--port", str(port)],
+        env={**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN},
+        stderr=theirs,
+    )
+    try:
+        said = ""
+        while f"http://127.0.0.1:{port}/#t={TOKEN}" not in said:
+            said += os.read(ours, 4096).decode()
+    finally:
+        serve.terminate()
+        serve.wait(20)
+        os.close(ours)
+        os.close(theirs)

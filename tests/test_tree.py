@@ -1,0 +1,114 @@
+"""The tree of the server: folders that can be looked over, no circles, one name for one thing."""
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+PACKAGE: Final = "action_assistant"
+SERVER: Final = Path(__file__).parents[1] / "server" / PACKAGE
+MOST: Final = 15  # modules of a folder
+#: Below each of these, packages stand on so many floors at most.
+FLOORS: Final = {"runner": 6, "editor": 6, "web": 6, "umrf": 6}
+#: Class names that stand in several modules, and why they may.
+SHARED: Final[dict[str, str]] = {}
+
+
+def modules() -> dict[str, Path]:
+    """Every module of the server by its dotted name."""
+    found = {}
+    for path in sorted(SERVER.rglob("*.py")):
+        name = ".".join((PACKAGE, *path.relative_to(SERVER).with_suffix("").parts))
+        found[name.removesuffix(".__init__")] = path
+    return found
+
+
+MODULES: Final = modules()
+
+
+def imports(path: Path) -> Iterator[str]:
+    """The modules of ours that one imports, wherever in it; for types alone as well."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (each.name for each in node.names if each.name in MODULES)
+        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+            for each in node.names:
+                deeper = f"{node.module}.{each.name}"
+                yield from (name for name in (deeper, node.module) if name in MODULES)
+
+
+def children(package: str) -> dict[str, set[str]]:
+    """What stands directly in a package, folders as one, and what of it each imports."""
+    found: dict[str, set[str]] = defaultdict(set)
+    inside = f"{package}."
+
+    def child(name: str) -> str:
+        return name.removeprefix(inside).partition(".")[0]
+
+    for name, path in MODULES.items():
+        if not name.startswith(inside):
+            continue
+        own = child(name)
+        found[own] |= {
+            child(each) for each in imports(path) if each.startswith(inside) and child(each) != own
+        }
+    return found
+
+
+def floors(package: str) -> dict[str, int]:
+    """On which floor each child stands: above everything that it imports. Fails for a circle."""
+    graph, found = children(package), dict[str, int]()
+
+    def floor(name: str, above: tuple[str, ...]) -> int:
+        assert name not in above, f"a circle in {package}: {' → '.join([*above, name])}"
+        if name not in found:
+            found[name] = 1 + max((floor(each, (*above, name)) for each in graph[name]), default=0)
+        return found[name]
+
+    for name in list(graph):
+        floor(name, ())
+    return found
+
+
+PACKAGES: Final = sorted(name for name, path in MODULES.items() if path.name == "__init__.py")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_folder_holds_neither_many_modules_nor_one(package: str) -> None:
+    folder = MODULES[package].parent
+    there = [path.stem for path in folder.glob("*.py") if path.stem != "__init__"]
+    below = [path for path in folder.iterdir() if (path / "__init__.py").exists()]
+    assert len(there) <= MOST, f"{len(there)} modules in {package}"
+    assert len(there) != 1 or below, f"{package} has one module: {there}"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_imports_make_no_circles_between_what_stands_in_a_folder(package: str) -> None:
+    floors(package)
+
+
+@pytest.mark.parametrize("package", FLOORS)
+def test_packages_stand_on_few_floors(package: str) -> None:
+    whole = f"{PACKAGE}.{package}"
+    graph = children(whole)
+    folders = {name for name in graph if MODULES[f"{whole}.{name}"].name == "__init__.py"}
+
+    def floor(name: str) -> int:
+        return 1 + max((floor(each) for each in graph[name] & folders), default=0)
+
+    highest = max(folders, key=floor)
+    assert floor(highest) <= FLOORS[package], f"{highest} stands on floor {floor(highest)}"
+
+
+def test_a_class_name_stands_in_one_module() -> None:
+    where = defaultdict(set)
+    for name, path in MODULES.items():
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef):
+                where[node.name].add(name)
+    several = {name: sorted(places) for name, places in where.items() if len(places) > 1}
+    assert {name: at for name, at in several.items() if name not in SHARED} == {}
+    assert set(SHARED) <= set(several), "a reason without a name that needs it"
