@@ -198,7 +198,7 @@ def test_every_document_is_linked_from_the_first_page() -> None:
         ("`editor/nothing.py` does", ["editor/nothing.py"]),
         ("`runner.nothing.follow` does", ["runner.nothing"]),
         ("`tests/nothing/` has it", ["tests/nothing"]),
-        ("`docs/glossary.md`, `umrf/codec.py`, `umrf.codec.read`, `editor.mark`", []),
+        ("`docs/glossary.md`, `umrf/files/codec.py`, `umrf.files.codec.read`, `editor.mark`", []),
     ],
 )
 def test_a_dead_path_is_found(text: str, dead: list[str]) -> None:
