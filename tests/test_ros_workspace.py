@@ -70,7 +70,7 @@ def test_packages_of_a_sourced_environment_never_stand_before_ours(tmp_path: Pat
 
 def test_what_we_start_does_not_see_pythonpath_either(tmp_path: Path) -> None:
     shown = run(
-        "import os, sys; from action_assistant import sourced; sourced.hide();"
+        "import os, sys; from action_assistant import ros_workspace; ros_workspace.hide();"
         "print(os.environ.get('PYTHONPATH'), any('hostile' in each for each in sys.path))",
         {"PYTHONPATH": str(tmp_path / "hostile")},
     )
@@ -80,7 +80,7 @@ def test_what_we_start_does_not_see_pythonpath_either(tmp_path: Path) -> None:
 def test_the_program_itself_may_come_by_pythonpath(tmp_path: Path) -> None:
     server = str(Path(interpreter.__file__).parents[1])
     shown = run(
-        "import os, sys; from action_assistant import sourced; sourced.hide();"
+        "import os, sys; from action_assistant import ros_workspace; ros_workspace.hide();"
         f"print(os.environ.get('PYTHONPATH') == {server!r}, {server!r} in sys.path)",
         {"PYTHONPATH": os.pathsep.join([server, str(tmp_path)])},
     )

@@ -78,6 +78,6 @@ def _survives(rmw: str, environ: Mapping[str, str]) -> bool:
     asked = {**environ, "RMW_IMPLEMENTATION": rmw}
     command = [
         *(sys.executable, "-c"),
-        "from action_assistant import sourced; sourced.offer(); import rclpy",
+        "from action_assistant import ros_workspace; ros_workspace.offer(); import rclpy",
     ]
     return subprocess.run(command, env=asked, capture_output=True, check=False).returncode != 102
