@@ -82,7 +82,7 @@ def here(*arguments: str | Path) -> int:
     parser = argparse.ArgumentParser()
     backup.add_to(parser.add_subparsers())
     options = parser.parse_args(list(map(str, arguments)))
-    code: int = options.deed(options)
+    code: int = options.handler(options)
     return code
 
 

@@ -18,7 +18,7 @@ def run(*arguments: str) -> int:
     parser = argparse.ArgumentParser()
     maintenance.add_to(parser.add_subparsers())
     options = parser.parse_args(arguments)
-    code: int = options.deed(options)
+    code: int = options.handler(options)
     return code
 
 
