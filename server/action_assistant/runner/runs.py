@@ -119,6 +119,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     started_at: int | None = None
     ended_at: int | None = None
     going_at: int = 0  # it was not over at that moment, or any before
+    reopened_at: int = 0  # feedback, which may be old, said then that it was not over after all
     over_at: int | None = None  # nothing of it moved any more when that was seen first
     end: End | None = None
     detail: str = ""

@@ -87,8 +87,8 @@ def _shown(run: "Run", actions: dict[str, ActionRun], item: Snapshot) -> "Run":
 
 
 def _looked_at(run: "Run", looked: int) -> "Run":
-    """Answers have shown it as it was known until now."""
-    if run.over_at is not None or looked <= run.going_at:
+    """Answers have shown it as it was known until now: those that were asked for since."""
+    if run.over_at is not None or looked <= max(run.going_at, run.reopened_at):
         return run
     return replace(run, going_at=looked)
 
@@ -100,7 +100,8 @@ def _timed(run: "Run", at: int, asked: int | None) -> "Run":
         return run if run.over_at is not None else replace(run, over_at=at)
     if run.over_at is None and (asked is None or asked <= run.going_at):
         return run
-    return replace(run, over_at=None, going_at=max(run.going_at, asked or 0))
+    reopened = at if asked is None else run.reopened_at
+    return replace(run, over_at=None, going_at=max(run.going_at, asked or 0), reopened_at=reopened)
 
 
 def names_all(run: "Run", item: Snapshot) -> bool:
