@@ -220,7 +220,8 @@ async def test_an_update_that_would_hold_the_process_up_is_refused_to_its_sender
 ) -> None:
     async def bring() -> None:
         async with editor.socket(graph) as session:
-            await session.send_bytes(messages.change(at_once(12_000)))
+            # Three times what may be; two fifths of what ends the process that tries it.
+            await session.send_bytes(messages.change(at_once(16_000)))
             assert await closed(session, 60) == messages.TOO_BIG
 
     await bring()

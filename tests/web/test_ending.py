@@ -4,12 +4,14 @@ import contextlib
 import itertools
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import httpx
 import pytest
 
 from action_assistant.errors import NotFound, Unavailable
+from action_assistant.web.auth import sessions
 from action_assistant.web.auth.keys import Keys, Session
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.session_files import SessionFiles
@@ -219,6 +221,16 @@ def test_a_mark_that_cannot_be_written_holds_here_and_says_so(tmp_path: Path) ->
     revoked.write_again()
     assert Revocations(tmp_path).ends(session)
     assert Revocations(tmp_path).every() == {"abc"}
+
+
+async def test_all_sessions_of_a_browser_end_where_nothing_can_be_written(tmp_path: Path) -> None:
+    (tmp_path / "revoked").write_text("no folder")
+    revoked = Revocations(tmp_path)
+    held = [KEYS.new_session("Ada"), KEYS.new_session("Ada")]
+    request: Any = SimpleNamespace(scope={"state": {"sessions": held}})
+    with pytest.raises(Unavailable):
+        await sessions._end(revoked, request)
+    assert all(revoked.ends(each) for each in held)
 
 
 def test_nobody_is_put_out_when_the_disk_is_gone(tmp_path: Path) -> None:

@@ -246,8 +246,14 @@ async def _end(revoked: Revocations, request: _Asking) -> None:
     """Every session that the browser of whoever asks holds, also those that have expired. Raises
     Unavailable."""
     sessions: list[Session] = request.scope["state"].get("sessions", [])
+    unwritten: Unavailable | None = None
     for each in dict.fromkeys(session.id for session in sessions):
-        await to_thread.run_sync(revoked.end, each)
+        try:
+            await to_thread.run_sync(revoked.end, each)
+        except Unavailable as error:  # it holds here; so shall the others
+            unwritten = error
+    if unwritten is not None:
+        raise unwritten
 
 
 async def _invited(
