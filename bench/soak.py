@@ -57,7 +57,7 @@ PARTS: Final[dict[str, Part]] = {
     "mutants": Part(
         "1,000,000 mutated updates against the scanner",
         {"TEST_MUTANTS": "1000000"},
-        ("tests/editor/test_scan_fuzz.py",),
+        ("tests/editor/crdt/test_scan_fuzz.py",),
     ),
     "files": Part(
         "10,000 generated files through every reader",
@@ -79,15 +79,15 @@ PARTS: Final[dict[str, Part]] = {
         },
         (
             "-s",
-            "tests/runner/test_false_confirmations.py",
-            "tests/runner/test_stops_and_starts.py",
+            "tests/runner/stop/test_false_confirmations.py",
+            "tests/runner/stop/test_stops_and_starts.py",
             "tests/test_stop_latency.py",
         ),
     ),
     "archives": Part(
         "kill -9 at every step of putting runs and raw messages into archives",
         {"SOAK_ARCHIVE_EVERY": "1"},
-        ("tests/runner/review/test_retention.py", "-k", "kill"),
+        ("tests/runner/archives/test_retention.py", "-k", "kill"),
     ),
     "long": Part(
         "what CI has no time for: one more product, database or command each",

@@ -9,7 +9,8 @@ from typing import Final
 import pytest
 
 PACKAGE: Final = "action_assistant"
-SERVER: Final = Path(__file__).parents[1] / "server" / PACKAGE
+TESTS: Final = Path(__file__).parent
+SERVER: Final = TESTS.parent / "server" / PACKAGE
 MOST: Final = 15  # modules of a folder
 #: Below each of these, packages stand on so many floors at most.
 FLOORS: Final = {"runner": 6, "editor": 6, "web": 6, "umrf": 6}
@@ -101,6 +102,14 @@ def test_packages_stand_on_few_floors(package: str) -> None:
 
     highest = max(folders, key=floor)
     assert floor(highest) <= FLOORS[package], f"{highest} stands on floor {floor(highest)}"
+
+
+def test_folders_of_tests_mirror_those_of_the_server() -> None:
+    folders = {path.parent.relative_to(TESTS) for path in TESTS.rglob("test_*.py")}
+    mirrored = {each for each in folders if each.parts and (SERVER / each.parts[0]).is_dir()}
+    assert {str(each) for each in mirrored if not (SERVER / each / "__init__.py").exists()} == set()
+    for folder in mirrored:
+        assert len(list((TESTS / folder).glob("test_*.py"))) <= MOST, f"many tests in {folder}"
 
 
 def test_a_class_name_stands_in_one_module() -> None:

@@ -14,7 +14,7 @@ from action_assistant.commands.token_proof import AfterProof
 from action_assistant.errors import CannotStart
 from action_assistant.web.auth.keys import Keys
 from support.product import TOKEN, Product
-from web.test_access import KEYS, served
+from web.auth.test_access import KEYS, served
 
 
 class Stranger:

@@ -19,8 +19,8 @@ from pycrdt import Doc, Map
 from action_assistant.editor.crdt import messages
 from action_assistant.web.network.connection_limits import AT_ONCE, OF_A_PERSON
 from editor import forged_updates
+from editor.api.test_sockets import acks, closed, eventually, goodbye, masked, upgraded
 from editor.process import BEARER, Editor, running
-from editor.test_sockets import acks, closed, eventually, goodbye, masked, upgraded
 
 TOGETHER = 1000
 ROUNDS = max(1, int(os.environ.get("TEST_RECONNECTS", "1000")) // TOGETHER)

@@ -13,9 +13,9 @@ from action_assistant.editor.rooms.rate_limits import AT_ONCE, PER_MINUTE, ByteR
 from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import TooLarge
 from action_assistant.journal.journal import Journal
+from editor.api.test_sockets import closed, got
 from editor.client import Client, settle
 from editor.process import Editor
-from editor.test_sockets import closed, got
 
 STREAM = "graph/g"
 

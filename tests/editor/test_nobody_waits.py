@@ -14,9 +14,9 @@ from action_assistant.editor.crdt import document_quota, messages, trial
 from action_assistant.editor.interchange import importing
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import TooLarge
+from editor.api.test_sockets import closed
 from editor.client import Client, settle
 from editor.process import BEARER, Editor
-from editor.test_sockets import closed
 
 Body = dict[str, Any]
 

@@ -28,7 +28,7 @@ from action_assistant.runner.runs.events import Ended, Observed, Published, enco
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.settings import Keep
-from runner.test_runs import REQUESTED
+from runner.runs.test_runs import REQUESTED
 
 DAY_US: Final = 86_400_000_000
 NOW: Final = 100 * DAY_US

@@ -1,0 +1,87 @@
+"""What the list of graphs says of each: robots, labels, and who is in it now."""
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import httpx
+from hypothesis import given
+from hypothesis import strategies as st
+
+from action_assistant.editor.app import open_services
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.documents.contents import labels_of
+from action_assistant.editor.log.graph_events import graph_stream
+from action_assistant.settings import EditorSettings
+from action_assistant.umrf.model import Graph
+from action_assistant.web.workers.lanes import GaveUp
+from editor.api.test_api import NAV
+from editor.client import Client
+
+texts = st.one_of(st.text(max_size=8), st.none(), st.integers())
+
+
+def test_robots_and_labels_are_those_of_the_file(http: httpx.Client) -> None:
+    actions = [
+        {**action, "actor": robot} for action, robot in zip(NAV["actions"], "ba", strict=True)
+    ]
+    attributes = {"labels": ["night", "night", " demo "], "zoom": 1.50}
+    body = {**NAV, "actions": actions, "gui_attributes": attributes}
+    made = http.post("/api/graphs", json=body).json()
+    assert (made["robots"], made["labels"]) == (["a", "b"], ["night", "demo"])
+    (listed,) = [each for each in http.get("/api/graphs").json() if each["id"] == made["id"]]
+    assert (listed["robots"], listed["labels"]) == (["a", "b"], ["night", "demo"])
+    again = http.get(f"/api/graphs/{made['id']}/umrf").json()
+    assert again["gui_attributes"]["labels"] == attributes["labels"]
+
+
+@given(st.one_of(st.lists(texts), texts, st.dictionaries(st.text(max_size=3), texts)))
+def test_labels_that_are_none_are_left_out(value: object) -> None:
+    attributes = json.dumps({"labels": value})
+    labels = labels_of(Graph(name="g", extra=(("gui_attributes", attributes),)))
+    assert all(label.strip() == label and label for label in labels)
+    assert len(set(labels)) == len(labels) <= 20
+
+
+async def test_the_list_says_who_is_in_a_graph_now(tmp_path: Path) -> None:
+    settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
+    async with open_services(settings) as services:
+        made, _ = await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
+        async with services.rooms.enter(graph_stream(made.id)) as room:
+            here = [Client("mari"), Client("ada"), Client("ada")]
+            for number, client in enumerate(here, start=1):
+                client.join(room)
+                client.deliver(messages.presence([messages.PresenceEntry(number, 1, b"{}")]))
+            await asyncio.sleep(0)
+            view = await services.catalogue.get(made.id)
+            assert [person.name for person in view.people] == ["Ada", "Mari"]
+            here[0].leave()
+            view = await services.catalogue.get(made.id)
+            assert [person.name for person in view.people] == ["Ada"]
+            for client in here[1:]:
+                client.leave()
+        assert (await services.catalogue.get(made.id)).people == ()
+
+
+async def test_a_graph_of_which_nothing_can_be_found_out_stays_in_the_list_with_the_others(
+    tmp_path: Path,
+) -> None:
+    settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
+    async with open_services(settings) as services:
+        made, _ = await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
+        others = {view.id for view in await services.catalogue.all()} - {made.id}
+    async with open_services(settings) as services:
+        asked = services.graph_reader._run_in_worker
+
+        async def ask(work: Any, *values: Any) -> Any:
+            if getattr(values[0], "graph", "") == made.id:
+                raise GaveUp("This took longer than it may.")
+            return await asked(work, *values)
+
+        services.graph_reader._run_in_worker = ask
+        views = {view.id: view for view in await services.catalogue.all()}
+        assert views.keys() == others | {made.id}
+        assert (views[made.id].name, views[made.id].problems) == (made.name, None)
+        assert all(views[other].problems is not None for other in others)
+        assert made.id.encode() not in await services.library.all()

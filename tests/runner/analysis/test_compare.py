@@ -1,0 +1,134 @@
+"""Two runs are compared visit by visit, and part where they first differ."""
+
+from typing import Any
+
+import msgspec
+
+from action_assistant.runner.analysis.comparison import compare
+from action_assistant.runner.links.observations import NodeResult, NodeState
+from action_assistant.runner.runs.events import Ended, Observed, Published
+from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.run import Run
+from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import Graph, Parameter
+from runner.harness import sequence
+from runner.runs.test_runs import REQUESTED
+
+PLAN = sequence(actions=2)
+
+
+def went(
+    number: int, *course: tuple[str, str], graph: Graph = PLAN, **more: Any
+) -> tuple[Run, str]:
+    """A run in which these actions ended so, one second each; `-` for one that has no end."""
+    umrf = codec.write(graph)
+    events: list[Any] = [
+        msgspec.structs.replace(
+            REQUESTED,
+            run=f"r{number}",
+            number=number,
+            graph_name=graph.name,
+            digest=digest(graph),
+            actions={each.full_name: each.key for each in graph.actions},
+            umrf=umrf,
+        ),
+        Published(1_000_000, "life"),
+    ]
+    at = 1_000_000
+    for name, result in course:
+        events.append(Observed(at, (NodeState(at, graph.name, name, "RUNNING"),)))
+        at += more.get(name, 1_000_000)
+        if result != "-":
+            said = more.get("said") if result == "error" else None
+            ended = (
+                NodeResult(at, graph.name, name, f"on_{result}", said),
+                NodeState(at, graph.name, name, "FINISHED"),
+            )
+            events.append(Observed(at, ended))
+    events.append(Ended(at, more.get("end", "finished"), "on_true"))
+    run = replay(events)
+    assert run is not None
+    return run, umrf
+
+
+def compared(a: tuple[Run, str], b: tuple[Run, str]) -> Any:
+    return compare(a[0], b[0], a[1], b[1])
+
+
+GOOD = went(1, ("Work_0", "true"), ("Work_1", "true"))
+
+
+def test_runs_that_went_alike_do_not_part() -> None:
+    found = compared(GOOD, went(2, ("Work_0", "true"), ("Work_1", "true")))
+    assert found.parting is None
+    assert found.text == "Every visit ended the same."
+    assert found.same_graph
+
+
+def test_the_parting_is_the_first_visit_with_another_result_and_what_was_said() -> None:
+    bad = went(2, ("Work_0", "true"), ("Work_1", "error"), said="gripper jammed")
+    found = compared(GOOD, bad)
+    assert found.parting is not None
+    assert (found.parting.step.action, found.parting.step.visit) == ("Work_1", 1)
+    assert found.parting.messages_b == ["gripper jammed"]
+    assert found.text == "1 step was alike; then Work_1: true in run 1, error in run 2."
+
+
+def test_an_action_that_only_one_run_reached_is_where_they_part() -> None:
+    found = compared(GOOD, went(2, ("Work_0", "true")))
+    assert found.parting is not None
+    assert found.parting.step.relation == "only_a"
+    assert "never run in run 2" in found.text
+
+
+def test_a_result_that_nobody_saw_is_no_difference_yet_is_said() -> None:
+    found = compared(GOOD, went(2, ("Work_0", "true"), ("Work_1", "-"), end="lost"))
+    assert found.parting is None
+    assert "not known" in found.text
+
+
+def test_a_changed_parameter_is_named() -> None:
+    value = '{"pvf_type": "number", "pvf_value": %s}'
+    plans = [
+        msgspec.structs.replace(
+            PLAN,
+            actions=(
+                msgspec.structs.replace(
+                    PLAN.actions[0], inputs=(Parameter("speed", value % speed),)
+                ),
+                PLAN.actions[1],
+            ),
+        )
+        for speed in ("0.2", "0.9")
+    ]
+    found = compared(
+        went(1, ("Work_0", "true"), graph=plans[0]), went(2, ("Work_0", "true"), graph=plans[1])
+    )
+    assert not found.same_graph
+    (change,) = found.parameters
+    assert change.name == "Work_0"
+    assert [field.field for field in change.fields] == ["in/speed"]
+
+
+def test_a_renamed_action_is_compared_with_itself() -> None:
+    renamed = msgspec.structs.replace(
+        PLAN,
+        actions=(msgspec.structs.replace(PLAN.actions[0], name="Job"), PLAN.actions[1]),
+    )
+    found = compared(GOOD, went(2, ("Job_0", "true"), ("Work_1", "true"), graph=renamed))
+    assert found.parting is None
+    assert not found.same_graph
+
+
+def test_the_slower_run_of_a_step_is_named() -> None:
+    slow = went(2, ("Work_0", "true"), ("Work_1", "true"), Work_0=4_000_000)
+    found = compared(GOOD, slow)
+    assert [step.slower for step in found.steps] == ["b", None]
+
+
+def test_comparing_is_total_for_graphs_of_different_names() -> None:
+    other = sequence("cleaning", 1)
+    found = compared(GOOD, went(2, ("Work_0", "false"), graph=other))
+    assert found.parting is not None
+    assert not found.same_graph

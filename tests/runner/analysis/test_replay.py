@@ -1,0 +1,174 @@
+"""A film shows at every moment exactly what was known then."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import anyio
+import msgspec
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from action_assistant.journal.events import Draft
+from action_assistant.runner.analysis.keyframes import APART, KeyframeStore
+from action_assistant.runner.analysis.replay import ReplayFrame, RunReplay, run_replay
+from action_assistant.runner.links.observations import NodeResult, NodeState, Seen, Snapshot
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import (
+    Author,
+    Ended,
+    Observed,
+    RunEvent,
+    StopRequested,
+    encode,
+)
+from action_assistant.runner.runs.fold import replay
+from runner.harness import MemoryLedger, at_once, virtual
+from runner.runs.test_runs import STARTED
+
+STATES = ("UNINITIALIZED", "RUNNING", "STOPPING", "FINISHED", "ERROR", "PAUSED")
+NODES = ("Go_0", "Grip_0", "Sub__Go__0")
+
+node_states = st.builds(
+    lambda node, state: lambda at: NodeState(at, "patrol", node, state),
+    st.sampled_from(NODES),
+    st.sampled_from(STATES),
+)
+results = st.builds(
+    lambda node, result, said: lambda at: NodeResult(at, "patrol", node, result, said),
+    st.sampled_from(NODES),
+    st.sampled_from(["on_true", "on_false", "on_error"]),
+    st.sampled_from([None, "jammed", "no way"]),
+)
+snapshots = st.builds(
+    lambda nodes: (
+        lambda at: Snapshot(
+            at=at, graph="patrol", state="RUNNING", nodes=nodes, run="r1", since=at - 50
+        )
+    ),
+    st.dictionaries(st.sampled_from(NODES), st.sampled_from(STATES), max_size=3),
+)
+batches = st.lists(st.lists(st.one_of(node_states, results, snapshots), max_size=4), max_size=30)
+
+
+def told(drawn: Sequence[Sequence[Any]]) -> list[RunEvent]:
+    """A run of which this was seen, one batch a millisecond."""
+    events = list(STARTED)
+    for i, batch in enumerate(drawn):
+        at = 2_000 + i * 1_000
+        seen: tuple[Seen, ...] = tuple(make(at) for make in batch)
+        events.append(Observed(at, seen))
+    end = 3_000 + len(drawn) * 1_000
+    return [*events, StopRequested(end, Author("b", "Ben")), Ended(end + 1, "stopped", None, "so")]
+
+
+async def stored(events: Sequence[RunEvent]) -> MemoryLedger:
+    ledger = MemoryLedger()
+    drafts = [Draft(each.kind, "x", encode(each)) for each in events]
+    await ledger.append("run/r1", drafts)
+    return ledger
+
+
+def played(run_replay: RunReplay, upto: int) -> dict[str, Any]:
+    """The run as the page draws it after the event `upto`: base, then frames."""
+    shown: dict[str, Any] = {"head": {}, "actions": {}}
+    if run_replay.base is not None:
+        built = msgspec.to_builtins(run_replay.base)
+        shown["head"] = built
+        shown["actions"] = {
+            name: {"state": action["state"], "older": action["older"], "visits": action["visits"]}
+            for name, action in built["actions"].items()
+        }
+    for frame in run_replay.frames:
+        if frame.seq <= upto:
+            _apply(shown, frame)
+    return shown
+
+
+def _apply(shown: dict[str, Any], frame: ReplayFrame) -> None:
+    built = msgspec.to_builtins(frame)
+    shown["head"] |= built.get("head", {})
+    for name, change in built.get("actions", {}).items():
+        action = shown["actions"].setdefault(name, {"state": "", "older": 0, "visits": []})
+        action["state"] = change["state"]
+        del action["visits"][change["first"] - action["older"] :]
+        action["visits"] += change.get("visits", [])
+
+
+@settings(deadline=None, max_examples=60)
+@given(batches)
+def test_replay_at_any_event_equals_the_fold_of_the_events_up_to_it(drawn: Any) -> None:
+    events = told(drawn)
+
+    async def main() -> None:
+        keyframe_store = KeyframeStore(await stored(events), at_once)
+        keyframes = await run_replay(keyframe_store, "r1", after=0)
+        assert [frame.seq for frame in keyframes.frames] == list(range(1, len(events) + 1))
+        for upto in range(1, len(events) + 1):
+            run = replay(events[:upto])
+            assert run is not None
+            whole = msgspec.to_builtins(views.shown(run))
+            shown = played(keyframes, upto)
+            assert shown["head"]["state"] == whole["state"]
+            assert shown["head"].get("unknown_since") == whole["unknown_since"]
+            assert shown["head"].get("ended_at") == whole["ended_at"]
+            for name, action in whole["actions"].items():
+                assert shown["actions"][name]["state"] == action["state"]
+                assert shown["actions"][name]["visits"][-20:] == action["visits"][-20:]
+
+    anyio.run(main)
+
+
+def long_run(events: int) -> list[RunEvent]:
+    states = ("RUNNING", "FINISHED")
+    ticks = [
+        Observed(2_000 + i, (NodeState(2_000 + i, "patrol", "Go_0", states[i % 2]),))
+        for i in range(events)
+    ]
+    return [*STARTED, *ticks, Ended(9_000_000, "finished", "on_true")]
+
+
+@virtual
+async def test_the_pages_of_a_long_film_join_without_a_gap() -> None:
+    events = long_run(2 * APART + 10)
+    keyframe_store = KeyframeStore(await stored(events), at_once)
+    first = await run_replay(keyframe_store, "r1", after=0)
+    second = await run_replay(keyframe_store, "r1", after=APART + 5)
+    third = await run_replay(keyframe_store, "r1", after=2 * APART)
+    assert [chapter.after for chapter in first.chapters] == [0, APART, 2 * APART]
+    assert (first.after, second.after, third.after) == (0, APART, 2 * APART)
+    seqs = [frame.seq for page in (first, second, third) for frame in page.frames]
+    assert seqs == list(range(1, len(events) + 1))
+    run = replay(events[:APART])
+    assert run is not None
+    assert second.base == views.shown(run)
+
+
+@virtual
+async def test_keyframes_are_a_cache_that_may_vanish_or_be_of_another_fold() -> None:
+    events = long_run(APART + 700)
+    ledger = await stored(events)
+    whole = await KeyframeStore(ledger, at_once).keyframes("r1")
+    assert whole.keys[-1].run == replay(events)
+    assert ledger.snapshots
+    again = await KeyframeStore(ledger, at_once).keyframes("r1")  # from the cache
+    assert again == whole
+    other = msgspec.structs.replace(whole, fold=-1)
+    await ledger.keep_snapshot("run/r1", whole.keys[-1].seq, msgspec.msgpack.encode(other))
+    assert await KeyframeStore(ledger, at_once).keyframes("r1") == whole
+    await ledger.keep_snapshot("run/r1", whole.keys[-1].seq, b"nonsense")
+    assert await KeyframeStore(ledger, at_once).keyframes("r1") == whole
+
+
+@virtual
+async def test_a_reel_that_was_made_early_goes_on_with_the_run() -> None:
+    events = long_run(APART + 50)
+    ledger = await stored(events[: APART // 2])
+    keyframe_store = KeyframeStore(ledger, at_once)
+    early = await keyframe_store.keyframes("r1")
+    assert early.keys[-1].seq == APART // 2
+    rest = [Draft(each.kind, "x", encode(each)) for each in events[APART // 2 :]]
+    await ledger.append("run/r1", rest)
+    late = await keyframe_store.keyframes("r1")
+    assert late.keys[-1].run == replay(events)
+    run = replay(events[:1234])
+    assert await keyframe_store.at("r1", 1234) == run

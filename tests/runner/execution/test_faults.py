@@ -1,0 +1,172 @@
+"""A fault in one place keeps Stop from nothing: in a link, in what is kept beside runs, in what looks
+back on them. In virtual time."""
+
+from pathlib import Path
+from typing import Any
+
+import anyio
+import pytest
+
+from action_assistant.runner.archives.archive_store import ArchiveStore
+from action_assistant.runner.archives.retention import Retention
+from action_assistant.runner.links.port import Answer, Order
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.robots.recordings import Recordings
+from action_assistant.settings import Keep
+from runner.harness import (
+    ANN,
+    BEN,
+    Harness,
+    at_once,
+    clock_us,
+    order,
+    run_in_virtual_time,
+    sequence,
+    until,
+    virtual,
+)
+from runner.registered_robots import Open
+from runner.robots.test_robots import NEVER, fleet
+
+
+class Faulty(Open):
+    """A robot whose link fails in ways that nobody foresaw."""
+
+    stops_fail = False
+    gets_fail = False
+
+    async def stop(self, graph_name: str) -> None:
+        """The middleware breaks after the message has left."""
+        await super().stop(graph_name)
+        if self.stops_fail:
+            raise RuntimeError("the context is not valid")
+
+    async def get(self) -> Answer:
+        """The middleware breaks before it has asked."""
+        if self.gets_fail:
+            raise RuntimeError("the context is not valid")
+        return await super().get()
+
+
+@virtual
+async def test_a_link_that_breaks_while_it_stops_is_stopped_by_again_and_told_as_unconfirmed() -> (
+    None
+):
+    david = Faulty(NEVER)
+    async with fleet(Harness(), David=david) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await until(lambda: control.open[run.id].run.state == "running")
+        david.stops_fail, david.loss = True, 1.0
+        await control.stop(run.id, BEN)
+        await anyio.sleep(10)
+        told = control.open[run.id].run
+        assert len(david.stops) > 5
+        assert any("not valid" in each.text for each in told.alarms if "unconf" in each.code)
+        david.stops_fail, david.loss = False, 0.0
+        await until(lambda: not control.open)
+        assert (await control.find(run.id)).state == "stopped"
+
+
+@virtual
+async def test_a_link_that_breaks_when_it_asks_leaves_the_run_unknown() -> None:
+    david = Faulty(NEVER)
+    async with fleet(Harness(), David=david) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await until(lambda: control.open[run.id].run.state == "running")
+        david.gets_fail = True
+        await anyio.sleep(10)
+        assert control.open[run.id].run.state == "unknown"
+        assert control.robots.robot("David").state == "busy"
+        david.gets_fail = False
+        await until(lambda: control.open[run.id].run.state == "running")
+
+
+@pytest.mark.parametrize("fault", ["stops_fail", "gets_fail"])
+def test_a_link_that_breaks_while_a_graph_of_somebody_else_is_stopped_ends_nothing(
+    fault: str,
+) -> None:
+    @virtual
+    async def lived() -> None:
+        david, eve = Faulty(NEVER), Open(NEVER)
+        async with fleet(Harness(), David=david, Eve=eve) as control:
+            run = (await control.start(order(sequence(), engine="Eve"), ANN)).run
+            await david.engine.start(Order(run="theirs", graph=sequence("cleaning"), umrf=""))
+            await anyio.sleep(15)
+            setattr(david, fault, True)
+            control.stop_robot("David", BEN)
+            await anyio.sleep(10)
+            assert control.robots.foreign_stops.trouble("David", "cleaning")
+            assert control.open[run.id].run.state == "running"
+            setattr(david, fault, False)
+            await until(lambda: not control.robots.foreign_stops.going("David"))
+            assert not await david.moving("cleaning")
+
+    lived()
+
+
+def test_a_file_that_somebody_put_beside_recordings_ends_nothing(tmp_path: Path) -> None:
+    (tmp_path / "David").mkdir()
+    (tmp_path / "David" / "2026-11-21T10 (copy).jsonl.gz").write_bytes(b"")
+
+    async def live() -> None:
+        recordings = Recordings(tmp_path, at_once)
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(recordings.run)
+            for at in (1, 2):
+                said = Answer(
+                    asked_at=at, at=at, incarnation="life", graphs=(), texts={"a": f"{at}"}
+                )
+                recordings.heard("David", said)
+                await anyio.sleep(5)
+            tasks.cancel_scope.cancel()
+        assert len(await recordings.listed("David")) == 2
+        assert (tmp_path / "David" / "2026-11-21T10 (copy).jsonl.gz").exists()
+
+    run_in_virtual_time(live)
+
+
+def test_a_recording_that_cannot_be_looked_at_does_not_end_what_puts_old_ones_away(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "recordings" / "David").mkdir(parents=True)
+    (tmp_path / "recordings" / "David" / "2026-11-21T10.jsonl.gz").symlink_to("nowhere")
+
+    async def live() -> None:
+        retention = Retention(
+            Harness().ledger,  # type: ignore[arg-type] - nothing of it is asked
+            Recordings(tmp_path / "recordings", at_once),
+            Keep(folder=tmp_path, raw=1),
+            is_open=lambda _: False,
+            clock_us=clock_us,
+            run_in_worker=at_once,
+        )
+        retention._left_over = False
+        with anyio.move_on_after(3 * 3_600) as waited:
+            await retention.run()
+        assert waited.cancelled_caught
+        assert "nowhere" in caplog.text or "No such file" in caplog.text
+
+    run_in_virtual_time(live)
+
+
+@virtual
+async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_not() -> None:
+    harness = Harness()
+    async with harness.runner() as control, anyio.create_task_group() as tasks:
+        archive_store = ArchiveStore(harness.ledger, Path("nowhere"), at_once)  # type: ignore[arg-type]
+        review_service = ReviewService(control, archive_store, at_once, clock_us)
+        keyframes, failed = review_service.keyframe_store.keyframes, []
+
+        async def fails_once(run: str) -> Any:
+            if not failed:
+                failed.append(run)
+                raise ZeroDivisionError
+            return await keyframes(run)
+
+        review_service.keyframe_store.keyframes = fails_once  # type: ignore[method-assign]
+        tasks.start_soon(review_service.run)
+        for _ in range(2):
+            run = (await control.start(order(sequence(actions=1)), ANN)).run
+            await until(lambda run=run: run.id not in control.open)
+        await until(lambda: len([each for each in harness.ledger.streams if "about/" in each]) == 2)
+        tasks.cancel_scope.cancel()
