@@ -48,44 +48,39 @@ const LETTERS: Readonly<Record<string, Precondition>> = {
   s: "on_stopped",
 };
 
+const STEPS: Record<string, number> = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
+
 function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) {
   const row = useRef<HTMLDivElement>(null);
-  const pick = useRef(onPick);
-  pick.current = onPick;
+  const [at, setAt] = useState(0);
+  const press = useRef<(event: KeyboardEvent) => boolean>(() => false);
+  press.current = ({ key }) => {
+    const chosen = LETTERS[key.toLowerCase()];
+    const step = STEPS[key];
+    if (chosen) onPick(chosen);
+    else if (step) setAt((at + step + OUTCOMES.length) % OUTCOMES.length);
+    return Boolean(chosen || step);
+  };
   // Heard at once, also before the dialog has the focus: people type faster than it opens.
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
-      const chosen = LETTERS[event.key.toLowerCase()];
-      if (!chosen || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.ctrlKey || event.metaKey || event.altKey || !press.current(event)) return;
       event.preventDefault();
       event.stopPropagation();
-      pick.current(chosen);
     };
     window.addEventListener("keydown", onKey, { capture: true });
     return () => window.removeEventListener("keydown", onKey, { capture: true });
   }, []);
-  const onKeyDown = (event: React.KeyboardEvent) => {
-    const buttons = [...(row.current?.querySelectorAll("button") ?? [])];
-    const at = buttons.indexOf(document.activeElement as HTMLButtonElement);
-    const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
-    if (step) buttons[(at + step + buttons.length) % buttons.length]?.focus();
-    else return;
-    event.preventDefault();
-    event.stopPropagation();
-  };
+  useEffect(() => row.current?.querySelectorAll("button")[at]?.focus(), [at]);
   return (
     // biome-ignore lint/a11y/useSemanticElements: a fieldset cannot be laid out as a row everywhere
-    <div
-      ref={row}
-      role="group"
-      aria-label="Outcome"
-      className={style.outcomes}
-      onKeyDown={onKeyDown}
-    >
+    <div ref={row} role="group" aria-label="Outcome" className={style.outcomes}>
       {OUTCOMES.map((outcome, i) => (
         <Button
           key={outcome}
-          data-autofocus={i === 0 || undefined}
+          // Where the dialog puts the focus once it has opened.
+          data-autofocus={i === at || undefined}
+          onFocus={() => setAt(i)}
           onClick={() => onPick(outcome)}
           leftSection={<OutcomeSign outcome={outcome} />}
           rightSection={<span className={style.digit}>{i + 1}</span>}
