@@ -38,7 +38,7 @@ from action_assistant.settings import reached
 from action_assistant.version import VERSION
 from action_assistant.web.auth.access import REFUSED_SOCKET
 from action_assistant.web.network.certificate import Certificate
-from action_assistant.web.server.listen import bound
+from action_assistant.web.server.sockets import bound
 
 _SIGNS: Final[dict[Verdict, str]] = {"fine": "✓", "note": "·", "wrong": "✗"}
 _SOUND_SQLITE: Final = (3, 51, 3)

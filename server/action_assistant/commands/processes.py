@@ -241,8 +241,8 @@ def _runner(options: argparse.Namespace) -> int:
 
 def _migrate(options: argparse.Namespace) -> int:
     from action_assistant.editor.log import database_location
+    from action_assistant.journal.database import Branch
     from action_assistant.journal.databases import database_of, migrate
-    from action_assistant.journal.migrate import Branch
 
     data = settings.data_folder(options.data.resolve())
     database = options.database or database_location.of(data)
