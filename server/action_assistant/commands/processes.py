@@ -1,6 +1,7 @@
 """Commands that are processes: serve, editor, runner; and migrate, which prepares their databases."""
 
 import argparse
+import gc
 import logging
 import sys
 from pathlib import Path
@@ -195,6 +196,7 @@ def _serve(options: argparse.Namespace) -> int:
 
 
 def _editor(options: argparse.Namespace) -> int:
+    gc.disable()  # until it listens: what is loaded by then stays
     from action_assistant.editor.app import create_app
     from action_assistant.web.server.listen import serve as listen
 
@@ -212,6 +214,7 @@ def _editor(options: argparse.Namespace) -> int:
 
 
 def _runner(options: argparse.Namespace) -> int:
+    gc.disable()  # until it listens: what is loaded by then stays
     from action_assistant.runner.app import create_app
     from action_assistant.web.server.listen import serve as listen
 

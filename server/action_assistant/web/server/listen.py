@@ -292,6 +292,7 @@ class _Server(uvicorn.Server):
         gc.collect()
         gc.freeze()
         gc.set_threshold(*_GARBAGE)
+        gc.enable()
 
     def _protocol(self) -> asyncio.Protocol:
         return _Http(
