@@ -64,6 +64,11 @@ PARTS: Final[dict[str, Part]] = {
         {"FUZZ_EXAMPLES": "10000"},
         ("tests/fuzz",),
     ),
+    "properties": Part(
+        "20 times as many generated graphs, files, edits and histories for every property",
+        {"TEST_EXAMPLES": "20"},
+        ("-m", "hypothesis", "tests/umrf", "tests/editor", "tests/runner", "tests/test_wire.py"),
+    ),
     "hostile": Part(
         "1,000 Stops while 20 people press hard on every route, beside 2,000 silent strangers",
         {"TEST_HOSTILE_STOPS": "1000", "TEST_HOSTILE_SILENT": "2000"},

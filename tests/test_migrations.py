@@ -1,5 +1,7 @@
 """Migrations: the scripts make what `tables.py` says, there and back, from anywhere, with data."""
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -13,8 +15,11 @@ from sqlalchemy import JSON, Column, Connection, MetaData, insert, inspect, sele
 
 from action_assistant import paths
 from action_assistant.errors import CannotStart
+from action_assistant.journal.alembic_scripts import config_for
+from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import database_of, migrate
-from action_assistant.journal.migrate import BRANCHES, Branch, config_for
+from action_assistant.journal.migrate import revisions_of
+from action_assistant.schema.branches import BRANCHES, VERSIONS
 
 branches = pytest.mark.parametrize("branch", ["editor", "runner"])
 Deed: TypeAlias = Callable[[Connection], Any]
@@ -28,6 +33,12 @@ class Empty(NamedTuple):
 
     def migrate(self, revision: str = "head") -> str:
         return migrate(self.url, self.branch, revision)
+
+    def migrate_by_scripts(self) -> None:
+        """To the newest revision, one script after the other."""
+        for revision in steps(self):
+            self.migrate(revision)
+        assert self.migrate() == steps(self)[-1]
 
     def do(self, deed: Deed) -> Any:
         """Something in one transaction."""
@@ -74,15 +85,67 @@ def steps(empty: Empty) -> list[str]:
 
 
 def test_a_migrated_database_equals_a_fresh_one(empty: Empty) -> None:
-    empty.migrate()
-    migrated = empty.do(schema)
-    empty.do(lambda c: command.downgrade(config_for(c, empty.branch), f"{empty.branch}@base"))
-    empty.do(BRANCHES[empty.branch].create_all)
-    assert migrated == empty.do(schema)
+    empty.migrate_by_scripts()
+    migrated = empty.do(definitions)
+    empty.do(erase)
+    assert empty.do(definitions) == ({}, [], [])
+    assert empty.migrate() == steps(empty)[-1]
+    assert migrated == empty.do(definitions)
 
 
-def test_alembic_finds_nothing_to_add(empty: Empty) -> None:
-    empty.migrate()
+def definitions(connection: Connection) -> tuple[dict[str, Any], list[str], list[str]]:
+    """The tables, the revision that they are said to be at, and of SQLite each definition as it
+    stands in the file, but for blanks."""
+    if connection.dialect.name == "sqlite":
+        rows = connection.execute(text("SELECT name, sql FROM sqlite_master ORDER BY name"))
+        stored = [f"{name}: {' '.join((sql or '').split())}" for name, sql in rows]
+    else:
+        stored = []
+    there = inspect(connection).has_table(VERSIONS.name)
+    versions = connection.scalars(select(VERSIONS.c.version_num)) if there else ()
+    return schema(connection), list(versions), stored
+
+
+def erase(connection: Connection) -> None:
+    """Every table, also Alembic's."""
+    metadata = MetaData()
+    metadata.reflect(connection)
+    metadata.drop_all(connection)
+
+
+@branches
+def test_revisions_are_those_of_the_scripts(branch: Branch, tmp_path: Path) -> None:
+    assert revisions_of(branch) == steps(Empty(branch, f"sqlite:///{tmp_path / 'one.db'}"))
+
+
+@branches
+def test_alembic_is_loaded_only_where_a_script_has_to_run(branch: Branch, tmp_path: Path) -> None:
+    def loaded(name: str) -> str:
+        url = f"sqlite:///{tmp_path / name}"
+        code = (
+            "import sys; from action_assistant.journal.journal import Journal\n"
+            f"Journal.prepare({url!r}, {branch!r}); print('alembic' in sys.modules)"
+        )
+        shown = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        )
+        return shown.stdout.strip()
+
+    migrate(f"sqlite:///{tmp_path / 'old.db'}", branch, f"{branch}_0001")
+    assert [loaded("new.db"), loaded("new.db"), loaded("old.db"), loaded("old.db")] == [
+        "False",
+        "False",
+        "True",
+        "False",
+    ]
+
+
+@pytest.mark.parametrize("by_scripts", [False, True])
+def test_alembic_finds_nothing_to_add(empty: Empty, by_scripts: bool) -> None:
+    if by_scripts:
+        empty.migrate_by_scripts()
+    else:
+        empty.migrate()
 
     def compare(connection: Connection) -> Any:
         context = MigrationContext.configure(connection, opts={"compare_type": True})

@@ -22,6 +22,7 @@ from action_assistant.umrf.semantics import (
     Trace,
     simulate,
 )
+from support.doses import examples
 from support.page import Page, graph_of, open_page
 
 VECTORS = sorted((Path(__file__).parent / "vectors" / "document").glob("*.json"))
@@ -110,7 +111,7 @@ def graphs(draw: st.DrawFn) -> Graph:
     )
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(graph=graphs())
 def test_any_graph_crosses_the_wire(page: Page, graph: Graph) -> None:
     doc = Doc()
@@ -182,7 +183,7 @@ arrows = st.lists(
 )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(arrows, st.sets(st.integers(0, 3)), st.lists(st.sampled_from(["on_true", "on_false", "on_error"]), max_size=4))  # fmt: skip
 def test_where_one_thing_follows_the_other_a_drawn_graph_never_waits_for_its_end(
     page: Page, arrows: list[tuple[int, int, str]], giving: set[int], ends: list[str]

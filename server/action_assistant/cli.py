@@ -6,49 +6,117 @@ Exit codes: 0 fine, 1 the answer is no, 2 wrong use or cannot start.
 import argparse
 import importlib
 import sys
-from collections.abc import Mapping, Sequence
-from typing import Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
 
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import make_streams_printable
 from action_assistant.settings import check_environment, hide_password
-from action_assistant.version import VERSION
 
-_MODULES: Final = (
-    "processes",
-    "files",
-    "remote",
-    "people",
-    "simulate_robot",
-    "maintenance",
-    "backups.backup",
-    "doctor",
-)
-#: Commands that are started often, and need nothing of the other modules.
-_ALONE: Final[Mapping[str, str]] = {
-    "serve": "processes",
-    "editor": "processes",
-    "runner": "processes",
-    "check": "files",
-    "convert": "files",
-    "simulate": "files",
-    "simulate-robot": "simulate_robot",
+
+class CommandEntry(NamedTuple):
+    """One word of the command line. Its `module` names it in COMMANDS, with the function that gives
+    a parser its arguments and its handler. `described`: its own help begins with the same words."""
+
+    module: str
+    help: str
+    described: bool = False
+
+
+#: Every command; `--help` lists them in this order. Only the module of the one that is asked for is
+#: imported: all of them together take more than a second.
+COMMANDS: Final[Mapping[str, CommandEntry]] = {
+    "serve": CommandEntry("processes", "start the editor and the runner, and open the page"),
+    "editor": CommandEntry("processes", "the editor alone: graphs, versions, the page"),
+    "runner": CommandEntry("processes", "the runner alone, the side of the robots: runs and Stop"),
+    "migrate": CommandEntry("processes", "bring the databases of a data folder to this version"),
+    "check": CommandEntry("files", "say what is wrong with UMRF files; exit 1 if any has an error"),
+    "convert": CommandEntry("files", "print a file of any dialect as canonical UMRF"),
+    "simulate": CommandEntry("files", "run a file in the simulator, without a server or a robot"),
+    "import": CommandEntry("remote", "bring UMRF files in as graphs", described=True),
+    "export": CommandEntry("remote", "print a graph as UMRF", described=True),
+    "graphs": CommandEntry("remote", "list the graphs", described=True),
+    "runs": CommandEntry("remote", "list the runs, newest first", described=True),
+    "run": CommandEntry(
+        "remote",
+        "publish a graph as it is now, start it and wait for its end; exit 1 if it does not "
+        "finish, or is known to have ended otherwise than true",
+        described=True,
+    ),
+    "stop": CommandEntry(
+        "remote", "stop a run, or all of them; exit 1 unless it is proven", described=True
+    ),
+    "people": CommandEntry("people", "links that let people in: list, invite, revoke"),
+    "simulate-robot": CommandEntry(
+        "simulate_robot", "a robot that behaves like a real engine, on ROS 2, to practise with"
+    ),
+    "verify": CommandEntry("maintenance", "look whether every stored event is what was written"),
+    "rebuild": CommandEntry(
+        "maintenance",
+        "make the tables of graphs, versions, people, runs and robots again from the events",
+    ),
+    "backup": CommandEntry(
+        "backups.backup",
+        "write a checked copy of everything into one file, also while it is in use",
+    ),
+    "restore": CommandEntry(
+        "backups.backup", "put a backup in the place of what is there; open pages notice and ask"
+    ),
+    "doctor": CommandEntry(
+        "doctor", "look what is wrong: ROS 2, robots, folders, databases, ports, the page"
+    ),
 }
 
 
-def parser(command: str = "") -> argparse.ArgumentParser:
-    """Every command with its help and an example. With a `command`, the others may be missing:
-    importing them all takes most of a second."""
+class _CommandParser(argparse.ArgumentParser):
+    """The parser of one command, complete once it is used."""
+
+    complete: Callable[[], None] | None = None
+
+    def parse_known_args(self, *args: Any, **more: Any) -> Any:
+        """As the parser above asks, for the command that was given."""
+        if self.complete is not None:
+            self.complete()
+            self.complete = None
+        return super().parse_known_args(*args, **more)
+
+
+class _ShowVersion(argparse.Action):
+    """`--version`. Finding out which was installed takes longer than all the rest of this module."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from action_assistant.version import VERSION
+
+        print(f"action-assistant {VERSION}")
+        parser.exit()
+
+
+def parser() -> argparse.ArgumentParser:
+    """Every command with its help and an example."""
     top = argparse.ArgumentParser(
         prog="action-assistant",
         description="Design, run and review robot tasks (UMRF graphs) together, in the browser.",
         epilog="Start with: action-assistant serve",
     )
-    top.add_argument("--version", action="version", version=f"action-assistant {VERSION}")
-    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name in (_ALONE[command],) if command in _ALONE else _MODULES:
-        importlib.import_module(f"action_assistant.commands.{name}").add_to(commands)
+    top.add_argument(
+        "--version",
+        action=_ShowVersion,
+        nargs=0,
+        help="show program's version number and exit",
+    )
+    commands = top.add_subparsers(
+        dest="command", required=True, metavar="COMMAND", parser_class=_CommandParser
+    )
+    for name, command in COMMANDS.items():
+        described = command.help if command.described else None
+        below = commands.add_parser(name, help=command.help, description=described)
+        below.complete = lambda name=name, below=below: _complete(name, below)
     return top
+
+
+def _complete(name: str, parser: argparse.ArgumentParser) -> None:
+    module = importlib.import_module(f"action_assistant.commands.{COMMANDS[name].module}")
+    module.COMMANDS[name](parser)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -56,8 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     make_streams_printable()
     if arguments is None:
         hide_password()
-    asked = sys.argv[1:] if arguments is None else arguments
-    options = parser(asked[0] if asked else "").parse_args(asked)
+    options = parser().parse_args(arguments)
     try:
         check_environment()
         code: int = options.handler(options)

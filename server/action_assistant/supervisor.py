@@ -21,7 +21,7 @@ from action_assistant.share_links import invitations_as_text, is_ours
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.network.certificate import Certificate
-from action_assistant.web.server.listen import bound
+from action_assistant.web.server.sockets import bound
 
 _PATIENCE: Final = 30.0  # seconds until a start that does not answer is called failed
 _STEADY: Final = 30.0  # seconds after which a process counts as healthy again

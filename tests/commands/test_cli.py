@@ -1,33 +1,89 @@
 """The words of the command line."""
 
-import argparse
+import importlib
 import subprocess
 import sys
+from collections import defaultdict
+from typing import Final
 
 import pytest
 
-from action_assistant.cli import _ALONE, parser
+from action_assistant.cli import COMMANDS, main, parser
+
+#: What no command on files needs, and takes long to import.
+SLOW: Final = frozenset(
+    {
+        "alembic",
+        "asyncio",
+        "cryptography",
+        "email",
+        "httpx",
+        "litestar",
+        "pycrdt",
+        "sqlalchemy",
+        "uvicorn",
+    }
+)
 
 
-def help_of(top: argparse.ArgumentParser, command: str) -> str:
-    (commands,) = (each for each in top._actions if isinstance(each.choices, dict))
-    assert isinstance(commands.choices, dict)
-    text: str = commands.choices[command].format_help()
-    return text
+def test_every_command_is_where_the_list_says() -> None:
+    named = defaultdict(set)
+    for name, command in COMMANDS.items():
+        named[command.module].add(name)
+    modules = {
+        name: importlib.import_module(f"action_assistant.commands.{name}").COMMANDS
+        for name in named
+    }
+    assert {name: set(found) for name, found in modules.items()} == named
 
 
-@pytest.mark.parametrize("command", _ALONE)
-def test_a_command_is_the_same_whether_or_not_the_others_are_there(command: str) -> None:
-    assert help_of(parser(command), command) == help_of(parser(), command)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_a_line_in_the_list_and_an_example(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "1000")
+    assert f"    {command}" in parser().format_help()
+    assert COMMANDS[command].help in parser().format_help()
+    with pytest.raises(SystemExit) as ended:
+        main([command, "--help"])
+    assert ended.value.code == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith(f"usage: action-assistant {command} [-h]")
+    assert f"example: action-assistant {command} " in shown
+    assert (COMMANDS[command].help in shown) >= COMMANDS[command].described
 
 
-def test_a_file_is_checked_without_loading_a_server() -> None:
+@pytest.mark.parametrize(
+    "words", [["--help"], ["--version"], ["no-command"], ["check", "no-file"], ["check", "--help"]]
+)
+def test_commands_on_files_load_no_server(words: list[str]) -> None:
+    wanted = SLOW - {"email"} if words == ["--version"] else SLOW
     shown = subprocess.run(
         [
             sys.executable,
             "-c",
-            "import sys; from action_assistant.cli import parser; parser('check');"
-            "print({'litestar', 'sqlalchemy', 'alembic'} & {*sys.modules})",
+            "import atexit, sys; from action_assistant.__main__ import main\n"
+            f"atexit.register(lambda: print('loaded', sorted({set(wanted)!r} & {{*sys.modules}})))\n"
+            "main()",
+            *words,
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert shown.stdout.endswith("loaded []\n"), shown.stdout + shown.stderr
+
+
+@pytest.mark.parametrize("command", ["graphs", "stop", "run"])
+def test_commands_that_ask_a_server_load_none(command: str) -> None:
+    shown = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import sys; from action_assistant.cli import parser\n"
+            f"parser().parse_args([{command!r}, *sys.argv[1:]])\n"
+            "print({'litestar', 'sqlalchemy', 'alembic', 'pycrdt', 'uvicorn'} & {*sys.modules})",
+            *([] if command == "graphs" else ["x"]),
         ],
         capture_output=True,
         text=True,

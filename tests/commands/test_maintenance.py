@@ -1,6 +1,5 @@
 """`verify` and `rebuild`, on a data folder as it lies."""
 
-import argparse
 import asyncio
 import sqlite3
 from contextlib import closing
@@ -8,16 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.commands import maintenance
+from action_assistant.cli import parser
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.journal import Journal
 
 
 def run(*arguments: str) -> int:
-    parser = argparse.ArgumentParser()
-    maintenance.add_to(parser.add_subparsers())
-    options = parser.parse_args(arguments)
+    options = parser().parse_args(arguments)
     code: int = options.handler(options)
     return code
 

@@ -22,6 +22,7 @@ from action_assistant.umrf.files.codec import Unreadable, read
 from action_assistant.umrf.model import Graph, Problem, Signature
 from action_assistant.umrf.semantics import HazardEvent, NodeStateEvent, simulate
 from strategies import graphs
+from support.doses import examples
 from support.recordings import CORPUS, NO_CORPUS, engine_runs, facts, family, lines
 
 SAFE = ["on_error -> ignore"]
@@ -230,7 +231,7 @@ def test_renaming_that_changes_the_order_of_outputs_loses_one() -> None:
 
 
 @given(st.dictionaries(st.sampled_from("abcdefg"), st.sampled_from("ABCDmnopqrst"), min_size=1))
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_renamings_that_hide_outputs_from_the_engine_are_errors(renamings: dict[str, str]) -> None:
     remap = [{"from": source, "to": target} for source, target in renamings.items()]
     outputs = {name: TEXT for name in "abcdefg"}  # noqa: C420 - values of JSON
@@ -288,7 +289,7 @@ def test_errors_come_first_and_every_path_leads_somewhere() -> None:
 
 
 @given(graphs())
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 def test_any_graph_is_checked(graph: Graph) -> None:
     for problem in check(graph):
         assert problem.message
@@ -296,7 +297,7 @@ def test_any_graph_is_checked(graph: Graph) -> None:
 
 
 @given(graphs())
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 def test_what_check_says_can_never_run_does_not_run(graph: Graph) -> None:
     never = {
         problem.where.aid

@@ -7,6 +7,7 @@ from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files.codec import Stamp, read, write
 from action_assistant.umrf.model import Graph
 from strategies import graphs
+from support.doses import examples
 
 FILE = """{"graph_name": "g", "actions": [{"name": "A", "type": "sync",
   "input_parameters": {"p": {"pvf_type": "number", "pvf_value": %s}}%s}]}"""
@@ -17,7 +18,7 @@ def of(text: str) -> str:
 
 
 @given(graphs(max_actions=4))
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_layout_stamps_and_keys_do_not_count(graph: Graph) -> None:
     stamped = read(write(graph, Stamp(graph="g", version="v", run="r"))).graph
     moved = msgspec.structs.replace(graph, entry_position=(1.0, 2.0), notes=(("n", "1"),))

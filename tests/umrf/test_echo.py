@@ -10,6 +10,7 @@ from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files.codec import read, write
 from action_assistant.umrf.model import Graph
 from strategies import graphs
+from support.doses import examples
 from support.recordings import family, lines
 
 
@@ -30,7 +31,7 @@ def test_what_the_engine_printed_is_the_echo_of_what_it_read() -> None:
 
 
 @given(graphs(max_actions=4))
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_an_echo_echoes_itself(graph: Graph) -> None:
     once = echo(graph, PINNED)
     assert digest(echo(once, PINNED)) == digest(once)

@@ -11,6 +11,7 @@ from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.fixes import fix
 from action_assistant.umrf.model import Graph
 from strategies import graphs
+from support.doses import examples
 
 
 def graph_of(a: dict[str, Any], b: dict[str, Any], *more: dict[str, Any]) -> Graph:
@@ -44,7 +45,7 @@ def test_a_fix_removes_its_problem(graph: Graph, code: str) -> None:
 
 
 @given(graphs())
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 def test_fixes_end_and_bring_no_new_errors(graph: Graph) -> None:
     for _ in range(50):
         mendable = [p for p in check(graph) if p.fix]

@@ -19,6 +19,7 @@ from action_assistant.umrf.model import (
     Relation,
 )
 from action_assistant.umrf.semantics import NodeStateEvent, script_from, simulate
+from support.doses import examples
 
 ANSWERS = st.sampled_from(["run", "run", "run", "ignore", "bypass", *RESPONSES])
 CONDITIONS = st.builds(
@@ -53,7 +54,7 @@ def graphs(draw: st.DrawFn) -> Graph:
     return Graph(name="any", actions=actions, relations=tuple(relations))
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(300), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     graph=graphs(),
     results=st.lists(st.sampled_from(["on_true", "on_false", "on_error"]), min_size=5, max_size=5),

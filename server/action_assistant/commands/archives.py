@@ -16,7 +16,6 @@ def add_to(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
         "archive",
         "put what is old into archives, prove them, and delete it here; pinned runs stay",
         "--runs 90 --raw 14",
-        of="runs",
     )
     archive.add_argument("--runs", type=_days, metavar="DAYS", help="runs that ended longer ago")
     archive.add_argument("--raw", type=_days, metavar="DAYS", help="raw messages of robots")

@@ -27,12 +27,16 @@ def command(
     name: str,
     text: str,
     example: str,
-    *,
-    of: str = "",
 ) -> argparse.ArgumentParser:
-    """A command that needs a running server. `of` is the command that it belongs to."""
-    words = " ".join(word for word in ("action-assistant", of, name, example) if word)
-    parser = commands.add_parser(name, help=text, description=text, epilog=f"example: {words}")
+    """A command below another, that needs a running server."""
+    parser = commands.add_parser(name, help=text, description=text)
+    add_server(parser, example)
+    return parser
+
+
+def add_server(parser: argparse.ArgumentParser, example: str) -> None:
+    """How a command finds the server that it needs, and an example of it."""
+    parser.epilog = f"example: {parser.prog} {example}".rstrip()
     parser.add_argument(
         "--url",
         "--server",
@@ -42,7 +46,6 @@ def command(
     parser.add_argument(
         "--data", type=Path, default=paths.data(), metavar="DIR", help="that holds the token"
     )
-    return parser
 
 
 class Server:

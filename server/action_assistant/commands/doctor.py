@@ -38,7 +38,7 @@ from action_assistant.settings import reached
 from action_assistant.version import VERSION
 from action_assistant.web.auth.access import REFUSED_SOCKET
 from action_assistant.web.network.certificate import Certificate
-from action_assistant.web.server.listen import bound
+from action_assistant.web.server.sockets import bound
 
 _SIGNS: Final[dict[Verdict, str]] = {"fine": "✓", "note": "·", "wrong": "✗"}
 _SOUND_SQLITE: Final = (3, 51, 3)
@@ -51,12 +51,9 @@ _UPGRADE: Final = {
 }
 
 
-def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the command of this module."""
-    doctor = commands.add_parser(
-        "doctor",
-        help="look what is wrong: ROS 2, robots, folders, databases, ports, the page",
-        epilog="example: action-assistant doctor --data ./data; exit code 1 if something is wrong",
+def _add_doctor(doctor: argparse.ArgumentParser) -> None:
+    doctor.epilog = (
+        "example: action-assistant doctor --data ./data; exit code 1 if something is wrong"
     )
     doctor.add_argument(
         "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
@@ -78,6 +75,9 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     doctor.add_argument("--json", action="store_true", help="print the findings as JSON")
     doctor.add_argument("--here", action="store_true", help=argparse.SUPPRESS)  # with this Python
     doctor.set_defaults(handler=_doctor)
+
+
+COMMANDS: Final = {"doctor": _add_doctor}
 
 
 def _doctor(options: argparse.Namespace) -> int:

@@ -35,13 +35,8 @@ class CheckVerdict(msgspec.Struct, frozen=True):
     notes: tuple[Note, ...] = ()
 
 
-def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the commands of this module."""
-    check = commands.add_parser(
-        "check",
-        help="say what is wrong with UMRF files; exit 1 if any has an error",
-        epilog="example: action-assistant check patrol.umrf.graph.json",
-    )
+def _add_check(check: argparse.ArgumentParser) -> None:
+    check.epilog = "example: action-assistant check patrol.umrf.graph.json"
     check.add_argument("files", type=Path, nargs="+", metavar="FILE")
     check.add_argument("--json", action="store_true", help="as JSON, for programs")
     check.add_argument("--facts", metavar="COMMIT", help="of the engine the graph is meant for")
@@ -51,11 +46,9 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     check.add_argument("--graphs", type=Path, metavar="DIR", help="of sub-graphs: *graph.json")
     check.set_defaults(handler=_check)
 
-    convert = commands.add_parser(
-        "convert",
-        help="print a file of any dialect as canonical UMRF",
-        epilog="example: action-assistant convert old.umrfg.json > new.umrf.graph.json",
-    )
+
+def _add_convert(convert: argparse.ArgumentParser) -> None:
+    convert.epilog = "example: action-assistant convert old.umrfg.json > new.umrf.graph.json"
     convert.add_argument("file", type=Path, metavar="FILE")
     convert.add_argument(
         "--through-document",
@@ -69,10 +62,10 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     convert.set_defaults(handler=_convert)
 
-    simulate = commands.add_parser(
-        "simulate",
-        help="run a file in the simulator, without a server or a robot",
-        epilog="example: action-assistant simulate patrol.umrf.graph.json --at 1500:stop --trace",
+
+def _add_simulate(simulate: argparse.ArgumentParser) -> None:
+    simulate.epilog = (
+        "example: action-assistant simulate patrol.umrf.graph.json --at 1500:stop --trace"
     )
     simulate.add_argument("file", type=Path, metavar="FILE")
     simulate.add_argument("--script", type=Path, metavar="S.json", help="what the actions do")
@@ -90,6 +83,9 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     simulate.add_argument("--trace", action="store_true", help="as JSON lines, for programs")
     simulate.set_defaults(handler=_simulate)
+
+
+COMMANDS: Final = {"check": _add_check, "convert": _add_convert, "simulate": _add_simulate}
 
 
 def _command(text: str) -> tuple[float, str, str | None]:

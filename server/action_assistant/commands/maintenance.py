@@ -4,6 +4,7 @@ import argparse
 import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Final
 
 from action_assistant import paths, settings
 from action_assistant.errors import CannotStart, Unavailable
@@ -14,23 +15,19 @@ from action_assistant.journal.journal import Journal
 from action_assistant.settings import settled
 
 
-def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the commands of this module."""
-    verify = commands.add_parser(
-        "verify",
-        help="look whether every stored event is what was written",
-        epilog="example: action-assistant verify --data ./data",
-    )
+def _add_verify(verify: argparse.ArgumentParser) -> None:
+    verify.epilog = "example: action-assistant verify --data ./data"
     _where(verify)
     verify.set_defaults(handler=_verify)
 
-    rebuild = commands.add_parser(
-        "rebuild",
-        help="make the tables of graphs, versions, people, runs and robots again from the events",
-        epilog="example: action-assistant rebuild --data ./data",
-    )
+
+def _add_rebuild(rebuild: argparse.ArgumentParser) -> None:
+    rebuild.epilog = "example: action-assistant rebuild --data ./data"
     _where(rebuild)
     rebuild.set_defaults(handler=_rebuild)
+
+
+COMMANDS: Final = {"verify": _add_verify, "rebuild": _add_rebuild}
 
 
 def _where(parser: argparse.ArgumentParser) -> None:

@@ -1,7 +1,7 @@
 """`people`: who may come in by which link, and the end of a link."""
 
 import argparse
-from typing import Any
+from typing import Any, Final
 
 from action_assistant.commands.client import No, Server, command, print_json, refused, running
 from action_assistant.errors import CannotStart, Refused
@@ -10,21 +10,16 @@ from action_assistant.safe_text import one_line
 from action_assistant.web.auth.revocations import Revocations
 
 
-def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the commands of this module."""
-    people = commands.add_parser(
-        "people",
-        help="links that let people in: list, invite, revoke",
-        description="Links that let people in without the token, each with a role.",
-        epilog="example: action-assistant people invite editor --label Mari",
-    )
+def _add_people(people: argparse.ArgumentParser) -> None:
+    people.description = "Links that let people in without the token, each with a role."
+    people.epilog = "example: action-assistant people invite editor --label Mari"
     words = people.add_subparsers(dest="word", required=True, metavar="WORD")
 
-    listed = command(words, "list", "the links, and who came in by them", "", of="people")
+    listed = command(words, "list", "the links, and who came in by them", "")
     listed.add_argument("--json", action="store_true", help="as JSON, for programs")
     listed.set_defaults(handler=_list)
 
-    invite = command(words, "invite", "make a link", "operator --label 'lab tablet'", of="people")
+    invite = command(words, "invite", "make a link", "operator --label 'lab tablet'")
     invite.add_argument("role", choices=["viewer", "editor", "operator"])
     invite.add_argument("--label", default="", help="whom it is for")
     invite.set_defaults(handler=_invite)
@@ -34,10 +29,12 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "revoke",
         "end a link and every session that came in by it, also while no server answers",
         "trlQRDEFzMaX",
-        of="people",
     )
     revoke.add_argument("id", metavar="ID", help="as `people list` shows it")
     revoke.set_defaults(handler=_revoke)
+
+
+COMMANDS: Final = {"people": _add_people}
 
 
 def _list(options: argparse.Namespace) -> int:

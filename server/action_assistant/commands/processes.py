@@ -1,10 +1,11 @@
 """Commands that are processes: serve, editor, runner; and migrate, which prepares their databases."""
 
 import argparse
+import gc
 import logging
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from action_assistant import paths, settings
 from action_assistant.errors import CannotStart
@@ -14,24 +15,17 @@ if TYPE_CHECKING:  # slow to load, and most commands do not need it
     from action_assistant.web.server.listen import TlsIdentity
 
 
-def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the commands of this module."""
-    both = commands.add_parser(
-        "serve",
-        help="start the editor and the runner, and open the page",
-        epilog="example: action-assistant serve --data ./data --port 8000",
-    )
+def _add_serve(both: argparse.ArgumentParser) -> None:
+    both.epilog = "example: action-assistant serve --data ./data --port 8000"
     _address(both, port=8000)
     _database(both, switch=True)
     _sharing(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
     both.set_defaults(handler=_serve)
 
-    editor = commands.add_parser(
-        "editor",
-        help="the editor alone: graphs, versions, the page",
-        epilog="example: action-assistant editor --port 8000 --runner-port 8001",
-    )
+
+def _add_editor(editor: argparse.ArgumentParser) -> None:
+    editor.epilog = "example: action-assistant editor --port 8000 --runner-port 8001"
     _address(editor, port=8000)
     _database(editor, switch=True)
     _sharing(editor)
@@ -40,11 +34,9 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     editor.set_defaults(handler=_editor)
 
-    runner = commands.add_parser(
-        "runner",
-        help="the runner alone, the side of the robots: runs and Stop",
-        epilog="example: action-assistant runner --port 8001 --page-port 8000",
-    )
+
+def _add_runner(runner: argparse.ArgumentParser) -> None:
+    runner.epilog = "example: action-assistant runner --port 8001 --page-port 8000"
     _address(runner, port=8001)
     _sharing(runner)
     runner.add_argument(
@@ -52,14 +44,20 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     )
     runner.set_defaults(handler=_runner)
 
-    migrate = commands.add_parser(
-        "migrate",
-        help="bring the databases of a data folder to this version",
-        epilog="example: action-assistant migrate --data ./data",
-    )
+
+def _add_migrate(migrate: argparse.ArgumentParser) -> None:
+    migrate.epilog = "example: action-assistant migrate --data ./data"
     migrate.add_argument("--data", type=Path, default=paths.data(), metavar="DIR")
     _database(migrate)
     migrate.set_defaults(handler=_migrate)
+
+
+COMMANDS: Final = {
+    "serve": _add_serve,
+    "editor": _add_editor,
+    "runner": _add_runner,
+    "migrate": _add_migrate,
+}
 
 
 def port_number(text: str) -> int:
@@ -198,6 +196,7 @@ def _serve(options: argparse.Namespace) -> int:
 
 
 def _editor(options: argparse.Namespace) -> int:
+    gc.disable()  # until it listens: what is loaded by then stays
     from action_assistant.editor.app import create_app
     from action_assistant.web.server.listen import serve as listen
 
@@ -215,6 +214,7 @@ def _editor(options: argparse.Namespace) -> int:
 
 
 def _runner(options: argparse.Namespace) -> int:
+    gc.disable()  # until it listens: what is loaded by then stays
     from action_assistant.runner.app import create_app
     from action_assistant.web.server.listen import serve as listen
 
@@ -244,8 +244,8 @@ def _runner(options: argparse.Namespace) -> int:
 
 def _migrate(options: argparse.Namespace) -> int:
     from action_assistant.editor.log import database_location
+    from action_assistant.journal.database import Branch
     from action_assistant.journal.databases import database_of, migrate
-    from action_assistant.journal.migrate import Branch
 
     data = settings.data_folder(options.data.resolve())
     database = options.database or database_location.of(data)

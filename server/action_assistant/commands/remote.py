@@ -10,7 +10,15 @@ from typing import Any, Final, TypeAlias
 import msgspec
 
 from action_assistant.commands import archives
-from action_assistant.commands.client import No, Server, command, print_json, refused, running
+from action_assistant.commands.client import (
+    No,
+    Server,
+    add_server,
+    command,
+    print_json,
+    refused,
+    running,
+)
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 
@@ -21,22 +29,27 @@ _INSIST_S: Final = 5.0
 Run: TypeAlias = dict[str, Any]
 
 
-def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the commands of this module."""
-    bring = command(commands, "import", "bring UMRF files in as graphs", "patrol.umrf.graph.json")
+def _add_import(bring: argparse.ArgumentParser) -> None:
+    add_server(bring, "patrol.umrf.graph.json")
     bring.add_argument("files", type=Path, nargs="+", metavar="FILE")
     bring.set_defaults(handler=_import)
 
-    export = command(commands, "export", "print a graph as UMRF", "patrol --at 120 > patrol.json")
+
+def _add_export(export: argparse.ArgumentParser) -> None:
+    add_server(export, "patrol --at 120 > patrol.json")
     export.add_argument("graph", metavar="GRAPH", help="id or name")
     export.add_argument("--at", type=int, metavar="SEQ", help="as it was then")
     export.set_defaults(handler=_export)
 
-    graphs = command(commands, "graphs", "list the graphs", "--json")
+
+def _add_graphs(graphs: argparse.ArgumentParser) -> None:
+    add_server(graphs, "--json")
     graphs.add_argument("--json", action="store_true", help="as JSON, for programs")
     graphs.set_defaults(handler=_graphs)
 
-    runs = command(commands, "runs", "list the runs, newest first", "--graph patrol")
+
+def _add_runs(runs: argparse.ArgumentParser) -> None:
+    add_server(runs, "--graph patrol")
     runs.add_argument("--graph", metavar="GRAPH", help="id or name")
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(handler=_runs)
@@ -46,7 +59,6 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "at-rest",
         "confirm that a run is at rest which no answer of its engine can prove so: after you looked",
         'RUN --how "I stand beside it; nothing moves."',
-        of="runs",
     )
     rests.add_argument("run", metavar="RUN", help="id of the run")
     rests.add_argument("--how", required=True, help="how you have seen that nothing moves")
@@ -57,7 +69,6 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "examples",
         "take in recorded runs that failed, to see how causes are found; each is there once",
         "",
-        of="runs",
     )
     brought.set_defaults(handler=_examples)
     again = command(
@@ -66,19 +77,14 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         "simulate every expected course again, with the graph as it was and as it is now; exit 1 if "
         "any goes another way",
         "--graph patrol",
-        of="runs",
     )
     again.add_argument("--graph", metavar="GRAPH", help="id or name; only what is expected of it")
     again.add_argument("--json", action="store_true", help="as JSON, for programs")
     again.set_defaults(handler=_verify)
 
-    run = command(
-        commands,
-        "run",
-        "publish a graph as it is now, start it and wait for its end; exit 1 if it does not "
-        "finish, or is known to have ended otherwise than true",
-        "patrol --script fast.json",
-    )
+
+def _add_run(run: argparse.ArgumentParser) -> None:
+    add_server(run, "patrol --script fast.json")
     run.add_argument("graph", metavar="GRAPH", help="id or name")
     run.add_argument("--engine", default="simulator", metavar="ROBOT", help="default: %(default)s")
     run.add_argument("--script", type=Path, metavar="S.json", help="what simulated actions do")
@@ -86,14 +92,24 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     run.add_argument("--no-wait", action="store_true", help="print the run's id and return")
     run.set_defaults(handler=_run)
 
-    stop = command(
-        commands, "stop", "stop a run, or all of them; exit 1 unless it is proven", "--all"
-    )
+
+def _add_stop(stop: argparse.ArgumentParser) -> None:
+    add_server(stop, "--all")
     which = stop.add_mutually_exclusive_group(required=True)
     which.add_argument("run", nargs="?", metavar="RUN", help="id of the run")
     which.add_argument("--all", action="store_true", help="every run of every robot")
     stop.add_argument("--wait", type=float, default=30.0, metavar="SECONDS", help="for proof")
     stop.set_defaults(handler=_stop)
+
+
+COMMANDS: Final = {
+    "import": _add_import,
+    "export": _add_export,
+    "graphs": _add_graphs,
+    "runs": _add_runs,
+    "run": _add_run,
+    "stop": _add_stop,
+}
 
 
 def _import(options: argparse.Namespace) -> int:

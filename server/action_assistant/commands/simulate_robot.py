@@ -28,13 +28,8 @@ from action_assistant.umrf.semantics import Script, script_from
 _DEEP: Final = 2  # folders below --actions in which an engine looks
 
 
-def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the commands of this module."""
-    robot = commands.add_parser(
-        "simulate-robot",
-        help="a robot that behaves like a real engine, on ROS 2, to practise with",
-        epilog="example: action-assistant simulate-robot David --domain 7 --quirk loss=0",
-    )
+def _add_simulate_robot(robot: argparse.ArgumentParser) -> None:
+    robot.epilog = "example: action-assistant simulate-robot David --domain 7 --quirk loss=0"
     robot.add_argument("name", metavar="NAME", help="its wake word, as it is registered")
     robot.add_argument("--domain", type=_domain, metavar="N", help="default: $ROS_DOMAIN_ID, or 0")
     robot.add_argument(
@@ -62,6 +57,9 @@ def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     robot.add_argument("--facts", metavar="COMMIT", help="of the engine that it stands in for")
     robot.add_argument("--wake-words", default="", metavar="A,B", help="others that it answers to")
     robot.set_defaults(handler=_simulate_robot)
+
+
+COMMANDS: Final = {"simulate-robot": _add_simulate_robot}
 
 
 def _known() -> str:

@@ -16,10 +16,10 @@ from action_assistant.journal.database import Branch, Database, WriterSession, c
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.follower import Follower
-from action_assistant.journal.migrate import BRANCHES
 from action_assistant.journal.reader import JournalReader, body_of, following, seal_of
 from action_assistant.journal.removal import STREAM, StreamRemoved, delete_some, taken_out
 from action_assistant.journal.writer import Job, Outcome, Transaction, Writer
+from action_assistant.schema.branches import BRANCHES
 from action_assistant.schema.editor_tables import editor_head, editor_snapshot
 from action_assistant.schema.log_tables import LOG
 

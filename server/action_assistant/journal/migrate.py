@@ -5,39 +5,25 @@ import re
 from collections.abc import Callable
 from typing import Final
 
-from alembic import command
-from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, MetaData, inspect
+from sqlalchemy import Connection, insert, inspect, select
 
 from action_assistant import paths
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch as Branch
 from action_assistant.journal.events import Event
-from action_assistant.schema import editor_tables, runner_tables
+from action_assistant.schema.branches import BRANCHES, VERSIONS
 
-BRANCHES: Final[dict[Branch, MetaData]] = {
-    "editor": editor_tables.EDITOR,
-    "runner": runner_tables.RUNNER,
-}
-#: How our revisions are named, also those of versions to come.
+#: How our revisions are named, also those of versions to come; a script's file begins with its name.
 _OURS: Final = re.compile(rf"({'|'.join(BRANCHES)})_\d+")
-_VERSIONS: Final = "alembic_version"
 log: Final = logging.getLogger(__name__)
-logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in one line
 
 
-def config_for(connection: Connection, branch: Branch) -> Config:
-    """Alembic's configuration, pointed at our scripts and at a connection that is open."""
-    folder = paths.migrations()
-    config = Config(attributes={"connection": connection, "metadata": BRANCHES[branch]})
-    config.set_main_option("script_location", str(folder).replace("%", "%%"))
-    config.set_main_option("version_path_separator", "newline")
-    config.set_main_option("path_separator", "newline")
-    locations = "\n".join(str(folder / name) for name in BRANCHES)
-    config.set_main_option("version_locations", locations.replace("%", "%%"))
-    return config
+def revisions_of(branch: str) -> list[str]:
+    """Every revision that this program knows, the oldest first."""
+    names = (_OURS.match(path.name) for path in (paths.migrations() / branch).glob("*.py"))
+    return sorted(
+        (name[0] for name in names if name), key=lambda name: int(name.rpartition("_")[2])
+    )
 
 
 def upgrade_to(branch: Branch, revision: str = "head") -> Callable[[Connection], str]:
@@ -46,13 +32,10 @@ def upgrade_to(branch: Branch, revision: str = "head") -> Callable[[Connection],
     def upgrade(connection: Connection) -> str:
         name = _name_of(connection)
         current = recognize(connection)
-        config = config_for(connection, branch)
-        script = ScriptDirectory.from_config(config)
-        ours = {item.revision for item in script.iterate_revisions(f"{branch}@head", "base")}
-        if current - ours:
+        ours = revisions_of(branch)
+        if current - set(ours):
             raise CannotStart(f"The database {name} is not the {branch}'s.")
-        command.upgrade(config, f"{branch}@{revision}")
-        (now,) = MigrationContext.configure(connection).get_current_heads()
+        now = _upgraded(connection, branch, current, ours[-1] if revision == "head" else revision)
         if {now} != current:
             log.info("%s: the tables are those of %s now", name, now)
         return now
@@ -60,27 +43,47 @@ def upgrade_to(branch: Branch, revision: str = "head") -> Callable[[Connection],
     return upgrade
 
 
+def _upgraded(connection: Connection, branch: Branch, current: set[str], revision: str) -> str:
+    """The revision at which a database is afterwards."""
+    newest = revisions_of(branch)[-1]
+    if current == {newest} == {revision}:
+        return newest
+    if not current and revision == newest:
+        # All of the tables at once: what the scripts come to, one after the other.
+        BRANCHES[branch].create_all(connection, checkfirst=False)
+        VERSIONS.create(connection, checkfirst=True)
+        connection.execute(insert(VERSIONS).values(version_num=newest))
+        return newest
+    # Alembic takes longer to import than a start has otherwise to do with the database.
+    from action_assistant.journal import alembic_scripts
+
+    return alembic_scripts.upgrade(connection, branch, revision)
+
+
 def recognize(connection: Connection) -> set[str]:
     """The revisions of a database of ours; none of an empty one. Changes nothing. Raises CannotStart
     for another program's, and for one that a newer version of this program made."""
     name = _name_of(connection)
-    current = set(map(str, MigrationContext.configure(connection).get_current_heads()))
+    current = _current(connection)
     if _is_foreign(connection, current):
         raise CannotStart(
             f"The database {name} is another program's: it is left as it is. Choose another one, "
             "or an empty one."
         )
-    known = {
-        item.revision
-        for branch in BRANCHES
-        for item in ScriptDirectory.from_config(config_for(connection, branch)).walk_revisions()
-    }
+    known = {revision for branch in BRANCHES for revision in revisions_of(branch)}
     if current - known:
         raise CannotStart(
             f"The database {name} was made by a newer version of this program "
             f"({', '.join(sorted(current - known))}): install that version, or choose another."
         )
     return current
+
+
+def _current(connection: Connection) -> set[str]:
+    """The revisions that a database says it is at."""
+    if not inspect(connection).has_table(VERSIONS.name):
+        return set()
+    return set(map(str, connection.scalars(select(VERSIONS.c.version_num))))
 
 
 def _name_of(connection: Connection) -> str:
@@ -94,7 +97,7 @@ def _name_of(connection: Connection) -> str:
 def _is_foreign(connection: Connection, current: set[str]) -> bool:
     """Whether tables are there that we did not make. A database on a server may hold others, too, as
     long as their names are not in our way."""
-    there = set(inspect(connection).get_table_names()) - {_VERSIONS}
+    there = set(inspect(connection).get_table_names()) - {VERSIONS.name}
     if connection.dialect.name == "sqlite":
         if connection.exec_driver_sql("PRAGMA application_id").scalar():
             return True  # we have never set one

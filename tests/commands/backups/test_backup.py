@@ -1,6 +1,5 @@
 """`backup` while the server runs, and `restore`, after which history is another one."""
 
-import argparse
 import asyncio
 import json
 import shutil
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.commands.backups import backup
+from action_assistant.cli import parser
 from action_assistant.editor.app import open_services
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
@@ -79,9 +78,7 @@ def test_what_was_backed_up_while_running_is_there_again(editor: Editor, tmp_pat
 
 def here(*arguments: str | Path) -> int:
     """A command in this process."""
-    parser = argparse.ArgumentParser()
-    backup.add_to(parser.add_subparsers())
-    options = parser.parse_args(list(map(str, arguments)))
+    options = parser().parse_args(list(map(str, arguments)))
     code: int = options.handler(options)
     return code
 

@@ -1,6 +1,5 @@
 """`restore` writes nothing but a whole backup of ours, into a place that is empty or ours."""
 
-import argparse
 import asyncio
 import json
 import multiprocessing
@@ -17,7 +16,8 @@ from typing import Any, Final
 import pytest
 
 from action_assistant import settings
-from action_assistant.commands.backups import backup, restore
+from action_assistant.cli import parser
+from action_assistant.commands.backups import restore
 from action_assistant.commands.backups.backup_file import Package
 from action_assistant.commands.backups.data_folder import checked
 from action_assistant.commands.backups.progress import Progress
@@ -34,9 +34,7 @@ LARGE: Final = 10 << 20
 
 def here(*arguments: str | Path) -> int:
     """A command in this process."""
-    parser = argparse.ArgumentParser()
-    backup.add_to(parser.add_subparsers())
-    options = parser.parse_args(list(map(str, arguments)))
+    options = parser().parse_args(list(map(str, arguments)))
     code: int = options.handler(options)
     return code
 

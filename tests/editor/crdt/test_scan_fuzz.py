@@ -16,6 +16,7 @@ from action_assistant.editor.crdt.messages import Malformed, number
 from action_assistant.editor.crdt.update_scan import outline
 from editor import forged_updates
 from editor.crdt.test_scan import made, values
+from support.doses import examples
 
 MUTANTS: Final = int(os.environ.get("TEST_MUTANTS", "20000"))
 SLOWEST: Final = 250.0  # ms of processor time
@@ -133,7 +134,7 @@ deeds = st.lists(
 )
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(deeds, min_size=1, max_size=3), st.randoms(use_true_random=False))
 def test_whatever_clients_make_together_is_passed(
     people: list[list[tuple[str, str, Any]]], chance: random.Random

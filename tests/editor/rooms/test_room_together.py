@@ -13,6 +13,7 @@ from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.journal.journal import Journal
 from editor.client import Client, settle
+from support.doses import examples
 
 who = st.integers(0, 2)
 key = st.sampled_from(["a", "b", "c", "d"])
@@ -45,7 +46,7 @@ def shown(doc: Doc[Any]) -> tuple[Any, dict[int, int]]:
     return doc.get("things", type=Map).to_py(), clocks(doc.get_state())
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(plan=st.lists(steps, min_size=4, max_size=40))
 async def test_replay_equals_room_equals_every_client(
     journal: Journal, rooms: Rooms, plan: list[tuple[Any, ...]]

@@ -24,6 +24,7 @@ from action_assistant.runner.runs.events import (
 from action_assistant.runner.runs.fold import replay
 from runner.harness import MemoryLedger, at_once, virtual
 from runner.runs.test_runs import STARTED
+from support.doses import examples
 
 STATES = ("UNINITIALIZED", "RUNNING", "STOPPING", "FINISHED", "ERROR", "PAUSED")
 NODES = ("Go_0", "Grip_0", "Sub__Go__0")
@@ -94,7 +95,7 @@ def _apply(shown: dict[str, Any], frame: ReplayFrame) -> None:
         action["visits"] += change.get("visits", [])
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(batches)
 def test_replay_at_any_event_equals_the_fold_of_the_events_up_to_it(drawn: Any) -> None:
     events = told(drawn)

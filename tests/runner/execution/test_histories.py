@@ -29,6 +29,7 @@ from runner.harness import (
     sequence,
     two_ends,
 )
+from support.doses import examples
 
 GRAPHS = {"one": sequence("one"), "two": two_ends("two")}
 NAMES = tuple(GRAPHS)
@@ -208,7 +209,7 @@ class Story:
             assert (told.desired == "stopped") == bool(stops)
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(200), suppress_health_check=[HealthCheck.too_slow])
 @given(
     first=st.sampled_from(NAMES),
     seed=st.integers(0, 2**32),

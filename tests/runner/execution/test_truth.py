@@ -17,6 +17,7 @@ from runner import harness
 from runner.fake_network import now_ms
 from runner.harness import BEN, run_in_virtual_time, sequence
 from runner.record_streams import Place
+from support.doses import examples
 
 RESULTS = ("on_true", "on_false", "on_error")
 CALLS = st.fixed_dictionaries(
@@ -85,7 +86,7 @@ async def lived(calls: list[dict[str, Any]], loss: float, seed: int, stop: float
     return witness
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(15), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     calls=st.lists(CALLS, min_size=1, max_size=5),
     loss=st.sampled_from([0.0, 0.3, 0.9]),

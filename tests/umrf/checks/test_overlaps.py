@@ -21,6 +21,7 @@ from action_assistant.umrf.semantics import (
     Script,
     simulate,
 )
+from support.doses import examples
 from umrf.drawn import busy_graphs
 
 SAFE = ["on_error -> ignore"]
@@ -43,7 +44,7 @@ def scripted(graph: Graph, calls: Calls) -> Script:
 
 
 @given(busy_graphs(), CALLS)
-@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(200), deadline=None, suppress_health_check=list(HealthCheck))
 def test_what_runs_at_once_in_any_simulation_was_said_to_be_able_to(
     graph: Graph, calls: Calls
 ) -> None:
@@ -68,7 +69,7 @@ def test_what_runs_at_once_in_any_simulation_was_said_to_be_able_to(
 
 
 @given(busy_graphs(), CALLS)
-@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(200), deadline=None, suppress_health_check=list(HealthCheck))
 def test_a_hazard_of_any_simulation_is_one_that_check_told(graph: Graph, calls: Calls) -> None:
     told = {problem.code for problem in check(graph)}
     for trace in simulate(graph, script=scripted(graph, calls), max_events=400, until_ms=60_000):

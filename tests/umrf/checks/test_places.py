@@ -15,6 +15,7 @@ from action_assistant.umrf.files.codec import Reading, Unreadable, read, read_ac
 from action_assistant.umrf.json.places import places_of, pointer
 from action_assistant.umrf.model import Graph, Where
 from strategies import graphs
+from support.doses import examples
 from support.recordings import CORPUS, NO_CORPUS
 
 OWN = sorted((Path(__file__).parents[1] / "examples").glob("*.json"))
@@ -195,13 +196,13 @@ def files(draw: st.DrawFn) -> bytes:
 
 
 @given(files())
-@settings(max_examples=150, deadline=None, suppress_health_check=SLOW)
+@settings(max_examples=examples(150), deadline=None, suppress_health_check=SLOW)
 def test_every_finding_of_a_spoiled_file_has_its_place(text: bytes) -> None:
     hold(text)
 
 
 @given(files())
-@settings(max_examples=80, deadline=None, suppress_health_check=SLOW)
+@settings(max_examples=examples(80), deadline=None, suppress_health_check=SLOW)
 def test_a_finding_about_an_action_points_at_that_action(text: bytes) -> None:
     reading = read(text)
     whole = json.loads(text.decode("utf-8-sig"))
@@ -213,7 +214,7 @@ def test_a_finding_about_an_action_points_at_that_action(text: bytes) -> None:
 
 
 @given(graphs())
-@settings(max_examples=60, deadline=None, suppress_health_check=SLOW)
+@settings(max_examples=examples(60), deadline=None, suppress_health_check=SLOW)
 def test_the_problems_of_a_graph_have_their_places_in_its_canonical_text(graph: Graph) -> None:
     text = write(graph)
     for problem in check_written(graph):
@@ -311,7 +312,7 @@ JSON_VALUES = st.recursive(
 
 
 @given(JSON_VALUES, st.booleans())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_every_pointer_of_a_text_is_found(value: Any, plain: bool) -> None:
     text = json.dumps(value, ensure_ascii=plain)
     every = dict(walk(value))

@@ -24,6 +24,7 @@ from action_assistant.umrf.model import (
     Graph,
     Relation,
 )
+from support.doses import examples
 from umrf.drawn import busy_graphs
 from umrf.shapes import GROWING
 
@@ -38,7 +39,7 @@ def told(outcome: Outcome) -> Outcome:
 
 
 @given(busy_graphs(), st.booleans(), st.booleans())
-@settings(max_examples=250, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(250), deadline=None, suppress_health_check=list(HealthCheck))
 def test_a_deviation_ends_as_when_the_engine_goes_through_all_of_it(
     graph: Graph, slower_first: bool, backwards: bool
 ) -> None:
@@ -71,7 +72,7 @@ def test_what_runs_on_when_the_usual_course_is_finished_is_not_finished_with_it(
 
 
 @given(busy_graphs(8))
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(60), deadline=None, suppress_health_check=list(HealthCheck))
 def test_what_is_not_tried_cannot_end_otherwise(graph: Graph) -> None:
     """An outcome that no child answers in another way is no way of its own."""
     trials = Trials(graph)

@@ -13,6 +13,7 @@ from action_assistant.umrf.files.codec import Unreadable, read_action, write_act
 from action_assistant.umrf.model import Action, Signature
 from action_assistant.umrf.signatures import signature_of
 from strategies import actions
+from support.doses import examples
 from support.recordings import CORPUS, NO_CORPUS, family, lines
 
 OWN = Path(__file__).parents[1] / "examples" / "single.umrf.json"
@@ -78,7 +79,7 @@ def test_every_readable_action_of_the_corpus_survives_writing(verdicts: Verdicts
 
 
 @given(st.data())
-@settings(max_examples=80)
+@settings(max_examples=examples(80))
 def test_what_is_written_is_read_as_the_same_action(data: st.DataObject) -> None:
     action: Action = data.draw(actions("a1", "Go", data.draw(st.integers(0, 3))))
     assert read_action(write_action(action)).action == action

@@ -15,6 +15,7 @@ from action_assistant.umrf.files.codec import Stamp, Unreadable, read, write
 from action_assistant.umrf.json.text import MAX_BYTES, dump, parse
 from action_assistant.umrf.model import ENTRY, EXIT, Graph
 from strategies import graphs, normal
+from support.doses import examples
 from support.recordings import CORPUS, NO_CORPUS, family
 
 OWN = Path(__file__).parents[1] / "examples"
@@ -39,7 +40,7 @@ def file_of(**fields: object) -> str:
 
 
 @given(graphs())
-@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(120), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_what_is_written_is_read_as_the_same_graph(graph: Graph) -> None:
     reading = read(write(graph))
     assert normal(reading.graph) == normal(graph)
@@ -49,7 +50,7 @@ def test_what_is_written_is_read_as_the_same_graph(graph: Graph) -> None:
 
 
 @given(graphs())
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(50), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_writing_twice_changes_nothing(graph: Graph) -> None:
     text = write(graph)
     assert write(read(text).graph) == text
@@ -338,7 +339,7 @@ def test_hostile_texts_cost_no_more_than_their_size(text: str) -> None:
     ]), inner, max_size=6),
     max_leaves=40,
 ))  # fmt: skip
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_any_json_is_read_or_refused(value: object) -> None:
     text = json.dumps(value)
     try:

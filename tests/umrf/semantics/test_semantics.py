@@ -28,6 +28,7 @@ from action_assistant.umrf.semantics import (
     simulate,
 )
 from strategies import graphs
+from support.doses import examples
 
 RUN = Conditions("run", "run", "run", "ignore")
 
@@ -446,7 +447,7 @@ def test_null_in_a_script_means_the_default() -> None:
 
 
 @given(graphs(), st.sampled_from(RESPONSES), st.booleans())
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 def test_any_graph_gives_one_trace_that_ends(graph: Graph, response: str, error: bool) -> None:
     calls = Script({"*": (Behaviour(result="on_error" if error else "on_true"),)})
     commands = [(1500.0, "pause", None), (2500.0, "resume", None), (4000.0, "stop", None)]

@@ -26,7 +26,7 @@ from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.sessions import Invited, session_routes
 from action_assistant.web.network.addresses import Addresses
 from action_assistant.web.server.application import application
-from action_assistant.web.server.listen import bound
+from action_assistant.web.server.sockets import bound
 
 KEYS = Keys("k" * 43)
 BEARER = {"authorization": f"Bearer {KEYS.token}"}

@@ -43,38 +43,33 @@ _ARCHIVES: Final = ("runs", "raw")
 _SECRET: Final = frozenset({"ACTION_ASSISTANT_TOKEN", "ACTION_ASSISTANT_DATABASE"})
 
 
-def add_to(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the commands of this module."""
-    backup = commands.add_parser(
-        "backup",
-        help="write a checked copy of everything into one file, also while it is in use",
-        epilog="example: action-assistant backup monday.zip --data ./data; exit code 1 if something "
-        "is missing in it",
+def _add_backup(backup: argparse.ArgumentParser) -> None:
+    backup.epilog = (
+        "example: action-assistant backup monday.zip --data ./data; exit code 1 if something "
+        "is missing in it"
     )
-    back = commands.add_parser(
-        "restore",
-        help="put a backup in the place of what is there; open pages notice and ask",
-        epilog="example: action-assistant restore monday.zip --data ./data",
-    )
-    for command in (backup, back):
-        command.add_argument("file", type=Path, metavar="FILE")
-        command.add_argument(
-            "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
-        )
-    backup.add_argument(
-        "--database",
-        metavar="URL",
-        default=settings.database(),
-        help="of the editor; default: the one that was served last",
-    )
-    back.add_argument(
-        "--database",
-        metavar="URL",
-        default=settings.database(),
-        help="where the graphs shall be, an empty database; default: where those of the folder are",
-    )
+    _add_places(backup, "of the editor; default: the one that was served last")
     backup.set_defaults(handler=_backup)
+
+
+def _add_restore(back: argparse.ArgumentParser) -> None:
+    back.epilog = "example: action-assistant restore monday.zip --data ./data"
+    _add_places(
+        back,
+        "where the graphs shall be, an empty database; default: where those of the folder are",
+    )
     back.set_defaults(handler=restore.restore)
+
+
+def _add_places(command: argparse.ArgumentParser, database: str) -> None:
+    command.add_argument("file", type=Path, metavar="FILE")
+    command.add_argument(
+        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
+    )
+    command.add_argument("--database", metavar="URL", default=settings.database(), help=database)
+
+
+COMMANDS: Final = {"backup": _add_backup, "restore": _add_restore}
 
 
 def _backup(options: argparse.Namespace) -> int:

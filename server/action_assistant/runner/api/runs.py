@@ -23,12 +23,12 @@ from action_assistant.runner.api.openapi import (
     StartOperation,
     StopOperation,
 )
+from action_assistant.runner.api.review import json_of
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.review import listing
 from action_assistant.runner.review.service import ReviewService
-from action_assistant.runner.review.worker_queries import json_of
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.run import Run, State
 from action_assistant.runner.start.admission import decoded, read_request

@@ -9,11 +9,10 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, Concatenate, Final, NoReturn, ParamSpec, TypeVar, cast
+from typing import Any, Concatenate, Final, NoReturn, ParamSpec, TypeVar
 
 import anyio
 import msgspec
-from litestar import MediaType, Response
 
 from action_assistant.errors import Refused, Unavailable
 from action_assistant.journal.events import Draft, StreamSnapshot
@@ -30,11 +29,6 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 _SETTLED_S: Final = 2.0  # for what was shown to be stored; then what is stored is told
-
-
-def json_of(text: bytes, _: type[T]) -> Response[T]:
-    """An answer that was encoded elsewhere; the type is for those who read the interface."""
-    return cast("Response[T]", Response(text, media_type=MediaType.JSON))
 
 
 class StoragePaths(msgspec.Struct, frozen=True):

@@ -6,8 +6,10 @@ from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Annotated, Any, Final
 
+import anyio
 import msgspec
-from litestar import Litestar, MediaType, Request, Response, get
+from anyio import to_thread
+from litestar import Litestar, MediaType, Request, Response, Router, get
 from litestar.connection import ASGIConnection
 from litestar.handlers.base import BaseRouteHandler
 from litestar.openapi import OpenAPIConfig
@@ -84,7 +86,7 @@ def application(
         logging_config=None,
     )
     decisions.update(_decisions(inner))
-    api.prepare(inner.openapi_schema.to_schema())
+    api.make = lambda: inner.openapi_schema.to_schema()
 
     def root_of(scope: HTTPScope) -> str:
         state: dict[str, Any] = scope.get("state", {})
@@ -183,27 +185,52 @@ def _socket(url: str) -> str:
 
 class _OpenApiText(JsonRenderPlugin):
     """OpenAPI as JSON. Litestar leaves out an empty `security`, which is how a route says that it
-    is open to strangers; the others say in `x-needs` what one must be allowed to do."""
+    is open to strangers; the others say in `x-needs` what one must be allowed to do.
+
+    It takes a fifth of a second to make, so that is done when it is first asked for, and on a
+    thread: nothing else waits for it.
+    """
 
     def __init__(self, decisions: Mapping[tuple[str, str], Deed]) -> None:
         super().__init__(path="/openapi.json")
+        self.make: Callable[[], dict[str, Any]] = dict
         self._decisions = decisions
         self._text = b""
+        self._turn = anyio.Lock()
 
-    def render(self, request: Request[Any, Any, Any], openapi_schema: dict[str, Any]) -> bytes:
-        """The text of the schema."""
-        return self._text or self.prepare(openapi_schema)
+    def router(self) -> Router:
+        """For Litestar's routes of it, which would make it while everybody waits."""
 
-    def prepare(self, openapi_schema: dict[str, Any]) -> bytes:
-        """Make the text, once and before anybody asks: that takes a tenth of a second."""
-        for path, item in openapi_schema["paths"].items():
+        # Litestar copies what it is given, but no functions.
+        async def answer(request: Request[Any, Any, Any]) -> Response[bytes] | None:
+            if request.route_handler.media_type != self.media_type:
+                return None  # there is no such page
+            return Response(await self._known(), media_type=self.media_type)
+
+        return Router(
+            "/schema",
+            route_handlers=[],
+            before_request=answer,
+            include_in_schema=False,
+            dto=None,
+            return_dto=None,
+        )
+
+    async def _known(self) -> bytes:
+        async with self._turn:
+            if not self._text:
+                self._text = await to_thread.run_sync(self._made)
+        return self._text
+
+    def _made(self) -> bytes:
+        schema = self.make()
+        for path, item in schema["paths"].items():
             for method, operation in item.items():
                 if _answers_strangers(path):
                     operation["security"] = []
                 elif (path, method) in self._decisions:
                     operation["x-needs"] = self._decisions[path, method]
-        self._text = msgspec.json.encode(openapi_schema)
-        return self._text
+        return msgspec.json.encode(schema)
 
 
 def _openapi(title: str, api: _OpenApiText) -> OpenAPIConfig:
@@ -211,7 +238,7 @@ def _openapi(title: str, api: _OpenApiText) -> OpenAPIConfig:
     return OpenAPIConfig(
         title=title,
         version=VERSION,
-        path="/schema",
+        openapi_router=api.router(),
         render_plugins=[api],
         components=Components(security_schemes=schemes),
         security=[{"token": []}],

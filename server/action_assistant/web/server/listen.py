@@ -1,7 +1,6 @@
 """Listening: sockets bound first, so that a taken port is one clear sentence; then uvicorn."""
 
 import asyncio
-import errno
 import gc
 import logging
 import os
@@ -21,11 +20,11 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from action_assistant.errors import BadInput, CannotStart
 from action_assistant.public_url import Network
-from action_assistant.settings import EVERYWHERE
 from action_assistant.web.auth.access import KNOWN
 from action_assistant.web.network.certificate import Certificate
 from action_assistant.web.network.connections import Connections, raise_limit
 from action_assistant.web.server.proxy import Forwarded
+from action_assistant.web.server.sockets import bound
 
 log: Final = logging.getLogger(__name__)
 
@@ -44,7 +43,6 @@ _LENGTH_REQUIRED: Final = (
 )
 _LOOK_S: Final = 60.0  # between two looks at the certificate
 _GARBAGE: Final = (10_000, 10, 10)  # objects, and collections of the younger generations
-UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it was sent is gone
 
 
 def serve(
@@ -294,6 +292,7 @@ class _Server(uvicorn.Server):
         gc.collect()
         gc.freeze()
         gc.set_threshold(*_GARBAGE)
+        gc.enable()
 
     def _protocol(self) -> asyncio.Protocol:
         return _Http(
@@ -313,56 +312,6 @@ def _in_one_line(record: logging.LogRecord) -> bool:
         record.exc_info = None
         record.levelno, record.levelname = logging.WARNING, "WARNING"
     return True
-
-
-def bound(host: str, port: int) -> list[socket.socket]:
-    """Sockets for the address; both loopback families for a loopback name, so that nobody else
-    can stand in for us under `localhost`; both families for everywhere."""
-    hosts = [host]
-    if host in {"127.0.0.1", "localhost"}:
-        hosts = ["127.0.0.1", "::1"]
-    elif host == EVERYWHERE:
-        hosts = ["0.0.0.0", "::"]
-    found: list[socket.socket] = []
-    for name in hosts:
-        family = socket.AF_INET6 if ":" in name else socket.AF_INET
-        try:
-            listener = socket.socket(family, socket.SOCK_STREAM)
-        except OSError:  # no IPv6 on this machine
-            continue
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        _forget_silent_peers(listener)
-        if family == socket.AF_INET6:
-            listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
-        try:
-            listener.bind((name, port))
-            listener.listen(2048)
-        except OSError as error:
-            listener.close()
-            if name in {"::1", "::"} and found and error.errno != errno.EADDRINUSE:
-                continue  # IPv6 is known to the kernel but switched off
-            for other in found:
-                other.close()
-            raise CannotStart(_why(name, port, error)) from error
-        found.append(listener)
-    return found
-
-
-def _forget_silent_peers(listener: socket.socket) -> None:
-    """Have the kernel drop peers that vanished, and those that read nothing: what waits for them
-    would be kept for ever. Connections inherit this from the socket that accepts them."""
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    options = {"TCP_USER_TIMEOUT": UNHEARD * 1000, "TCP_KEEPIDLE": UNHEARD, "TCP_KEEPINTVL": 5}
-    for name, value in options.items():
-        number = getattr(socket, name, None)  # not every system has them
-        if number is not None:
-            listener.setsockopt(socket.IPPROTO_TCP, number, value)
-
-
-def _why(host: str, port: int, error: OSError) -> str:
-    if error.errno == errno.EADDRINUSE:
-        return f"Port {port} is taken on {host}; choose another with --port."
-    return f"Cannot listen on {host}, port {port}: {error.strerror}."
 
 
 def _end_with_parent(server: uvicorn.Server) -> None:

@@ -1,0 +1,32 @@
+"""Alembic, with the scripts of this program: from one revision of a database to another."""
+
+import logging
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from sqlalchemy import Connection
+
+from action_assistant import paths
+from action_assistant.schema.branches import BRANCHES
+
+logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in one line
+
+
+def config_for(connection: Connection, branch: str) -> Config:
+    """Alembic's configuration, pointed at our scripts and at a connection that is open."""
+    folder = paths.migrations()
+    config = Config(attributes={"connection": connection, "metadata": BRANCHES[branch]})
+    config.set_main_option("script_location", str(folder).replace("%", "%%"))
+    config.set_main_option("version_path_separator", "newline")
+    config.set_main_option("path_separator", "newline")
+    locations = "\n".join(str(folder / name) for name in BRANCHES)
+    config.set_main_option("version_locations", locations.replace("%", "%%"))
+    return config
+
+
+def upgrade(connection: Connection, branch: str, revision: str) -> str:
+    """Run the scripts up to a revision, and return it."""
+    command.upgrade(config_for(connection, branch), f"{branch}@{revision}")
+    (now,) = MigrationContext.configure(connection).get_current_heads()
+    return now
