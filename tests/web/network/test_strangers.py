@@ -141,6 +141,10 @@ UPGRADE = (
     b"connection: Upgrade\r\nupgrade: websocket\r\nsec-websocket-version: 13\r\n"
     b"sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
 )
+UNFINISHED = (
+    b"%b HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\naccept: %b\r\n"
+    b"content-length: 50\r\n\r\n{"
+)
 NO_TEXT = b"\x81\x82\0\0\0\0\xff\xff"
 
 
@@ -166,3 +170,37 @@ def test_what_a_peer_does_not_finish_or_spells_wrongly_is_no_failure_of_ours(
     assert "Invalid UTF-8" in log
     assert "Traceback" not in log
     assert "ended early" in log
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "accept"),
+    [
+        ("editor", b"GET /api/graphs", b"*/*"),
+        ("editor", b"GET /healthz", b"*/*"),
+        ("editor", b"GET /api/events?after=0", b"text/event-stream"),
+        ("editor", b"GET /api/graphs/%b/umrf", b"*/*"),
+        ("runner", b"GET /api/runs", b"*/*"),
+        ("runner", b"GET /api/robots", b"*/*"),
+        ("runner", b"DELETE /api/session", b"*/*"),
+    ],
+)
+def test_a_body_that_nobody_asked_for_and_that_does_not_end_is_one_line(
+    tmp_path: Path, name: str, asked: bytes, accept: bytes
+) -> None:
+    with process(name, tmp_path) as port, ExitStack() as stack:
+        url = f"http://127.0.0.1:{port}"
+        if b"%b" in asked:
+            made = httpx.post(
+                f"{url}/api/graphs", json={"name": "g"}, headers=BEARER, trust_env=False
+            )
+            asked %= made.json()["id"].encode()
+        before = (tmp_path / "log").read_text().splitlines()
+        for _ in range(3):
+            (one,) = crowd(stack, port, 1, UNFINISHED % (asked, TOKEN.encode(), accept))
+            time.sleep(0.3)
+            one.close()
+        time.sleep(0.3)
+        httpx.get(f"{url}/healthz", trust_env=False)
+        log = (tmp_path / "log").read_text()
+    assert "Traceback" not in log
+    assert len(log.splitlines()) <= len(before) + 4

@@ -33,6 +33,7 @@ WEBSOCKET_LIMIT: Final = 1_114_112  # bytes; an update of 1 MiB and its frame
 GRACE: Final = 5  # seconds that open requests get when the process is told to end
 HEAD_LIMIT: Final = 32_768  # bytes of a request line and its header fields
 _CALLS: Final = frozenset({"http", "websocket"})
+_WITHOUT_BODY: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Processor time and time (seconds) when what is answered came in.
 _RECEIVED: Final[ContextVar[tuple[float, float]]] = ContextVar("received", default=(0.0, 0.0))
 _FAILED: Final = 3  # exit code when the application could not be set up
@@ -192,7 +193,7 @@ class ActivityTracker:
             await self._app(scope, receive, send)
             return
         peer: Any = scope.get("client")
-        whole = scope["type"] == ScopeType.WEBSOCKET or not _has_body(scope)
+        whole = not _waits_for_body(scope)
 
         async def received() -> Any:
             nonlocal whole
@@ -219,8 +220,11 @@ class ActivityTracker:
             await self._app(scope, received, sent)
 
 
-def _has_body(scope: Scope) -> bool:
-    """Whether a body was announced."""
+def _waits_for_body(scope: Scope) -> bool:
+    """Whether a body was announced, and means anything. What is asked with others is answered without
+    it: whoever waits for their end would hear of a failure there."""
+    if scope["type"] != ScopeType.HTTP or scope["method"] in _WITHOUT_BODY:
+        return False
     return any(name == b"content-length" and value != b"0" for name, value in scope["headers"])
 
 
