@@ -25,7 +25,7 @@ from action_assistant.settings import EVERYWHERE
 from action_assistant.web.auth.access import KNOWN
 from action_assistant.web.network.certificate import Certificate
 from action_assistant.web.network.connections import Connections, raise_limit
-from action_assistant.web.server.proxy import Forwarded
+from action_assistant.web.server.proxy import ASKED, Forwarded
 
 log: Final = logging.getLogger(__name__)
 
@@ -70,9 +70,10 @@ def serve(
         for listener in sockets:
             listener.close()
         raise
-    connections = Connections(raise_limit())
+    forwarded = Forwarded(endings, proxies)
+    connections = Connections(raise_limit(), forwarded.is_proxy)
     config = uvicorn.Config(
-        ActivityTracker(Forwarded(endings, proxies), connections),
+        ActivityTracker(forwarded, connections),
         http=_Http,
         h11_max_incomplete_event_size=HEAD_LIMIT,
         lifespan="on",
@@ -215,8 +216,8 @@ class ActivityTracker:
                 message["headers"] = [*message.get("headers", []), _own_share()]
             await send(message)
 
-        with self._connections.answering(peer and tuple(peer)) as known:
-            scope.setdefault("state", {})[KNOWN] = known
+        with self._connections.answering(peer and tuple(peer)) as holder:
+            scope.setdefault("state", {}).update({KNOWN: holder.known, ASKED: holder.asked})
             await self._app(scope, received, sent)
 
 
