@@ -10,10 +10,11 @@ import httpx
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor.crdt import document_quota, messages, trial
+from action_assistant.editor.crdt import document_quota, messages, opening_time, trial
 from action_assistant.editor.interchange import importing
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import TooLarge
+from action_assistant.journal.journal import Journal
 from editor.api.test_sockets import closed
 from editor.client import Client, settle
 from editor.process import BEARER, Editor
@@ -289,3 +290,92 @@ async def test_what_waits_and_is_harmless_is_let_in(rooms: Rooms) -> None:
         assert await room.submit(second, "eve") == 2
         assert await room.submit(first, "eve") == 3
         assert (await room.quiet()).waiting == ()
+
+
+def one_more(clock: int, count: int, client: int = 7) -> bytes:
+    """As `at_once`, of a client that goes on."""
+    return at_once(count, client, clock)
+
+
+async def test_many_small_updates_make_no_graph_that_takes_long_to_open(
+    rooms: Rooms, journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of them is as quick as others. All of them together hold everybody up, again and again."""
+    monkeypatch.setattr(opening_time, "SECONDS", 0.02)
+    ada, eve = Client("ada"), Client("eve")
+    async with rooms.enter("graph/g") as room:
+        for client in (ada, eve):
+            client.join(room)
+        ada.map["k"] = "v"
+        await settle(ada, eve)
+        for clock in range(0, 18_000, 600):
+            eve.deliver(messages.change(one_more(clock, 600)))
+        await settle(ada, eve)
+        assert eve.member is not None
+        assert await eve.member.ended() == messages.FULL
+        assert eve.member.said == "a graph may take 0.0 s to open; go on with a copy of it"
+        del ada.map["k"]
+        await settle(ada)
+        assert ada.durable == ada.sent
+        state = (await room.quiet()).doc.get_update()
+    begun = time.process_time()
+    Doc[Any]().apply_update(state)
+    assert time.process_time() - begun < 0.2  # 0.8 s otherwise
+
+
+async def test_who_opens_it_often_does_not_get_further(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(opening_time, "SECONDS", 0.02)
+    ended = None
+    for clock in range(0, 18_000, 600):
+        eve, rooms = Client("eve"), Rooms(journal, window=0)
+        async with rooms.enter("graph/g") as room:
+            eve.join(room)
+            await settle(eve)
+            eve.deliver(messages.change(one_more(clock, 600)))
+            await room.quiet()
+            assert eve.member is not None
+            if eve.member.closed:
+                ended = clock, await eve.member.ended()
+        await rooms.close()
+        if ended is not None:
+            break
+    assert ended is not None
+    assert ended[1] == messages.FULL
+    assert ended[0] < 12_000
+
+
+def page_edit(n: int, own: int = 200) -> bytes:
+    """What the n-th page writes, each a client of its own: over what the one before it wrote, and over
+    what an earlier one did."""
+    number, text = messages.number, messages.text
+
+    def value(key: bytes, after: int, clock: int) -> bytes:
+        if after < 0:
+            return b"\x28\x01\x01a" + text(key) + b"\x01\x79"
+        return b"\xa8" + number(1_000_000 + 7 * after) + number(clock) + b"\x01\x79"
+
+    head = b"\x01\x02" + number(1_000_000 + 7 * n) + b"\x00"
+    return head + value(b"shared", n - 1, 0) + value(b"own %d" % (n % own), n - own, 1) + b"\x00"
+
+
+async def test_thousands_of_pages_that_edit_one_graph_are_hardly_ever_tried(
+    journal: Journal,
+) -> None:
+    """Each page that is opened is a client of its own, which overwrites what others wrote."""
+    tries = 0
+
+    async def counted(work: Callable[..., Any], *values: Any) -> Any:
+        nonlocal tries
+        tries += 1
+        return work(*values)
+
+    rooms = Rooms(journal, linger=60, window=0, tried=counted)
+    async with rooms.enter("graph/g") as room:
+        for n in range(0, 4_000, 20):
+            await asyncio.gather(*(room.submit(page_edit(m), "ada") for m in range(n, n + 20)))
+        assert room.seq == 4_000
+        assert (await room.quiet()).doc.get("a", type=Map)["shared"] is False
+    await rooms.close()
+    assert tries < 30

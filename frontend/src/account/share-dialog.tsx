@@ -4,9 +4,10 @@ import { useMediaQuery } from "@mantine/hooks";
 import { IconLock, IconLockOpen2, IconPlugConnectedX } from "@tabler/icons-react";
 import { useState } from "react";
 import { errorText } from "../api/http";
+import { useLive } from "../api/live/use-live";
 import { pageUrl } from "../api/page-url";
 import { ROLE_WORDS, type Role } from "../api/session";
-import { type Sharing, useInvite, useSharing } from "../api/sharing";
+import { type Sharing, useInvite, useRevoke, useSharing } from "../api/sharing";
 import style from "./share-dialog.module.css";
 import { ShareLink } from "./share-link";
 
@@ -111,6 +112,7 @@ function NewLink() {
 
 function Body() {
   const sharing = useSharing();
+  const revoke = useRevoke(useLive().runner);
   const [chosen, setChosen] = useState<string | null>(null);
   if (sharing.isError) return <Text>{errorText(sharing.error)}</Text>;
   if (!sharing.data) return <div className={style.waiting} aria-busy="true" />;
@@ -142,10 +144,27 @@ function Body() {
           </div>
           <ul>
             {open.map((invitation) => (
-              <ShareLink key={invitation.id} invitation={invitation} origin={origin} />
+              <ShareLink
+                key={invitation.id}
+                invitation={invitation}
+                origin={origin}
+                revoke={revoke}
+              />
             ))}
           </ul>
         </section>
+      )}
+      {revoke.isError && (
+        <p className={style.problem} role="alert">
+          {errorText(revoke.error)}{" "}
+          <Button
+            size="compact-sm"
+            loading={revoke.isPending}
+            onClick={() => revoke.mutate(revoke.variables)}
+          >
+            Try again
+          </Button>
+        </p>
       )}
       {over.length > 0 && (
         <Text size="sm" c="dimmed">

@@ -2,9 +2,7 @@
 import { Button, TextInput } from "@mantine/core";
 import { IconCheck, IconCopy, IconQrcode } from "@tabler/icons-react";
 import { useState } from "react";
-import { errorText } from "../api/http";
-import { useLive } from "../api/live/use-live";
-import { codeUrl, type Invitation, useRevoke } from "../api/sharing";
+import { codeUrl, type Invitation, type useRevoke } from "../api/sharing";
 import { copyText } from "../ui/copy-text";
 import { ago, instant, useNow } from "../ui/times";
 import style from "./share-dialog.module.css";
@@ -35,9 +33,14 @@ function Copy({ link, label }: { link: string; label: string }) {
   );
 }
 
-export function ShareLink({ invitation, origin }: { invitation: Invitation; origin: string }) {
-  const { runner } = useLive();
-  const revoke = useRevoke(runner);
+interface Props {
+  invitation: Invitation;
+  origin: string;
+  /** Of the dialog, which also shows what went wrong: a link that was revoked is gone from here. */
+  revoke: ReturnType<typeof useRevoke>;
+}
+
+export function ShareLink({ invitation, origin, revoke }: Props) {
   const now = useNow(20_000);
   const [code, setCode] = useState(false);
   const [asking, setAsking] = useState(false);
@@ -91,17 +94,12 @@ export function ShareLink({ invitation, origin }: { invitation: Invitation; orig
             size="compact-sm"
             color="red"
             variant="filled"
-            loading={revoke.isPending}
+            loading={revoke.isPending && revoke.variables === invitation.id}
             onClick={() => revoke.mutate(invitation.id)}
           >
             Revoke now
           </Button>
         </div>
-      )}
-      {revoke.isError && (
-        <p className={style.problem} role="alert">
-          {errorText(revoke.error)}
-        </p>
       )}
       {code && (
         <figure className={style.code}>

@@ -20,6 +20,7 @@ import {
   rememberedName,
   renamePerson,
   takeCredential,
+  takeFarewell,
 } from "../api/session";
 import { sessionEnd } from "../api/session-end";
 import { PersonContext } from "../api/use-person";
@@ -42,7 +43,7 @@ async function knock(): Promise<Gate> {
   } catch (error) {
     const refused = error instanceof Refusal && error.details.status === 401;
     if (refused && isWithdrawn(error)) return { at: "outside", why: WITHDRAWN };
-    if (refused && key === null) return { at: "outside", why: "" };
+    if (refused && key === null) return { at: "outside", why: takeFarewell() };
     const strange = refused && key?.kind === "token";
     return {
       at: "outside",

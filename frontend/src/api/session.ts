@@ -1,5 +1,5 @@
 /** Who this browser is: trades the token of the link for a cookie. */
-import { fetchJson } from "./http";
+import { errorText, fetchJson, Refusal } from "./http";
 import type { Role } from "./roles";
 
 export { may, type Permission, ROLE_WORDS, ROLES, type Role } from "./roles";
@@ -69,14 +69,43 @@ export async function currentPerson(): Promise<Person> {
   return (await fetchJson<SessionAnswer>("/api/session")).person;
 }
 
-/** Ends the session at the editor, and at a runner that has a data folder of its own: each ends it by
- * itself, so one that cannot be reached is told by the other. Throws when neither could. */
+const FAREWELL_KEY = "aa.farewell";
+
+/** Ends the session at the editor, and at a runner that has a data folder of its own. Where they share
+ * one, either does for both; the page cannot know, so that of one which was not told it is said
+ * afterwards (`takeFarewell`). Throws when neither could. */
 export async function signOut(runner: string | undefined): Promise<void> {
-  const places = ["", ...(runner === undefined ? [] : [runner])];
-  const told = places.map((place) => fetchJson(`${place}/api/session`, { method: "DELETE" }));
-  const outcomes = await Promise.allSettled(told);
-  const failed = outcomes.find((each) => each.status === "rejected");
-  if (failed && !outcomes.some((each) => each.status === "fulfilled")) throw failed.reason;
+  const [editor, other] = await Promise.allSettled([
+    endSession("The editor", ""),
+    runner === undefined ? lostRunner() : endSession("The runner", runner),
+  ]);
+  if (editor.status === "rejected" && other.status === "rejected") throw editor.reason;
+  const failed = [editor, other].find((each) => each.status === "rejected");
+  if (failed !== undefined) sessionStorage.setItem(FAREWELL_KEY, errorText(failed.reason));
+}
+
+/** Of a session that has ended already, as by the other one, nothing is left to do. */
+async function endSession(who: string, place: string): Promise<void> {
+  try {
+    await fetchJson(`${place}/api/session`, { method: "DELETE" });
+  } catch (error) {
+    if (error instanceof Refusal && error.details.status === 401) return;
+    throw new Error(`${who} could not end this session: ${errorText(error)} ${OWN_FOLDER}`);
+  }
+}
+
+function lostRunner(): Promise<never> {
+  return Promise.reject(new Error(`The page did not find the runner. ${OWN_FOLDER}`));
+}
+
+const OWN_FOLDER =
+  "If it has a data folder of its own, it goes on to take a copy of this session’s cookie for valid.";
+
+/** What could not be done when this browser signed out last; told once. */
+export function takeFarewell(): string {
+  const said = sessionStorage.getItem(FAREWELL_KEY) ?? "";
+  sessionStorage.removeItem(FAREWELL_KEY);
+  return said;
 }
 
 /** The same session under another name. */

@@ -1,7 +1,7 @@
 /** Links that let people in, as owners see them. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import type { VersionAuthor } from "./graphs";
-import { fetchJson } from "./http";
+import { errorText, fetchJson } from "./http";
 import { serverPath } from "./page-url";
 import type { Role } from "./roles";
 
@@ -35,6 +35,8 @@ export interface Sharing {
 }
 
 const KEY = ["invitations"] as const;
+const NOT_AT_THE_RUNNER =
+  "The link is revoked at the editor. A runner with a data folder of its own was not told:";
 const LOOK = 4_000; // ms: who came in is seen soon
 
 export function useSharing() {
@@ -66,7 +68,11 @@ export function useRevoke(runner: string | undefined) {
       }
       // Each puts them out by itself, whatever the other says.
       const outcomes = await Promise.allSettled(told);
-      for (const each of outcomes) if (each.status === "rejected") throw each.reason;
+      const failed = outcomes.findIndex((each) => each.status === "rejected");
+      const outcome = outcomes[failed];
+      if (outcome?.status !== "rejected") return;
+      if (failed === 0) throw outcome.reason;
+      throw new Error(`${NOT_AT_THE_RUNNER} ${errorText(outcome.reason)}`);
     },
     onSettled: () => client.invalidateQueries({ queryKey: KEY }),
   });

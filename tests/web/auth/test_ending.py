@@ -1,7 +1,9 @@
 """The end of links and sessions, whatever else has failed: a full disk, no database, no editor."""
 
+import asyncio
 import contextlib
 import itertools
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +15,7 @@ import pytest
 from action_assistant.errors import NotFound, Unavailable
 from action_assistant.web.auth import sessions
 from action_assistant.web.auth.keys import Keys, Session
-from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.revocations import Revocations, SessionGuards
 from action_assistant.web.auth.session_files import SessionFiles
 from editor.process import running as editor_running
 from journal import servers
@@ -275,3 +277,67 @@ def test_a_cookie_of_an_older_version_goes_on_and_can_be_ended(
         assert old.id in {each["id"] for each in editor.get("/api/sessions").json()}
     assert guest.http.delete("/api/session").status_code == 204
     assert guest.runner("POST", "/api/stop").status_code == 401
+
+
+async def test_hundreds_of_open_sockets_are_watched_with_one_look_at_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks = 0
+    stat = Path.stat
+
+    def counted(path: Path, **more: Any) -> os.stat_result:
+        nonlocal looks
+        looks += 1
+        return stat(path, **more)
+
+    guards, cut = SessionGuards(Revocations(tmp_path)), list[str]()
+
+    async def socket(session: Session) -> None:
+        with guards.hold(session) as guard:
+            try:
+                await asyncio.sleep(60)
+            except asyncio.CancelledError:
+                assert guard.is_cut
+                cut.append(session.id)
+
+    sessions = [KEYS.new_session("", invitation=f"link{n % 3}") for n in range(300)]
+    tasks = [asyncio.create_task(socket(each)) for each in sessions]
+    await asyncio.sleep(0)
+    monkeypatch.setattr(Path, "stat", counted)
+    await asyncio.sleep(1)
+    assert 1 <= looks < 20
+    other = Revocations(tmp_path)  # another process
+    for each in sessions[:3]:
+        other.end(each.id)
+        await asyncio.sleep(0.25)
+    other.end(sessions[3].id)
+    other.add("link2")
+    await asyncio.sleep(0.5)
+    gone = {each.id for n, each in enumerate(sessions) if n < 4 or n % 3 == 2}
+    assert set(cut) == gone
+    monkeypatch.undo()
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def test_who_is_watched_is_also_put_out_when_the_folder_cannot_be_listed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    revoked, session = Revocations(tmp_path), KEYS.new_session("")
+    guards = SessionGuards(revoked)
+
+    def unreadable(path: Path) -> Iterator[Path]:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    async def socket() -> bool:
+        with guards.hold(session) as guard:
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.sleep(5)
+            return guard.is_cut
+
+    monkeypatch.setattr(Path, "iterdir", unreadable)
+    task = asyncio.create_task(socket())
+    await asyncio.sleep(0.3)
+    (tmp_path / "revoked" / f"session-{session.id}").touch()
+    assert await task

@@ -1,5 +1,6 @@
 """Who says nothing, or not who they are, takes no room from those who are signed in."""
 
+import contextlib
 import os
 import resource
 import socket
@@ -141,6 +142,10 @@ UPGRADE = (
     b"connection: Upgrade\r\nupgrade: websocket\r\nsec-websocket-version: 13\r\n"
     b"sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
 )
+UNFINISHED = (
+    b"%b HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\naccept: %b\r\n"
+    b"content-length: 50\r\n\r\n{"
+)
 NO_TEXT = b"\x81\x82\0\0\0\0\xff\xff"
 
 
@@ -166,3 +171,88 @@ def test_what_a_peer_does_not_finish_or_spells_wrongly_is_no_failure_of_ours(
     assert "Invalid UTF-8" in log
     assert "Traceback" not in log
     assert "ended early" in log
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "accept"),
+    [
+        ("editor", b"GET /api/graphs", b"*/*"),
+        ("editor", b"GET /healthz", b"*/*"),
+        ("editor", b"GET /api/events?after=0", b"text/event-stream"),
+        ("editor", b"GET /api/graphs/%b/umrf", b"*/*"),
+        ("runner", b"GET /api/runs", b"*/*"),
+        ("runner", b"GET /api/robots", b"*/*"),
+        ("runner", b"DELETE /api/session", b"*/*"),
+    ],
+)
+def test_a_body_that_nobody_asked_for_and_that_does_not_end_is_one_line(
+    tmp_path: Path, name: str, asked: bytes, accept: bytes
+) -> None:
+    with process(name, tmp_path) as port, ExitStack() as stack:
+        url = f"http://127.0.0.1:{port}"
+        if b"%b" in asked:
+            made = httpx.post(
+                f"{url}/api/graphs", json={"name": "g"}, headers=BEARER, trust_env=False
+            )
+            asked %= made.json()["id"].encode()
+        before = (tmp_path / "log").read_text().splitlines()
+        for _ in range(3):
+            (one,) = crowd(stack, port, 1, UNFINISHED % (asked, TOKEN.encode(), accept))
+            time.sleep(0.3)
+            one.close()
+        time.sleep(0.3)
+        httpx.get(f"{url}/healthz", trust_env=False)
+        log = (tmp_path / "log").read_text()
+    assert "Traceback" not in log
+    assert len(log.splitlines()) <= len(before) + 4
+
+
+SLOW = (
+    b"POST /api/session HTTP/1.1\r\nhost: localhost\r\norigin: http://localhost:%d\r\n"
+    b"x-forwarded-for: %b\r\ncontent-type: application/json\r\ncontent-length: 17\r\n\r\n{"
+)
+
+
+def slow(stack: ExitStack, port: int, source: str, asker: str) -> socket.socket:
+    """A stranger who is in the middle of a request, as who comes from `source` passes it on."""
+    one = stack.enter_context(
+        socket.create_connection(("127.0.0.1", port), timeout=5, source_address=(source, 0))
+    )
+    one.send(SLOW % (port, asker.encode()))
+    time.sleep(0.005)
+    return one
+
+
+def is_answered(one: socket.socket) -> bool:
+    """Whether the request is answered, once it is complete."""
+    with contextlib.suppress(OSError):
+        one.send(b'"token":"wrong"}')
+        return one.recv(100).startswith(b"HTTP/1.1 401")
+    return False
+
+
+@pytest.mark.parametrize(
+    ("source", "asker"),
+    [
+        ("127.0.0.1", "198.51.100.1, 203.0.113.9"),
+        ("127.0.0.3", "203.0.113.%d"),  # who is no proxy, and says of each that it is another one's
+    ],
+    ids=["behind the proxy", "forged"],
+)
+def test_one_who_floods_through_a_proxy_takes_nothing_from_others_behind_it(
+    tmp_path: Path, source: str, asker: str
+) -> None:
+    with (
+        process("editor", tmp_path, "--trusted-proxies", "127.0.0.1") as port,
+        ExitStack() as stack,
+    ):
+        others = [slow(stack, port, "127.0.0.1", f"203.0.113.{n}") for n in range(100, 110)]
+        for n in range(FEW):
+            slow(stack, port, source, asker % n if "%" in asker else asker)
+        assert [is_answered(each) for each in others] == [True] * 10
+        fresh = slow(stack, port, "127.0.0.1", "203.0.113.200")
+        assert is_answered(fresh)
+        answer = httpx.get(
+            f"http://127.0.0.1:{port}/api/graphs", headers=BEARER, trust_env=False, timeout=5
+        )
+        assert answer.status_code == 200

@@ -2,6 +2,7 @@
 
 import itertools
 import logging
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from enum import Enum
@@ -13,6 +14,7 @@ from pycrdt import Doc, get_update
 from action_assistant.editor.crdt.document_quota import DocumentQuota
 from action_assistant.editor.crdt.messages import NOTHING_NEW, ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Nesting
+from action_assistant.editor.crdt.opening_time import OpeningTime
 from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
 from action_assistant.editor.log.document_events import DEFERRED, UPDATED
 from action_assistant.journal.events import Event
@@ -55,6 +57,7 @@ class Replica:
         self.doc: Final[Doc[Any]] = Doc()
         self.owners: dict[int, str] = {}
         self.nesting = Nesting()
+        self.opening = OpeningTime()
         self._quota = DocumentQuota(self.doc)
         self._known: dict[int, int] = {}
         self._fired = False
@@ -105,7 +108,9 @@ class Replica:
 
     def begin(self, kept: "ReplicaState") -> None:
         """Take up where a snapshot was made. Raises Malformed, Panicked."""
+        begun = time.thread_time()
         self._apply(kept.state)
+        self.opening.opened(time.thread_time() - begun, len(kept.state))
         self._quota.took(len(kept.state))
         self.owners, self.nesting = kept.owners, Nesting(kept.spans)
         self._known = clocks(self.doc.get_state())
@@ -131,6 +136,7 @@ class Replica:
         with suppress(Malformed):
             self.nesting.learn(self.nesting.depths(read.placed, self._known))
         self._count(read, size)
+        self.opening.took(read.structs)
 
     def _check_patience(self, update: bytes, author: str) -> None:
         sizes = [len(each) for each, (_, whose) in self._waiting.items() if whose == author]
@@ -189,6 +195,8 @@ class Replica:
         self._apply(update)
         self.nesting.learn(depths)
         self._count(read, len(update))
+        if self._fired:
+            self.opening.took(read.structs)
         return self._fired
 
     def _count(self, read: UpdateOutline, size: int) -> None:

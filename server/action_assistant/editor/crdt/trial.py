@@ -22,21 +22,28 @@ _ENDS: Final = 8 * SECONDS  # of a processor, after which the process that tries
 _INSIDE: Final = 5_000  # structs of an update in which something lies inside something else
 
 
+class TriedOutline(UpdateOutline, frozen=True):
+    """The outline of an update that was tried; `opening`: seconds that its document took to be opened."""
+
+    opening: float = 0.0
+
+
 class TooSlow(Exception):
     """An update that holds everybody up"""
 
 
-def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> UpdateOutline:
+def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> TriedOutline:
     """The outline of an update that may be applied to a document of this state, and after it the
     updates that waited for it. For workers: one that takes far too long ends the process. Raises Malformed, Panicked, TooSlow."""
     read = outline(update)
-    if not any(each.inside for each in read.placed):
-        read = UpdateOutline(read.brings, read.needs, (), read.actions, read.fields)
-    elif len(read.placed) > _INSIDE:
+    placed = read.placed if any(each.inside for each in read.placed) else ()
+    if len(placed) > _INSIDE:
         raise Malformed("too much that lies inside something else")
     doc: Doc[Any] = Doc()
     with applying():
+        begun = time.process_time()
         doc.apply_update(state)
+        opening = time.process_time() - begun
         begun = time.process_time()
         with _ended_after(_ENDS):
             for each in (update, *released):
@@ -44,7 +51,9 @@ def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> UpdateOutli
         spent = time.process_time() - begun
     if spent > SECONDS:
         raise TooSlow("This change takes so long that everybody would have to wait for it")
-    return read
+    return TriedOutline(
+        read.brings, read.needs, placed, read.actions, read.fields, read.structs, opening
+    )
 
 
 @contextlib.contextmanager

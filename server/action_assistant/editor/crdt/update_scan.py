@@ -26,13 +26,15 @@ _NAMED_TYPES: Final = frozenset({3, 5})
 class UpdateOutline(msgspec.Struct, frozen=True):
     """What an update brings, `(client, from clock, to clock)`, and what must be there before it:
     of each client so many clocks. `placed`: what need not lie in a root. `fields`: how many keys that
-    may be new are among it, `actions`: how many of them are new actions."""
+    may be new are among it, `actions`: how many of them are new actions; `structs`: how many there are
+    in all."""
 
     brings: tuple[tuple[int, int, int], ...]
     needs: dict[int, int]
     placed: tuple[Placed, ...] = ()
     actions: int = 0
     fields: int = 0
+    structs: int = 0
 
     def ready(self, known: dict[int, int]) -> bool:
         """Whether everything that it builds on is known, or comes with it."""
@@ -87,7 +89,7 @@ def outline(update: bytes) -> UpdateOutline:
     _deletions(reader, needs)
     if reader.left:
         raise Malformed("something follows the update")
-    return UpdateOutline(tuple(brings), needs, tuple(placed), actions, fields)
+    return UpdateOutline(tuple(brings), needs, tuple(placed), actions, fields, structs)
 
 
 def _client(reader: ByteReader) -> int:

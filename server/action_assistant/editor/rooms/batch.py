@@ -11,8 +11,7 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import ForeignClient, Panicked, Replica, TooMuchWaits
-from action_assistant.editor.crdt.trial import TooSlow, tried
-from action_assistant.editor.crdt.update_scan import UpdateOutline
+from action_assistant.editor.crdt.trial import TooSlow, TriedOutline, tried
 from action_assistant.editor.rooms.member import Member
 from action_assistant.errors import BadInput, Refused, TooLarge
 from action_assistant.web.auth.caller import acting_for
@@ -135,7 +134,7 @@ async def tried_for(
     state: bytes,
     update: bytes,
     released: Sequence[bytes] = (),
-) -> UpdateOutline:
+) -> TriedOutline:
     """The outline of an update that may be applied to a document of this state, and after it the
     updates that waited for it.
 
@@ -169,6 +168,18 @@ def batch_of(items: list[Item], *, one: bool = False) -> tuple[list[Item], list[
         if own > LARGE:
             break
     return items[:count], items[count:]
+
+
+def before_doubt(items: Sequence[Item], is_doubtful: Callable[[int], bool]) -> int:
+    """How many of these, from the first one on, may be taken together without doubt that the document
+    can be opened soon enough after them. `is_doubtful` is asked with a number of bytes."""
+    size = 0
+    for n, item in enumerate(items):
+        if isinstance(item, Offer):
+            size += len(item.update)
+            if is_doubtful(size):
+                return n
+    return len(items)
 
 
 def merged(updates: list[bytes]) -> list[bytes]:

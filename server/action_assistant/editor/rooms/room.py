@@ -38,6 +38,7 @@ from action_assistant.editor.rooms.batch import (
     Offer,
     Taken,
     batch_of,
+    before_doubt,
     merged,
     refuse,
     tried_for,
@@ -239,11 +240,10 @@ class Room:
             self._end(reason)
 
     async def _handle(self) -> None:
-        much_waits = self._replica.waiting_bytes > LARGE
-        batch, self._waiting = batch_of(self._waiting, one=much_waits)
+        batch, alone = self._next_batch()
         self._in_hand = batch
         match batch:
-            case [Offer(update) as offer] if much_waits or len(update) > LARGE:
+            case [Offer() as offer] if alone:
                 taken = await self._take_large(offer)
             case _:
                 taken = self._take(batch)
@@ -265,6 +265,22 @@ class Room:
             await self._keep_snapshot()
         if not taken.news:
             await asyncio.sleep(0)  # nothing was awaited; others want a turn
+
+    def _next_batch(self) -> tuple[list[Item], bool]:
+        """What is taken next, and whether that is an edit which has to be tried first."""
+        much_waits = self._replica.waiting_bytes > LARGE
+        batch, rest = batch_of(self._waiting, one=much_waits)
+        sure = before_doubt(batch, self._is_doubtful)
+        count = max(sure, 1)
+        self._waiting = [*batch[count:], *rest]
+        match batch[:count]:
+            case [Offer(update)] as alone if much_waits or not sure or len(update) > LARGE:
+                return alone, True
+            case several:
+                return several, False
+
+    def _is_doubtful(self, size: int) -> bool:
+        return self._replica.opening.is_doubtful_with(size + self._replica.waiting_bytes)
 
     def _take(self, batch: Sequence[Item]) -> Taken:
         """Apply a batch. After a panic the rest of it waits for a sound document."""
@@ -293,7 +309,7 @@ class Room:
             read = None
             if member is None or (member.edits and not member.refused):
                 read = await self._tried_first(offer)
-        except (Malformed, TooSlow, Panicked, NotNow) as error:
+        except (Malformed, TooSlow, Panicked, NotNow, QuotaExceeded) as error:
             log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
             refuse(offer, error)
             return taken
@@ -302,8 +318,9 @@ class Room:
 
     async def _tried_first(self, offer: Offer) -> UpdateOutline | None:
         """Its outline; None where it has to be read again, since in a document with depth also what
-        lies beside something deep counts. Raises Malformed, Panicked, TooSlow, NotNow."""
-        large = len(offer.update) > LARGE
+        lies beside something deep counts. Raises Malformed, Panicked, TooSlow, NotNow,
+        QuotaExceeded."""
+        large = len(offer.update) > LARGE or self._is_doubtful(len(offer.update))
         read = None if large else outline(offer.update)
         released = [] if read is None else self._replica.freed_by(read)
         if read is not None and sum(map(len, released)) <= LARGE:
@@ -311,6 +328,8 @@ class Room:
         state = self._replica.doc.get_update()
         waiting = released or self._replica.waiting
         tried = await tried_for(offer.author, self._tried, state, offer.update, waiting)
+        self._replica.opening.opened(tried.opening, len(state))
+        self._replica.opening.refuse(tried)
         return None if self._replica.nesting.spans else tried
 
     def _take_in(self, offer: Offer, taken: Taken, read: UpdateOutline | None = None) -> None:

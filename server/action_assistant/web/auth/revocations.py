@@ -11,7 +11,8 @@ import asyncio
 import logging
 import os
 import re
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -24,6 +25,7 @@ log: Final = logging.getLogger(__name__)
 FOLDER: Final = "revoked"
 SESSION_ENDED: Final = 4401  # close code of sockets
 _LOOK_S: Final = 0.2
+_SETTLED_NS: Final = 3_000_000_000  # until a folder's time has changed with its next entry for sure
 _ID: Final = re.compile(r"[A-Za-z0-9]{1,40}")
 _SESSION: Final = "session-"
 _SESSION_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -35,6 +37,7 @@ class Revocations:
     def __init__(self, data: Path) -> None:
         self._folder = data / FOLDER
         self._unwritten: set[str] = set()
+        self._listed_at = 0  # when the folder had changed last, as it was listed
         try:
             self._folder.mkdir(
                 mode=0o700, parents=True, exist_ok=True
@@ -57,6 +60,11 @@ class Revocations:
     def ends(self, session: Session) -> bool:
         """Whether it opens nothing any more, also no Stop."""
         return self.holds(session.invitation) or self.ended(session)
+
+    def ends_now(self) -> Callable[[Session], bool]:
+        """What `ends` answers at this moment, for many sessions: the folder is looked at once, and not
+        for each of them."""
+        return self._ends_in_mind if self._take_up() else self.ends
 
     def every(self) -> frozenset[str]:
         """All invitations."""
@@ -108,6 +116,27 @@ class Revocations:
         self._marks.add(mark)
         return True
 
+    def _ends_in_mind(self, session: Session) -> bool:
+        mark, invitation = _SESSION + session.id, session.invitation
+        if mark in self._marks or invitation in self._marks:
+            return True
+        if invitation is not None and _ID.fullmatch(invitation) is None:
+            return True
+        return _SESSION_ID.fullmatch(session.id) is None
+
+    def _take_up(self) -> bool:
+        """Keep in mind what others have marked; whether that is all there is. The time of a folder may
+        stay as it is for entries that follow each other closely."""
+        try:
+            now = time.time_ns()
+            changed = self._folder.stat().st_mtime_ns
+            if changed != self._listed_at:
+                self._marks |= {entry.name for entry in self._folder.iterdir()}
+                self._listed_at = changed if now - changed > _SETTLED_NS else 0
+        except OSError:
+            return False
+        return True
+
     def _names(self) -> set[str]:
         try:
             self._marks |= {entry.name for entry in self._folder.iterdir()}
@@ -125,9 +154,9 @@ class SessionGuard:
         self._task = task
         self._outlives = outlives
 
-    def look(self, revoked: Revocations) -> None:
+    def look(self, ends: Callable[[Session], bool]) -> None:
         """Cut it if the session has ended."""
-        over = revoked.ends(self._session)
+        over = ends(self._session)
         over = over or (self._session.expired and not self._outlives)
         if over and not self.is_cut:
             self.is_cut = True
@@ -163,6 +192,7 @@ class SessionGuards:
 
     async def _looking(self) -> None:
         while self._held:
+            ends = self._revoked.ends_now()
             for leash in tuple(self._held):
-                leash.look(self._revoked)
+                leash.look(ends)
             await asyncio.sleep(_LOOK_S)

@@ -44,10 +44,11 @@ def raise_limit() -> int:
 
 
 class Connection:
-    """One that was accepted. `holder`: the person who is signed in on it, else the address."""
+    """One that was accepted. `holder`: the person who is signed in on it, else the address: behind a
+    proxy that of whoever asks, and none that others share before that is known."""
 
-    def __init__(self, wire: socket.socket, peer: Peer) -> None:
-        self.holder = f"@{peer[0]}"
+    def __init__(self, wire: socket.socket, peer: Peer, *, of_proxy: bool = False) -> None:
+        self.holder = f"@{peer[0]}:{peer[1]}" if of_proxy else f"@{peer[0]}"
         self.answering = 0  # requests that are being answered
         self.since = time.monotonic()  # when it began to wait for a request
         self.transport: asyncio.BaseTransport | None = None  # after the handshake
@@ -111,10 +112,34 @@ class ConnectionsByHolder:
             del self._by[connection.holder]
 
 
-class Connections:
-    """All of a process. The door says who is known on which."""
+class ConnectionHolder:
+    """Whom a connection is held by, as that becomes known."""
 
-    def __init__(self, limit: int) -> None:
+    def __init__(
+        self, connections: "Connections", peer: Peer | None, connection: Connection | None
+    ) -> None:
+        self._connections = connections
+        self._peer = peer
+        self._connection = connection
+
+    def asked(self, address: str) -> None:
+        """A proxy that is believed asks for this address."""
+        self._hold(f"@{address}", is_stranger=True)
+
+    def known(self, person: str) -> None:
+        """This person is signed in."""
+        self._hold(person, is_stranger=False)
+
+    def _hold(self, holder: str, *, is_stranger: bool) -> None:
+        if self._peer is not None and self._connection is not None:
+            self._connections.hold(self._peer, self._connection, holder, is_stranger=is_stranger)
+
+
+class Connections:
+    """All of a process. The door says who is known on which; `is_proxy` which addresses ask for others."""
+
+    def __init__(self, limit: int, is_proxy: Callable[[str], bool] = lambda _: False) -> None:
+        self._is_proxy = is_proxy
         self._most = max(32, min(_MOST, limit - _in_use() - _KEPT))
         self._most_strangers = max(16, min(_MOST_STRANGERS, self._most * 2 // 3))
         self._all = ConnectionsByHolder()
@@ -162,7 +187,7 @@ class Connections:
                 return
             wire.setblocking(False)
             peer = (str(address[0]), int(address[1]))
-            connection = Connection(wire, peer)
+            connection = Connection(wire, peer, of_proxy=self._is_proxy(peer[0]))
             self._all.add(peer, connection)
             self._strangers.add(peer, connection)
             self._make_room(self._strangers, self._most_strangers)
@@ -245,26 +270,30 @@ class Connections:
     # --- what is known ------------------------------------------------------------------------
 
     @contextlib.contextmanager
-    def answering(self, peer: Peer | None) -> Iterator[Callable[[str], None]]:
-        """A request on a connection is answered, as long as you are inside. Gives what to call with
-        the id of the person when that is known."""
+    def answering(self, peer: Peer | None) -> Iterator[ConnectionHolder]:
+        """A request on a connection is answered, as long as you are inside. Gives what to tell who asks
+        when that is known."""
         connection = None if peer is None else self._all.get(peer)
-        if peer is None or connection is None:
-            yield lambda _: None
+        holder = ConnectionHolder(self, peer, connection)
+        if connection is None:
+            yield holder
             return
-
-        def known(person: str) -> None:
-            if connection.holder != person:
-                self._forget(peer, connection)
-                connection.holder = person
-                self._all.add(peer, connection)
-
         connection.answering += 1
         try:
-            yield known
+            yield holder
         finally:
             connection.answering -= 1
             connection.since = time.monotonic()
+
+    def hold(self, peer: Peer, connection: Connection, holder: str, *, is_stranger: bool) -> None:
+        """Somebody else holds a connection now."""
+        if connection.holder == holder:
+            return
+        self._forget(peer, connection)
+        connection.holder = holder
+        self._all.add(peer, connection)
+        if is_stranger:
+            self._strangers.add(peer, connection)
 
     def drop(self, peer: Peer | None) -> None:
         """End a connection whose other side does not go on."""

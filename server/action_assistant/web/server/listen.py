@@ -23,7 +23,7 @@ from action_assistant.public_url import Network
 from action_assistant.web.auth.access import KNOWN
 from action_assistant.web.network.certificate import Certificate
 from action_assistant.web.network.connections import Connections, raise_limit
-from action_assistant.web.server.proxy import Forwarded
+from action_assistant.web.server.proxy import ASKED, Forwarded
 from action_assistant.web.server.sockets import bound
 
 log: Final = logging.getLogger(__name__)
@@ -32,6 +32,7 @@ WEBSOCKET_LIMIT: Final = 1_114_112  # bytes; an update of 1 MiB and its frame
 GRACE: Final = 5  # seconds that open requests get when the process is told to end
 HEAD_LIMIT: Final = 32_768  # bytes of a request line and its header fields
 _CALLS: Final = frozenset({"http", "websocket"})
+_WITHOUT_BODY: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Processor time and time (seconds) when what is answered came in.
 _RECEIVED: Final[ContextVar[tuple[float, float]]] = ContextVar("received", default=(0.0, 0.0))
 _FAILED: Final = 3  # exit code when the application could not be set up
@@ -67,9 +68,10 @@ def serve(
         for listener in sockets:
             listener.close()
         raise
-    connections = Connections(raise_limit())
+    forwarded = Forwarded(endings, proxies)
+    connections = Connections(raise_limit(), forwarded.is_proxy)
     config = uvicorn.Config(
-        ActivityTracker(Forwarded(endings, proxies), connections),
+        ActivityTracker(forwarded, connections),
         http=_Http,
         h11_max_incomplete_event_size=HEAD_LIMIT,
         lifespan="on",
@@ -190,7 +192,7 @@ class ActivityTracker:
             await self._app(scope, receive, send)
             return
         peer: Any = scope.get("client")
-        whole = scope["type"] == ScopeType.WEBSOCKET or not _has_body(scope)
+        whole = not _waits_for_body(scope)
 
         async def received() -> Any:
             nonlocal whole
@@ -212,13 +214,16 @@ class ActivityTracker:
                 message["headers"] = [*message.get("headers", []), _own_share()]
             await send(message)
 
-        with self._connections.answering(peer and tuple(peer)) as known:
-            scope.setdefault("state", {})[KNOWN] = known
+        with self._connections.answering(peer and tuple(peer)) as holder:
+            scope.setdefault("state", {}).update({KNOWN: holder.known, ASKED: holder.asked})
             await self._app(scope, received, sent)
 
 
-def _has_body(scope: Scope) -> bool:
-    """Whether a body was announced."""
+def _waits_for_body(scope: Scope) -> bool:
+    """Whether a body was announced, and means anything. What is asked with others is answered without
+    it: whoever waits for their end would hear of a failure there."""
+    if scope["type"] != ScopeType.HTTP or scope["method"] in _WITHOUT_BODY:
+        return False
     return any(name == b"content-length" and value != b"0" for name, value in scope["headers"])
 
 

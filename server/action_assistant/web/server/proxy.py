@@ -23,6 +23,8 @@ from action_assistant.web.auth.access import Needs
 
 #: Under this name the state of a request has the path at which the page lies for whoever asks.
 MOUNT: Final = "mount"
+#: Under this name the state of a request has what wants to be told for whom a proxy asks.
+ASKED: Final = "asked"
 _CALLS: Final = frozenset({"http", "websocket"})
 _WITH_PORT: Final = re.compile(r"\[(.+)\](?::\d+)?|([0-9.]+):\d+")
 _Address = ipaddress.IPv4Address | ipaddress.IPv6Address
@@ -45,6 +47,7 @@ class Forwarded:
             peer: Any = scope.get("client")
             found = self._asker(peer[0], _forwarded(scope)) if peer else None
             if found is not None:
+                scope.get("state", {}).get(ASKED, _nobody)(found)
                 changed: Any = {**scope, "client": (found, 0)}
                 scope = changed
         await self._app(scope, receive, send)
@@ -57,6 +60,11 @@ class Forwarded:
             address = _address(chain.pop())
             found = str(address) if address is not None else found
         return found
+
+    def is_proxy(self, peer: str) -> bool:
+        """Whether who connects from this address is believed."""
+        address = _address(peer)
+        return address is not None and self._believes(address)
 
     def _believes(self, address: _Address) -> bool:
         return any(address in each for each in self._proxies)
@@ -127,6 +135,10 @@ def misrouted(runner_port: int) -> ControllerRouterHandler:
         )
 
     return astray
+
+
+def _nobody(_: str) -> None:
+    """Nobody wants to know."""
 
 
 async def _lead(send: Send, location: str) -> None:

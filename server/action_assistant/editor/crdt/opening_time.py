@@ -1,0 +1,61 @@
+"""How long a document may take to be opened: measured, since it does not follow from its size.
+
+The CRDT library looks for the place of what was written at the same time as other things through all of
+those. Updates that are harmless one by one can so become a document that holds the event loop up
+whenever it is opened. Work beyond what is linear is at most that of each struct with each other one;
+where so much could have come since the last measurement that it matters, it is measured again.
+"""
+
+from typing import Final
+
+from action_assistant.editor.crdt.document_quota import QuotaExceeded
+from action_assistant.editor.crdt.update_scan import UpdateOutline
+
+#: Seconds of a processor that opening a document may take, beside what its size needs: an honest
+#: graph takes 0.07 s per MiB.
+SECONDS: Final = 0.25
+_PER_MIB: Final = 0.2
+_MOST: Final = 2.0
+_SPARE: Final = 0.1  # seconds that may be added without being measured, beside what opening took
+_STEP: Final = 75e-9  # seconds from one struct to the next
+_STORED: Final = 12  # bytes of a struct in a document; few are smaller
+_SMALLEST: Final = 6  # bytes of a struct in an update
+
+
+class OpeningTime:
+    """Of one document: what opening it took when that was measured, and what has come since."""
+
+    def __init__(self) -> None:
+        self._structs = 0.0
+        self._measured_at = 0.0  # structs
+        self._seconds = 0.0
+        self._limit = SECONDS
+
+    def opened(self, seconds: float, size: int) -> None:
+        """So many bytes were applied in so many seconds to a document with nothing in it."""
+        self._structs = max(self._structs, size / _STORED)
+        self._measured_at, self._seconds = self._structs, seconds
+        self._limit = min(_MOST, SECONDS + _PER_MIB * size / (1 << 20))
+
+    def took(self, structs: int) -> None:
+        """So many structs were added."""
+        self._structs += structs
+
+    def is_doubtful_with(self, size: int) -> bool:
+        """Whether it has to be measured before updates of so many bytes are applied."""
+        if self.is_too_long:
+            return True
+        structs = self._structs + size / _SMALLEST
+        pairs = (structs**2 - self._measured_at**2) / 4
+        return pairs * _STEP > _SPARE + self._seconds
+
+    def refuse(self, read: UpdateOutline) -> None:
+        """Raise QuotaExceeded for an update that brings something to a document that took too long."""
+        if self.is_too_long and read.brings:
+            said = f"a graph may take {self._limit:.1f} s to open; go on with a copy of it"
+            raise QuotaExceeded(said)
+
+    @property
+    def is_too_long(self) -> bool:
+        """Whether it took too long when it was measured last."""
+        return self._seconds > self._limit
