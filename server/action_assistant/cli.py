@@ -18,6 +18,7 @@ _MODULES: Final = (
     "processes",
     "files",
     "remote",
+    "watch.watch",
     "people",
     "simulate_robot",
     "maintenance",
@@ -33,6 +34,7 @@ _ALONE: Final[Mapping[str, str]] = {
     "convert": "files",
     "simulate": "files",
     "simulate-robot": "simulate_robot",
+    "watch": "watch.watch",
 }
 
 
