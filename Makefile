@@ -48,11 +48,12 @@ dev: setup ## like run, and rebuild the page on every change
 
 .PHONY: check
 check: .venv/.done frontend/node_modules/.done ## formatting, lint, types and layers, both languages
-	@echo "» ruff, mypy, layers"
+	@echo "» ruff, mypy, layers, dependencies"
 	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
-	@echo "» Biome, tsc"
+	@$(BIN)/deptry .
+	@echo "» Biome, tsc, knip"
 	@$(NPM) run --silent check
 
 .PHONY: fix
@@ -130,7 +131,7 @@ build: setup ## the wheel, with migrations and the built page, in dist/
 .PHONY: lock
 lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@$(BIN)/pip install --quiet uv
-	@$(LOCK) pyproject.toml requirements/dev.in --output-file requirements/dev.txt
+	@$(LOCK) pyproject.toml --group dev --output-file requirements/dev.txt
 	@$(LOCK) --extra ros pyproject.toml requirements/ros.in --output-file requirements/ros.txt
 	@$(LOCK) pyproject.toml requirements/run.in --output-file requirements/run.txt
 	@$(LOCK) requirements/build.in --output-file requirements/build.txt
