@@ -47,12 +47,19 @@ dev: setup ## like run, and rebuild the page on every change
 		trap "kill $$page" EXIT; $(BIN)/action-assistant serve $(ARGS)
 
 .PHONY: check
-check: .venv/.done frontend/node_modules/.done ## formatting, lint, types and layers, both languages
-	@echo "» ruff, mypy, layers"
+check: check-server check-page ## formatting, lint, types, layers and what is unused, both languages
+
+.PHONY: check-server
+check-server: .venv/.done ## the server's half of check
+	@echo "» ruff, mypy, layers, dependencies"
 	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
-	@echo "» Biome, tsc"
+	@$(BIN)/deptry .
+
+.PHONY: check-page
+check-page: frontend/node_modules/.done ## the page's half of check
+	@echo "» Biome, tsc, knip"
 	@$(NPM) run --silent check
 
 .PHONY: fix
@@ -89,6 +96,14 @@ e2e: setup ros ## tests in Chromium against the real processes
 	@scripts/need chromium=chromium
 	@echo "» Playwright"
 	@$(BARE) $(NPM) run --silent e2e
+
+.PHONY: coverage
+coverage: .venv/.done ## which lines of UMRF, start, Stop and runs the tests of umrf and runner never reach
+	@mkdir -p build && $(BIN)/coverage erase
+	@# What is measured runs slower, so tests that bound its time may fail here; the report comes anyway.
+	-@$(BARE) $(BIN)/coverage run -m pytest -q --numprocesses $(PROCESSES) --dist loadfile --timeout=900 \
+		tests/umrf tests/runner $(PYTEST)
+	@$(BIN)/coverage combine --quiet && $(BIN)/coverage report
 
 .PHONY: soak
 soak: setup ## what takes longer than CI may, by the thousand (ARGS="kills images" for some of it)
@@ -127,10 +142,14 @@ build: setup ## the wheel, with migrations and the built page, in dist/
 	@$(BIN)/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 
+.PHONY: release
+release: ## changelog, version, commit and tag in one go: VERSION=1.2.3
+	@scripts/release "$(VERSION)"
+
 .PHONY: lock
 lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@$(BIN)/pip install --quiet uv
-	@$(LOCK) pyproject.toml requirements/dev.in --output-file requirements/dev.txt
+	@$(LOCK) pyproject.toml --group dev --output-file requirements/dev.txt
 	@$(LOCK) --extra ros pyproject.toml requirements/ros.in --output-file requirements/ros.txt
 	@$(LOCK) pyproject.toml requirements/run.in --output-file requirements/run.txt
 	@$(LOCK) requirements/build.in --output-file requirements/build.txt

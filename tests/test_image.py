@@ -46,9 +46,11 @@ def texts(value: object) -> list[str]:
 def test_every_image_has_a_version() -> None:
     bases = {words[1] for stage in stages().values() for words in stage if words[0] == "FROM"}
     bases |= {each["image"] for each in SERVICES.values()}
-    bases = {
-        re.sub(r"^\$\{ROS_IMAGE(:-.*)?\}$", "ros:jazzy-ros-base-noble", each) for each in bases
-    }
+    arguments = dict(
+        re.findall(r"^ARG (\w+)=(\S+)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+    )
+    assert set(arguments) == {"ROS_IMAGE", "ROS_BUILD_IMAGE"}
+    bases = {re.sub(r"^\$\{(\w+)(:-.*)?\}$", lambda m: arguments[m[1]], each) for each in bases}
     for base in bases - {"page", "wheel"}:
         tag = base.rpartition(":")[2]
         assert re.search(r"\d+\.\d+|jazzy-.*-noble", tag), base
@@ -63,6 +65,20 @@ def test_an_image_runs_as_nobody_special_and_tells_its_health(target: str) -> No
     assert steps.index("USER") > max(at for at, step in enumerate(steps) if step in {"RUN", "COPY"})
     assert "HEALTHCHECK" in steps
     assert "ADD" not in steps
+
+
+@pytest.mark.parametrize("target", ["editor", "runner"])
+def test_an_image_holds_nothing_that_only_building_needs(target: str) -> None:
+    """What is needed to make an environment stays in the stage that made it."""
+    own = [" ".join(words) for words in stages()[target] if words[0] in {"RUN", "COPY"}]
+    copied = [line for line in own if line.startswith("COPY")]
+    assert "COPY scripts/image /opt/build/" in copied
+    made = {f"--from={target}-environment /opt/{each}" for each in ("action-assistant", "temoto")}
+    others = [line for line in copied if line != "COPY scripts/image /opt/build/"]
+    assert {" ".join(line.split()[1:3]) for line in others} <= made
+    assert not re.search(r"python3-venv|colcon|build-essential|image (install|messages)", str(own))
+    (base,) = [words[1] for words in stages()[target] if words[0] == "FROM"]
+    assert "BUILD" not in base
 
 
 def test_what_is_copied_exists_and_nothing_else_is_sent() -> None:

@@ -24,6 +24,13 @@ def healthy(port: int) -> bool:
     return asked.returncode == 0
 
 
+def tools_in(environment: Path) -> set[str]:
+    """What builds, installs or tests packages, of all that an environment can import."""
+    (packages,) = environment.glob("lib/python3*/site-packages")
+    tools = {"pip", "setuptools", "wheel", "hatchling", "editables", "pytest", "hypothesis", "mypy"}
+    return tools & {each.name for each in packages.iterdir()}
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel of this checkout, with the page that was built last."""
@@ -44,6 +51,17 @@ def test_the_wheel_carries_page_and_migrations_and_nothing_foreign(wheel: Path) 
     assert {top for top in tops if not top.endswith(".dist-info")} == {"action_assistant"}
 
 
+def test_the_wheel_carries_neither_tests_nor_what_builds(wheel: Path) -> None:
+    names = [Path(name) for name in zipfile.ZipFile(wheel).namelist()]
+    outside = [
+        each for each in names if "static" not in each.parts and "dist-info" not in str(each)
+    ]
+    assert {each.suffix for each in outside} == {".py", ".json", ".jsonl", ".typed"}
+    assert {each.parts[1] for each in outside if each.suffix in {".json", ".jsonl"}} == {"examples"}
+    assert not {each.suffix for each in names} & {".map", ".ts", ".tsx", ".mako", ".pyc"}
+    assert not [each for each in names if "test" in each.name or "tests" in each.parts]
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: Path) -> None:
@@ -52,6 +70,7 @@ def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: 
     shutil.copy(wheel, files / "wheel")
     shutil.copy(ROOT / "requirements" / "run.txt", files)
     subprocess.run([IMAGE, "install", environment, files], check=True)
+    assert tools_in(environment) == set()
     product = Product(tmp_path / "data")
     tools, harmful = tmp_path / "bin", tmp_path / "sourced"
     tools.mkdir()

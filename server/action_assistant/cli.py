@@ -46,6 +46,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "stop": CommandEntry(
         "remote", "stop a run, or all of them; exit 1 unless it is proven", described=True
     ),
+    "watch": CommandEntry(
+        "watch.watch", "print each change of a graph as it comes, until Ctrl-C", described=True
+    ),
     "people": CommandEntry("people", "links that let people in: list, invite, revoke"),
     "simulate-robot": CommandEntry(
         "simulate_robot", "a robot that behaves like a real engine, on ROS 2, to practise with"

@@ -24,7 +24,7 @@ export interface GraphSummary {
 }
 
 /** One parameter of a known action; `text` is its JSON without a value. */
-export interface KnownParameter {
+interface KnownParameter {
   path: string;
   pvf_type: string | null;
   required: boolean;
@@ -154,7 +154,7 @@ export function createGraph(name: string): Promise<GraphSummary> {
 }
 
 /** Something that was translated or left out, with its place in the file that was sent. */
-export interface Remark {
+interface Remark {
   message: string;
   where: ProblemPlace;
   /** How often; once when it is not there. */

@@ -23,7 +23,7 @@ export class Refusal extends Error {
 }
 
 /** Nobody answered. */
-export class Unreachable extends Error {
+class Unreachable extends Error {
   constructor(who: string) {
     super(`${who} does not answer.`);
     this.name = "Unreachable";

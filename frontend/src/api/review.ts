@@ -71,7 +71,7 @@ export interface ComparedField {
   after: unknown;
 }
 
-export interface ComparedChange {
+interface ComparedChange {
   change: "added" | "removed" | "changed";
   fields: ComparedField[];
 }

@@ -2,12 +2,11 @@
 import { useQuery } from "@tanstack/react-query";
 import type { Problem } from "./graphs";
 import { fetchJson, fetchText } from "./http";
-import type { Run } from "./runs";
 
 export const SIMULATOR = "simulator";
 
 export type EngineState = "answering" | "busy" | "gone" | "restarted" | "no_link";
-export type Generation = "current" | "older" | "unknown";
+type Generation = "current" | "older" | "unknown";
 
 /** A graph that an engine holds, ended ones too. */
 export interface HeldGraph {
@@ -107,13 +106,6 @@ export interface Preflight {
   override: string[];
   /** Something stands in the way that cannot be overridden. */
   never: boolean;
-}
-
-export interface StartedGroup {
-  id: string;
-  runs: Run[];
-  /** Robots that nothing was sent to, and why. */
-  failed: Record<string, string>;
 }
 
 const path = (runner: string | undefined, name: string) =>

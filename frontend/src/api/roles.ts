@@ -1,7 +1,7 @@
 /** What each role may do, as the server's own table has it (`web/auth/roles.py`); a test compares them. */
 
 /** From the least to the most; each may do what those before it may. */
-export const ROLES = ["viewer", "editor", "operator", "owner"] as const;
+const ROLES = ["viewer", "editor", "operator", "owner"] as const;
 export type Role = (typeof ROLES)[number];
 
 /** The least role that may do a thing. */

@@ -2,7 +2,7 @@
 import { useQuery } from "@tanstack/react-query";
 import { fetchJson } from "./http";
 
-export type RunState =
+type RunState =
   | "requested"
   | "published"
   | "running"
@@ -16,9 +16,9 @@ export type RunState =
   | "refused"
   | "lost";
 
-export type RunResult = "on_true" | "on_false" | "on_error" | "on_stopped" | "on_halted";
+type RunResult = "on_true" | "on_false" | "on_error" | "on_stopped" | "on_halted";
 
-export type VisitResult = "true" | "false" | "error" | "stopped" | null;
+type VisitResult = "true" | "false" | "error" | "stopped" | null;
 
 /** Seconds: at least `least`, at most `most`; null: nothing bounds it from above. */
 export interface DurationBounds {

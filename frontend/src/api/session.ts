@@ -2,7 +2,7 @@
 import { errorText, fetchJson, Refusal } from "./http";
 import type { Role } from "./roles";
 
-export { may, type Permission, ROLE_WORDS, ROLES, type Role } from "./roles";
+export { may, type Permission, ROLE_WORDS, type Role } from "./roles";
 
 export interface Person {
   id: string;

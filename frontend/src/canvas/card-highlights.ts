@@ -2,7 +2,7 @@
 import { useSyncExternalStore } from "react";
 import type { Key } from "../graph/model";
 
-export interface CardHighlights {
+interface CardHighlights {
   /** The robot whose actions stand out; null: all. The empty name is that of any robot. */
   readonly robot: string | null;
   /** Open threads by action. */

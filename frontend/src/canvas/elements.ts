@@ -67,7 +67,7 @@ export type Arrow = Edge<
   "outcome"
 >;
 
-export interface ArrowLabel {
+interface ArrowLabel {
   readonly x: number;
   readonly y: number;
   readonly anchor: LabelRequest["anchor"];

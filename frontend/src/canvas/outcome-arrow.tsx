@@ -7,10 +7,6 @@ import { OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import style from "./outcome-arrow.module.css";
 import { ProblemBadge } from "./problem-badge";
 
-export function responseWords(answer: OutcomeResponse): string {
-  return `${answer.outcomes.map((outcome) => outcomeWord[outcome]).join(", ")} → ${answer.response}`;
-}
-
 function AnswerLine({ answer, optional }: { answer: OutcomeResponse; optional: boolean }) {
   return (
     <span className={style.answer}>

@@ -29,7 +29,7 @@ const FONT = "Inter, system-ui, sans-serif";
 const MONO = "ui-monospace, monospace";
 
 /** Text that means nothing to a reader of XML. What XML cannot hold at all is left out. */
-export function escaped(text: string): string {
+function escaped(text: string): string {
   return text
     .replace(/[^\t\n\r\u0020-\uD7FF\uE000-\uFFFD\u{10000}-\u{10FFFF}]/gu, "")
     .replaceAll("&", "&amp;")

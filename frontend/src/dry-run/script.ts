@@ -6,7 +6,7 @@ export type DecidedOutcome = "on_true" | "on_false" | "on_error";
 export type DecidedFaultKind = "error" | "never" | "exception" | "deaf" | "stop";
 
 /** How one visit of an action ends. */
-export interface Decision {
+interface Decision {
   readonly node: string;
   readonly call: number;
   /** When the visit began, and when it was decided; ms since the start. */

@@ -56,7 +56,7 @@ function isHeld(value: unknown): value is CopiedContent {
 }
 
 /** What was copied last in this browser. */
-export function lastCopied(): CopiedContent | null {
+function lastCopied(): CopiedContent | null {
   try {
     const kept: unknown = JSON.parse(localStorage.getItem(SHELF) ?? "null");
     if (isHeld(kept)) return kept;

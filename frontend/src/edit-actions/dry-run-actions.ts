@@ -94,7 +94,7 @@ const choice = (
   },
 });
 
-export const CHOICES: readonly EditAction[] = [
+const CHOICES: readonly EditAction[] = [
   choice("on_true", "It ends true", "1", IconCheck),
   choice("on_false", "It ends false", "2", IconX),
   choice("on_error", "It ends with an error", "3", IconExclamationMark),

@@ -61,7 +61,7 @@ export function isPressed(shortcut: string, event: Pressed, mac = onMac): boolea
 }
 
 /** Whether a shortcut is one printed character without Mod or Alt: such keys can be switched off. */
-export function isSingleKey(shortcut: string): boolean {
+function isSingleKey(shortcut: string): boolean {
   const parts = shortcut.split("+");
   const last = parts.at(-1) ?? "";
   return (last.length === 1 || last === "Plus") && !parts.includes("Mod") && !parts.includes("Alt");

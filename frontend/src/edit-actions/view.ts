@@ -145,10 +145,7 @@ export const showJson: EditAction = {
 };
 
 /** The nearest neighbour along arrows: down to what follows, up to what comes before, or beside. */
-export function neighbour(
-  context: EditorContext,
-  way: "up" | "down" | "left" | "right",
-): Key | null {
+function neighbour(context: EditorContext, way: "up" | "down" | "left" | "right"): Key | null {
   const { relations, actions } = context.graph;
   const places = context.positions();
   const [arrow] = selectedRelations(context);

@@ -64,7 +64,7 @@ function time(ms: number): string {
 }
 
 /** The action whose end is to be chosen: the selected one if it runs. */
-export function asked(context: EditorContext, run: DryRun): RunningAction | undefined {
+function asked(context: EditorContext, run: DryRun): RunningAction | undefined {
   return (
     run.sighting.running.find(({ key }) => context.selection.has(key)) ?? run.sighting.running[0]
   );

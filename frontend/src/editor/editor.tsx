@@ -52,7 +52,7 @@ export interface Shown {
   fold: (folded: boolean) => void;
 }
 
-export interface EditorBarParts {
+interface EditorBarParts {
   crumbs: readonly Crumb[];
   status?: ReactNode;
   actions?: ReactNode;

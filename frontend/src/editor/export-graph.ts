@@ -7,7 +7,7 @@ import type { EditorContext, ExportFormat } from "../edit-actions/editor-context
 const LARGEST = 8_000; // px of a PNG's longer side; browsers refuse much more
 
 /** A name that every file system takes. */
-export function fileName(name: string): string {
+function fileName(name: string): string {
   const plain = name
     .replace(/[^\p{L}\p{N} ._-]+/gu, "_")
     .replace(/^[._]+/, "")

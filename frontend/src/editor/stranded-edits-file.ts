@@ -22,7 +22,7 @@ export function changeSentence({ kind, thing, title }: GraphChange): string {
   return thing === "graph" ? `${kind} the graph` : `${kind} ${thing} ${title}`;
 }
 
-export function fileOf(graph: string, by: string, stranded: StrandedEdits): ChangesFile {
+function fileOf(graph: string, by: string, stranded: StrandedEdits): ChangesFile {
   const changes = changesOf(stranded, mapsFrom({})).map((change) => ({
     what: changeSentence(change),
     values: change.lines.map(({ field, before, after }) => ({ field, before, after })),

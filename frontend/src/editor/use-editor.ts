@@ -39,7 +39,7 @@ const NO_CANVAS_VIEW: CanvasView = {
 };
 
 /** What only the canvas knows; filled in by it while it is shown. */
-export interface CanvasHandle {
+interface CanvasHandle {
   view: CanvasView;
   positions: EditorContext["positions"];
   sizes: EditorContext["sizes"];

@@ -27,7 +27,7 @@ interface SearchEntry extends Omit<Hit, "why"> {
 }
 
 /** What people may write before a colon. */
-export const FIELDS = [
+const FIELDS = [
   "name", "type", "robot", "about", "parameter", "output", "response", "remap", "problem", "field",
 ] as const; // biome-ignore format: one list
 

@@ -10,8 +10,6 @@ import type * as Y from "yjs";
 import { isAid } from "./ids";
 import { ENTRY, EXIT, type Key } from "./model";
 
-export const SCHEMA = 1;
-
 export const ROOTS = ["meta", "actions", "relations", "positions", "comments"] as const;
 export type Root = (typeof ROOTS)[number];
 
@@ -86,9 +84,9 @@ export function endsOf(id: string): RelationEnds | null {
 }
 
 /** One key of a parameter's path, so that `/` can separate them. */
-export const escapeSegment = (segment: string): string =>
+const escapeSegment = (segment: string): string =>
   segment.replaceAll("~", "~0").replaceAll("/", "~1");
-export const unescapeSegment = (segment: string): string =>
+const unescapeSegment = (segment: string): string =>
   segment.replaceAll("~1", "/").replaceAll("~0", "~");
 /** The keys that lead to a parameter. */
 export const segmentsOf = (path: string): string[] => path.split("/").map(unescapeSegment);

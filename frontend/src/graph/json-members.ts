@@ -38,7 +38,7 @@ const COLON = /\s*:\s*/y;
 const BLANK = /[\s,:{]*/y;
 
 /** The members of the object that `text` is, each with its text, in order. */
-export function membersOf(text: string): [name: string, text: string][] {
+function membersOf(text: string): [name: string, text: string][] {
   const found: [string, string][] = [];
   let at = skip(text, 0, BLANK);
   while (text[at] === '"') {

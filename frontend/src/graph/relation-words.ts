@@ -18,7 +18,7 @@ import {
 } from "./model";
 
 /** How an action ended, after its name: "Scan ends true". */
-export const ENDINGS: Readonly<Record<Precondition, string>> = {
+const ENDINGS: Readonly<Record<Precondition, string>> = {
   on_true: "ends true",
   on_false: "ends false",
   on_error: "ends with an error",

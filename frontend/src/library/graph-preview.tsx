@@ -29,7 +29,7 @@ function boxes(graph: Graph): Map<string, MiniatureBox> {
   return found;
 }
 
-export function Miniature({ graph }: { graph: Graph }) {
+function Miniature({ graph }: { graph: Graph }) {
   const places = useMemo(() => boxes(graph), [graph]);
   const all = [...places.values()];
   const left = Math.min(...all.map((box) => box.x)) - MARGIN;

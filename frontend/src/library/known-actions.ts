@@ -21,7 +21,7 @@ const words = (list: Parameters): string[] =>
       `${pathWords(path)}: ${pvf_type ?? "no type"}${required ? "" : ", optional"}`,
   );
 
-export function knownAction(answer: KnownActionAnswer): KnownAction {
+function knownAction(answer: KnownActionAnswer): KnownAction {
   const { name, type, description, inputs, outputs, used_in } = answer;
   const bare = (list: Parameters) => list.map(({ path, text }) => ({ path, text }));
   return {

@@ -6,7 +6,7 @@ import { colorOfName } from "../ui/name-colors";
 import style from "./robot-filter.module.css";
 
 /** How many actions each robot has, by name; those for any robot last. */
-export function robotCounts(actors: readonly string[]): [name: string, actions: number][] {
+function robotCounts(actors: readonly string[]): [name: string, actions: number][] {
   const counts = new Map<string, number>();
   for (const actor of actors) counts.set(actor, (counts.get(actor) ?? 0) + 1);
   return [...counts].sort(([a], [b]) => (a === "" ? 1 : b === "" ? -1 : a.localeCompare(b)));

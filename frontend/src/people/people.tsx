@@ -11,7 +11,7 @@ import style from "./people.module.css";
 
 const MOST = 4;
 
-export function personName(person: { readonly name: string }): string {
+function personName(person: { readonly name: string }): string {
   return person.name || "Guest";
 }
 

@@ -13,7 +13,7 @@ interface Props {
 const RARE = ["graph", "version", "person", "since", "until"] as const;
 
 /** Midnight here, as the runner takes times; empty for none. */
-export function momentOf(date: string, after: "begin" | "end"): string {
+function momentOf(date: string, after: "begin" | "end"): string {
   const day = new Date(`${date}T00:00:00`);
   if (date === "" || Number.isNaN(day.getTime())) return "";
   if (after === "end") day.setDate(day.getDate() + 1);

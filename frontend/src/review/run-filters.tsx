@@ -42,7 +42,7 @@ interface Props {
 }
 
 /** What a filter asks for, in words; the name under which it is saved unless another is given. */
-export function filterWords(filter: RunFilter): string {
+function filterWords(filter: RunFilter): string {
   const ending = ENDINGS.find((each) => each.value === endingOf(filter))?.label ?? filter.state;
   const words = [
     ending === "All" ? "" : ending,

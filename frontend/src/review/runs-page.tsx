@@ -36,10 +36,7 @@ import style from "./runs-page.module.css";
 const PAGE = 100;
 
 /** The stored list with what the live socket knows better, in the order in which it was asked for. */
-export function overlaid(
-  stored: readonly ListedRun[],
-  live: ReadonlyMap<string, Run>,
-): ListedRun[] {
+function overlaid(stored: readonly ListedRun[], live: ReadonlyMap<string, Run>): ListedRun[] {
   return stored.map((run) => {
     const now = live.get(run.id);
     return now === undefined ? run : { ...run, ...now };
@@ -47,7 +44,7 @@ export function overlaid(
 }
 
 /** Runs that began after the list was asked for. They wait behind a pill: nothing moves by itself. */
-export function newcomers(
+function newcomers(
   stored: readonly ListedRun[],
   live: ReadonlyMap<string, Run>,
   newest: number,

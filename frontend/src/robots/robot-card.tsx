@@ -25,7 +25,7 @@ interface Props {
 type Sign = { good: boolean; text: string };
 
 /** What a person should know before trusting an answer or starting something. */
-export function robotSigns(robot: Robot): Sign[] {
+function robotSigns(robot: Robot): Sign[] {
   if (robot.state === "no_link") return [];
   const signs: Sign[] = [];
   if (robot.servers === 1)

@@ -28,7 +28,7 @@ export const NEW: Registration = {
 type RobotFormField = "name" | "domain" | "get_service" | "rmw" | "profile";
 
 /** The field that a refusal points at; "" when it is about all of it. */
-export function refusedField(error: unknown): RobotFormField | "" {
+function refusedField(error: unknown): RobotFormField | "" {
   const path = error instanceof Refusal ? (error.details.where?.path ?? "") : "";
   const found = /^\/(name|domain|get_service|rmw|profile)\b/.exec(path)?.[1];
   return (found as RobotFormField | undefined) ?? "";

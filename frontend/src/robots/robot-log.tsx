@@ -29,7 +29,7 @@ const BECAME: Readonly<Record<string, string>> = {
 };
 
 /** A sentence of one line; what it did to a run of ours comes after it. */
-export function robotLogText(told: RobotLogLine): string {
+function robotLogText(told: RobotLogLine): string {
   switch (told.kind) {
     case "commanded":
       return `Somebody else ${DONE[told.command] ?? told.command} ${told.graph || "a graph"}`;

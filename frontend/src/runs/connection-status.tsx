@@ -8,7 +8,7 @@ import style from "./connection-status.module.css";
 const OLD = 2_500; // ms; a run is looked at each second
 
 /** "proof 0.4 s ago": when the engine itself last showed this run. `whose`: its name stands before. */
-export function LastSeen({ run, whose = false }: { run: Run; whose?: boolean }) {
+function LastSeen({ run, whose = false }: { run: Run; whose?: boolean }) {
   const seen = useRunSeenAt(run.id);
   const goes = run.ended_at === null;
   const present = useNow(500, goes);

@@ -28,7 +28,7 @@ const SIGNS = { added: IconPlus, removed: IconMinus, changed: IconPencil } as co
 const MOST = 40; // differences that are listed
 
 /** Why a running graph cannot be changed; null when it can. */
-export function modifyObstacle(run: Run, engine: Robot | undefined, obstacle: string | null) {
+function modifyObstacle(run: Run, engine: Robot | undefined, obstacle: string | null) {
   const where = run.simulated ? "the simulator" : run.engine;
   if (run.state !== "running" && run.state !== "paused") return `Run ${run.number} is ${run.state}`;
   if (run.desired === "stopped") return `Run ${run.number} is being stopped`;

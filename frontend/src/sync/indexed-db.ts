@@ -78,7 +78,11 @@ export function epochName(epoch: string): string {
 }
 
 const NAME = "action-assistant";
-/** Copies of graphs in which nothing waits; the least recently used go first. */
+/**
+ * Copies of graphs in which nothing waits; the least recently used go first.
+ *
+ * @public e2e/browser-storage.spec.ts builds this module by itself
+ */
 export const MOST_COPIES = 40;
 
 interface Copy {
@@ -92,7 +96,11 @@ interface Copy {
 
 type CopyKey = readonly [graph: string, person: string, epoch: string];
 
-/** The browser's storage. Opens it at the first call, once. */
+/**
+ * The browser's storage. Opens it at the first call, once.
+ *
+ * @public e2e/browser-storage.spec.ts builds this module by itself
+ */
 export function indexedDbStore(factory: IDBFactory | undefined = globalThis.indexedDB): EditStore {
   let opened: Promise<IDBDatabase> | null = null;
   const database = () => {

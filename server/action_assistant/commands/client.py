@@ -94,11 +94,12 @@ def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "http
             "Is it running? Start it with `action-assistant serve`."
         ) from error
     if answer.is_error:
-        raise No(_sentence(answer))
+        raise No(sentence(answer))
     return answer
 
 
-def _sentence(answer: "httpx.Response") -> str:
+def sentence(answer: "httpx.Response") -> str:
+    """What a refusal says."""
     try:
         problem = answer.json()
         place = (problem.get("where") or {}).get("path", "")
@@ -112,18 +113,26 @@ def running(options: argparse.Namespace) -> Iterator[Server]:
     """The server that a command speaks to, with the token. Raises CannotStart, No."""
     import httpx
 
+    with httpx.Client(**reach(options)) as client:
+        config = _asked(client, "GET", "/api/config").json()
+        yield Server(client, config["runner_url"])
+
+
+def reach(options: argparse.Namespace) -> dict[str, Any]:
+    """What a client of httpx is made of that speaks to the server of a command and sends it the token,
+    but only after its proof. Raises CannotStart."""
     from action_assistant.commands.token_proof import AfterProof
 
     data = options.data.resolve()
     trust = Certificate(data).trusting_too()
     named = options.url or os.environ.get("ACTION_ASSISTANT_URL")
-    token = AfterProof(Keys.known(data), supposed=not named)
-    base = named or _here(trust)
-    with httpx.Client(
-        base_url=base, auth=token, timeout=30, trust_env=False, verify=trust
-    ) as client:
-        config = _asked(client, "GET", "/api/config").json()
-        yield Server(client, config["runner_url"])
+    return {
+        "base_url": named or _here(trust),
+        "auth": AfterProof(Keys.known(data), supposed=not named),
+        "timeout": 30,
+        "trust_env": False,
+        "verify": trust,
+    }
 
 
 def _here(trust: ssl.SSLContext) -> str:

@@ -7,9 +7,11 @@ from typing import Any
 import anyio
 import pytest
 
+from action_assistant.errors import Conflict, Unavailable
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
-from action_assistant.runner.links.port import Answer, Order
+from action_assistant.runner.execution.monitor import Monitor
+from action_assistant.runner.links.port import Answer, NotSent, Order
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.settings import Keep
@@ -100,6 +102,65 @@ def test_a_link_that_breaks_while_a_graph_of_somebody_else_is_stopped_ends_nothi
             setattr(david, fault, False)
             await until(lambda: not control.robots.foreign_stops.going("David"))
             assert not await david.moving("cleaning")
+
+    lived()
+
+
+@virtual
+async def test_a_fault_in_what_watches_a_run_is_told_once_and_the_run_still_stops(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also where it comes again and again, for a while."""
+    david = Faulty(NEVER)
+    left, take = [5], Monitor._take
+
+    def failing(self: Monitor, *answer: Any) -> None:
+        left[0] -= 1
+        if left[0] >= 0:
+            raise RuntimeError("a fault of ours")
+        take(self, *answer)
+
+    async with fleet(Harness(), David=david) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await until(lambda: control.open[run.id].run.state == "running")
+        monkeypatch.setattr(Monitor, "_take", failing)
+        await until(lambda: left[0] < 0)
+        (told,) = [each for each in control.open[run.id].run.alarms if each.code == "internal"]
+        assert told.text.startswith("The runner has a fault: ")
+        assert "a fault of ours" in told.text
+        await control.stop(run.id, BEN)
+        await until(lambda: not control.open)
+        assert (await control.find(run.id)).state == "stopped"
+        assert not await david.moving("patrol")
+
+
+def test_a_pause_that_cannot_be_sent_is_told_and_the_run_is_stopped_all_the_same() -> None:
+    class Unsendable(Open):
+        pauses = True
+
+        async def pause(self, graph_name: str) -> None:
+            """Nobody is there to hand it to."""
+            raise NotSent("nobody listens")
+
+        async def resume(self, graph_name: str, continue_from: str = "") -> None:
+            """The same."""
+            raise NotSent("nobody listens")
+
+    @virtual
+    async def lived() -> None:
+        david = Unsendable(NEVER)
+        async with fleet(Harness(), David=david) as control:
+            run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+            await until(lambda: control.open[run].run.state == "running")
+            with pytest.raises(Conflict, match="Only a paused run"):
+                await control.resume(run, ANN)
+            with pytest.raises(Unavailable, match="could not be sent: nobody listens"):
+                await control.pause(run, ANN)
+            assert control.open[run].run.state == "running"
+            with pytest.raises(Unavailable, match="could not be sent: nobody listens"):
+                await control.resume(run, ANN)
+            await control.stop(run, BEN)
+            await until(lambda: not control.open)
 
     lived()
 

@@ -17,7 +17,9 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter, Signature
 from action_assistant.umrf.semantics import script_from
 from runner.fake_network import Node, now, now_ms
-from runner.harness import ANN, BEN, ended, order, sequence, until, virtual
+from runner.harness import ANN, BEN, Harness, ended, engine, order, sequence, until, virtual
+from runner.registered_robots import Open
+from runner.robots.test_robots import NEVER, fleet
 from runner.robots_in_network import PATHS, RobotsInNetwork
 
 CODES = ("quiet", "others", "actions", "actors", "H7", "unknown-action", "signature")
@@ -197,6 +199,41 @@ async def test_words_that_somebody_else_may_have_caused_end_nothing_after_a_rest
 
 
 # --- the lines themselves -----------------------------------------------------------------------------
+
+
+@virtual
+async def test_a_start_that_was_refused_and_yet_shows_something_moving_is_an_alarm() -> None:
+    """What the log says and what is shown contradict each other: what moves is believed."""
+    david = Open(NEVER)
+    async with fleet(Harness(), David=david) as control:
+        run = (await control.start(order(PATROL, engine="David"), ANN)).run
+        for line in (RECEIVED, REFUSAL):
+            david.log(line)
+        await until(lambda: len(control.open[run.id].run.alarms) > 1)
+        alarms = {each.code: each.text for each in control.open[run.id].run.alarms}
+        assert "yet shows the graph RUNNING" in alarms["half_begun"]
+        assert "Could not resolve graph" in alarms["start_refused"]
+        assert control.open[run.id].run.end is None
+        await control.stop(run.id, BEN)
+        assert await ended(control, run.id) == "stopped"
+        assert not await david.moving("patrol")
+
+
+@virtual
+async def test_where_several_engines_answer_one_that_lacks_the_run_proves_nothing() -> None:
+    david = Open(NEVER)
+    async with fleet(Harness(), David=david) as control:
+        run = (await control.start(order(PATROL, engine="David"), ANN)).run
+        await until(lambda: control.open[run.id].run.state == "running")
+        whole, other = david.engine, engine(NEVER)
+        other._incarnation = whole._incarnation  # what answers does not say which it is
+        david.engine, david.servers = other, 2
+        await anyio.sleep(40)
+        assert control.open[run.id].run.state == "unknown"
+        david.engine, david.servers = whole, 1
+        await until(lambda: control.open[run.id].run.state == "running")
+        await control.stop(run.id, BEN)
+        assert await ended(control, run.id) == "stopped"
 
 
 def test_what_map_at_means_is_said_with_it() -> None:

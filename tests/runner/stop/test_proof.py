@@ -1,11 +1,13 @@
 """What proves that nothing moves: a look that lasts, and graphs of others that are not overlooked."""
 
+from typing import Any, cast
+
 import anyio
 
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer
 from action_assistant.runner.robots.foreign_graphs import foreign_graphs
-from action_assistant.runner.stop.proof import RestProof
+from action_assistant.runner.stop.proof import RestProof, send_stop
 from runner.harness import virtual
 
 
@@ -42,3 +44,32 @@ async def test_a_graph_that_one_look_did_not_show_is_looked_for_again() -> None:
     assert not rest.missing((), anyio.current_time())
     await anyio.sleep(0.5)
     assert rest.missing((), anyio.current_time())
+
+
+@virtual
+async def test_what_begins_again_by_itself_is_looked_at_for_longer() -> None:
+    for spontaneous, proven in (((), True), (("Work_0",), False)):
+        over = Snapshot(
+            at=0,
+            graph="patrol",
+            state="STOPPED",
+            nodes={"Work_0": "FINISHED"},
+            spontaneous=spontaneous,
+        )
+        rest = RestProof(exact=False)
+        assert not rest.seen((over,), anyio.current_time())
+        await anyio.sleep(0.6)
+        assert rest.seen((over,), anyio.current_time()) == proven
+        await anyio.sleep(60)
+        assert rest.seen((over,), anyio.current_time())
+
+
+@virtual
+async def test_a_link_that_holds_a_stop_message_back_is_told_and_waited_for_no_longer() -> None:
+    class Stuck:
+        async def stop(self, graph: str) -> None:
+            await anyio.sleep_forever()
+
+    began = anyio.current_time()
+    assert "could not be handed over" in await send_stop(cast("Any", Stuck()), "patrol")
+    assert anyio.current_time() - began == 1.0

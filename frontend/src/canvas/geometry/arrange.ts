@@ -6,7 +6,7 @@ export const CARD = { width: 208, height: 104 } as const;
 /** The ends are as wide as cards, so that the same x means the same middle. */
 export const PILL = { width: 208, height: 32 } as const;
 
-export interface Size {
+interface Size {
   readonly width: number;
   readonly height: number;
 }

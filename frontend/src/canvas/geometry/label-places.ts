@@ -12,7 +12,7 @@ export interface LabelRequest {
 }
 
 /** Points of a way, from its middle outwards. */
-export const TRIES = [0.5, 0.4, 0.6, 0.32, 0.68, 0.25, 0.75, 0.18, 0.82] as const;
+const TRIES = [0.5, 0.4, 0.6, 0.32, 0.68, 0.25, 0.75, 0.18, 0.82] as const;
 
 /** Parts of a label, px at zoom 1, of the type that `outcome-arrow.module.css` sets. */
 const LINE = 17;

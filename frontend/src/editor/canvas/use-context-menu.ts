@@ -8,7 +8,7 @@ const REST = 500; // ms
 const STILL = 8; // px that a resting finger may move
 
 /** Opens the menu for what lies under a point, which becomes the selection if it is not in it. */
-export function openMenuAt(context: EditorContext, screen: Position): void {
+function openMenuAt(context: EditorContext, screen: Position): void {
   const target = nodeAt(screen) ?? arrowAt(screen);
   if (target === null) context.select([]);
   else if (!context.selection.has(target)) context.select([target]);

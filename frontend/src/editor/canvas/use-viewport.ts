@@ -55,7 +55,7 @@ export function focusCard(room: HTMLElement, key: Key, tries: number): void {
 }
 
 /** The actions that run, the latest first. */
-export function running(progress: ReadonlyMap<Key, Progress>): Key[] {
+function running(progress: ReadonlyMap<Key, Progress>): Key[] {
   return [...progress]
     .filter(([, { tone, since }]) => tone === "run" && since !== null)
     .sort(([, a], [, b]) => (b.since ?? 0) - (a.since ?? 0))

@@ -13,7 +13,7 @@ import { FirstShortcut } from "../../edit-actions/shortcut-keys";
 import style from "./context-menu.module.css";
 
 /** What can be done with the selection, in groups. */
-export function offered(context: EditorContext): readonly (readonly EditAction[])[] {
+function offered(context: EditorContext): readonly (readonly EditAction[])[] {
   const actions = selectedActions(context).length;
   const notes = selectedNotes(context).length;
   const arrows = selectedRelations(context).length;

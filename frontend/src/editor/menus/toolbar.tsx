@@ -112,7 +112,7 @@ function DeedItems() {
   ));
 }
 
-export function EditActionMenu() {
+function EditActionMenu() {
   return (
     <Menu position="top-start" width={290}>
       <Menu.Target>

@@ -12,12 +12,12 @@ import { newAid } from "../ids";
 import type { Key } from "../model";
 import { asOneEdit, eraseKeys, writeKey } from "./document-writes";
 
-export interface CommentAuthor {
+interface CommentAuthor {
   readonly id: string;
   readonly name: string;
 }
 
-export interface CommentMessage {
+interface CommentMessage {
   readonly id: string;
   readonly author: CommentAuthor;
   /** Milliseconds since 1970, by the clock of whoever wrote it. */

@@ -8,7 +8,7 @@ import { readGraph, readTakenUp } from "../read";
 import { asNumber, asResponse } from "../values";
 
 /** The origin of everything that the person at this page does. */
-export const OWN_EDITS: unique symbol = Symbol("the person at this page");
+const OWN_EDITS: unique symbol = Symbol("the person at this page");
 
 /** Several edits as one: one transaction, one update for the others, one step of undo. */
 export function asOneEdit<T>(doc: Y.Doc, work: () => T): T {

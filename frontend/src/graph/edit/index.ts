@@ -14,7 +14,7 @@ import type { JsonText, Key, Position } from "../model";
 import { asOneEdit, eraseKeys, hasEnd, writeKey } from "./document-writes";
 
 export * from "./actions";
-export { asOneEdit, OWN_EDITS, undoOf } from "./document-writes";
+export { asOneEdit, undoOf } from "./document-writes";
 export * from "./parameters";
 export * from "./relations";
 

@@ -51,7 +51,7 @@ function useLook(graph: string, seq: number, engines: readonly string[]) {
 }
 
 /** The simulator goes alone; robots go together. */
-export function toggled(engines: readonly string[], name: string): string[] {
+function toggled(engines: readonly string[], name: string): string[] {
   if (name === SIMULATOR) return [SIMULATOR];
   const robots = engines.filter((engine) => engine !== SIMULATOR);
   const left = robots.filter((engine) => engine !== name);
@@ -132,7 +132,7 @@ function Exactly({
 }
 
 /** Why nothing can be started now; null when it can. */
-export function obstacleOf(
+function obstacleOf(
   engines: readonly string[],
   looks: readonly Preflight[] | undefined,
   reason: string,

@@ -12,7 +12,7 @@ interface Props {
 }
 
 /** Ctrl+. or ⌘. : not taken by browsers, and reachable without looking. */
-export function isStopAll(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey">): boolean {
+function isStopAll(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey">): boolean {
   return event.key === "." && (event.ctrlKey || event.metaKey);
 }
 

@@ -12,7 +12,7 @@ import type { Key, Position } from "../../graph/model";
 import { immediately, type Schedule } from "./frame-scheduler";
 
 /** What this page tells the others. */
-export interface Presence {
+interface Presence {
   /** The pointer, in the coordinates of the canvas. */
   readonly cursor?: Position;
   readonly selection: readonly Key[];

@@ -1,0 +1,1 @@
+"""watch: what people change in a graph, as it comes."""

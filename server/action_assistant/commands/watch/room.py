@@ -1,0 +1,303 @@
+"""A graph's room, joined as a stock Yjs client that never edits, and its changes on lines of their own."""
+
+import argparse
+import contextlib
+import sys
+from datetime import datetime
+from typing import Any, Final
+
+import anyio
+import httpx
+import msgspec
+from anyio.streams.memory import MemoryObjectSendStream
+from httpx_ws import (
+    AsyncWebSocketSession,
+    HTTPXWSException,
+    WebSocketDisconnect,
+    WebSocketUpgradeError,
+    aconnect_ws,
+)
+from pycrdt import Doc, Provider
+from pycrdt.websocket.websocket import HttpxWebsocket
+
+from action_assistant.commands.client import No, reach, refused, running, sentence
+from action_assistant.commands.watch.changes import GraphChange, ShownGraph, changes
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.documents import document
+from action_assistant.errors import CannotStart
+from action_assistant.safe_text import one_line
+
+_PAUSES: Final = (0.3, 1.0, 3.0, 10.0)  # seconds before coming again; the last one from then on
+#: Refusals of the upgrade after which coming again leads nowhere.
+_FINAL: Final = frozenset({401, 403, 404})
+#: The same of close codes, in words.
+_CLOSED: Final = {
+    messages.SESSION_ENDED: "The session has ended.",
+    messages.FORBIDDEN: "This graph may not be seen any more.",
+    messages.NO_SUCH_GRAPH: "The graph was deleted.",
+}
+#: How a connection is lost.
+_LOST: Final = (
+    HTTPXWSException,
+    httpx.HTTPError,
+    anyio.EndOfStream,
+    anyio.ClosedResourceError,
+    anyio.BrokenResourceError,
+)
+
+
+class _User(msgspec.Struct, frozen=True):
+    name: str = ""
+
+
+class _State(msgspec.Struct, frozen=True):
+    user: _User = _User()
+
+
+class Lines:
+    """Where changes and news of the connection are printed."""
+
+    def __init__(self, *, as_json: bool) -> None:
+        self._as_json = as_json
+
+    def change(self, seq: int, who: list[str], change: GraphChange) -> None:
+        """One line on the standard output."""
+        now = datetime.now().astimezone()
+        if self._as_json:
+            about = {"time": now.isoformat(timespec="milliseconds"), "seq": seq, "who": who}
+            line = msgspec.json.encode(about | msgspec.to_builtins(change)).decode()
+        else:
+            line = f"{now:%H:%M:%S}  moment {seq}  {', '.join(who) or '-'}  {change.words}"
+        print(one_line(line), flush=True)
+
+    def news(self, text: str) -> None:
+        """One line on the standard error, so that programs can read the rest."""
+        print(one_line(text), file=sys.stderr, flush=True)
+
+
+class WatchedGraph:
+    """What is known of the graph: its document, the moment that was told last, and who is who."""
+
+    def __init__(self, lines: Lines) -> None:
+        self._lines = lines
+        self._names: dict[int, str] = {}
+        self.ever_entered = False
+        self._begin()
+        self.enter()
+
+    def _begin(self) -> None:
+        self.doc: Doc[Any] = Doc()
+        self._changed = False
+        self._subscription = self.doc.observe(self._note)
+        self._told: ShownGraph | None = None
+        self._clocks: dict[int, int] = {}
+        self._epoch = ""
+        self._seq = 0
+
+    def begin_anew(self) -> None:
+        """Forget the history: the server has another one."""
+        self.doc.unobserve(self._subscription)
+        self._begin()
+
+    def enter(self) -> None:
+        """A connection begins; until it is in sync, nothing is told."""
+        self.in_sync = False
+        self._greeted = False
+
+    @property
+    def claims(self) -> dict[str, str]:
+        """What the room is told when it is entered (docs/room-protocol.md 1)."""
+        known = {"epoch": self._epoch, "seq": str(self._seq)} if self._epoch else {}
+        return {"acks": "1"} | known
+
+    def hear(self, message: bytes) -> None:
+        """A message of the room. What came before it is in the document by now: the provider applies
+        each before it asks for the next."""
+        reader = messages.ByteReader(message)
+        match reader.number():
+            case messages.SYNC:
+                self.in_sync |= reader.number() == messages.STEP_2
+            case messages.AWARENESS:
+                found = messages.parse(message)
+                if isinstance(found, messages.Presence):
+                    self._meet(found)
+            case messages.EPOCH:
+                self._epoch = reader.text().decode()
+            case messages.READ_ONLY:
+                self._lines.news(f"Nobody may change it: {reader.text().decode()}")
+            case messages.ACKS if self.in_sync:
+                reader.number()
+                self._reach(reader.number())
+
+    def _note(self, _: object) -> None:
+        self._changed = True
+
+    def _meet(self, presence: messages.Presence) -> None:
+        for entry in presence.entries:
+            with contextlib.suppress(msgspec.DecodeError):
+                state = msgspec.json.decode(entry.state, type=_State | None)
+                if state is not None and state.user.name:
+                    self._names[entry.client] = state.user.name
+
+    def _reach(self, seq: int) -> None:
+        """Everything up to a moment is there: tell what is different."""
+        self._seq = seq
+        if not self._greeted and self._told is not None:
+            self._lines.news(f"Connected again, at moment {seq}.")
+        if self._told is None or self._changed:
+            self._changed = False
+            self._look(seq)
+        self._greeted = self.ever_entered = True
+
+    def _look(self, seq: int) -> None:
+        maps = document.maps_of(self.doc)
+        now = ShownGraph(document.read_maps(maps), maps["comments"])
+        before, self._told = self._told, now
+        who = self._who_wrote()
+        if before is None:
+            count = sum(not action.missing for action in now.graph.actions)
+            self._lines.news(f"Watching {now.graph.name} at moment {seq}; actions: {count}.")
+            return
+        for change in changes(before, now):
+            self._lines.change(seq, who, change)
+
+    def _who_wrote(self) -> list[str]:
+        """Who added something since this was asked last. Who only deleted does not show."""
+        reader = messages.ByteReader(self.doc.get_state())
+        clocks = {reader.number(): reader.number() for _ in range(reader.number())}
+        before, self._clocks = self._clocks, clocks
+        wrote = {client for client, clock in clocks.items() if clock != before.get(client)}
+        return sorted({self._names[client] for client in wrote & self._names.keys()})
+
+
+class QuietSocket(HttpxWebsocket):
+    """The provider's socket: asks for the document, and lets nothing pass that could change it.
+
+    A stock provider answers each update with its echo, which a room ignores; a program that only looks
+    sends none.
+    """
+
+    def __init__(
+        self,
+        socket: AsyncWebSocketSession,
+        graph: WatchedGraph,
+        ended: "MemoryObjectSendStream[Exception]",
+    ) -> None:
+        super().__init__(socket, "room")
+        self._graph = graph
+        self._ended = ended
+
+    async def send(self, message: bytes) -> None:
+        """As the provider asks."""
+        if message[:2] != bytes((messages.SYNC, messages.STEP_1)):
+            return
+        try:
+            await super().send(message)
+        except Exception as error:  # noqa: BLE001 - told by who waits for the end
+            self._end(error)
+
+    async def recv(self) -> bytes:
+        """As the provider asks, which takes every error for the end and keeps it to itself."""
+        try:
+            message: bytes = await super().recv()
+            self._graph.hear(message)
+        except Exception as error:
+            self._end(error)
+            raise
+        return message
+
+    def _end(self, error: Exception) -> None:
+        with contextlib.suppress(anyio.WouldBlock):  # the first one counts
+            self._ended.send_nowait(error)
+
+
+def watch(options: argparse.Namespace) -> int:
+    """Print changes until Ctrl-C. Raises CannotStart."""
+    try:
+        with running(options) as server:
+            graph = server.graph_id(options.graph)
+        anyio.run(_follow, options, graph)
+    except No as error:
+        return refused(error)
+    return 0
+
+
+async def _follow(options: argparse.Namespace, graph: str) -> None:
+    """Be in the room, and come again after each lost connection. Raises No, CannotStart."""
+    lines = Lines(as_json=options.json)
+    watched = WatchedGraph(lines)
+    failures = 0
+    while True:
+        why = await _visit(options, graph, watched)
+        _raise_if_final(why, again=watched.ever_entered)
+        if isinstance(why, WebSocketDisconnect) and why.code == messages.OTHER_EPOCH:
+            lines.news("The history of the graphs was replaced; beginning anew.")
+            watched.begin_anew()
+            continue
+        failures = 0 if watched.in_sync else failures
+        if not failures:
+            lines.news(f"Connection lost{_because(why)}; coming again.")
+        await anyio.sleep(_PAUSES[min(failures, len(_PAUSES) - 1)])
+        failures += 1
+
+
+async def _visit(options: argparse.Namespace, graph: str, watched: WatchedGraph) -> Exception:
+    """Be in the room until that ends: why it did."""
+    watched.enter()
+    # Anew each time: while the server was away, anybody may have taken its place, and has to prove
+    # itself before it is sent the token.
+    found = reach(options)
+    found[
+        "auth"
+    ].requires_response_body = False  # an upgrade has none that ends; others are read here
+    hooks = {"response": [_read]}
+    send, receive = anyio.create_memory_object_stream[Exception](1)
+    path = f"/api/graphs/{graph}/room"
+    try:
+        with send, receive:
+            async with (
+                httpx.AsyncClient(**found, event_hooks=hooks) as client,
+                aconnect_ws(
+                    path, client, params=watched.claims, session_class=AsyncWebSocketSession
+                ) as socket,
+                Provider(watched.doc, QuietSocket(socket, watched, send)),
+            ):
+                return await receive.receive()
+    except (*_LOST, CannotStart) as error:
+        return error
+    except ExceptionGroup as group:
+        lost, other = group.split(_LOST)
+        if other is not None or lost is None:
+            raise
+        return lost
+
+
+async def _read(response: httpx.Response) -> None:
+    if response.status_code != httpx.codes.SWITCHING_PROTOCOLS:
+        await response.aread()
+
+
+def _raise_if_final(why: Exception, *, again: bool) -> None:
+    """Raise what coming again does not help against."""
+    match why:
+        case WebSocketUpgradeError() if why.response.status_code in _FINAL:
+            raise No(sentence(why.response))
+        case WebSocketDisconnect() if why.code in _CLOSED:
+            raise No(_CLOSED[why.code])
+        case CannotStart() if again:  # somebody else listens there; our server may come back
+            return
+        case ExceptionGroup() | WebSocketDisconnect():
+            return
+    if not isinstance(why, _LOST):
+        raise why
+
+
+def _because(why: Exception) -> str:
+    match why:
+        case WebSocketDisconnect():
+            return f" ({why.reason or why.code})"
+        case WebSocketUpgradeError():
+            return f" (status {why.response.status_code})"
+        case CannotStart():
+            return f" ({why})"
+    return ""

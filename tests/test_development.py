@@ -1,0 +1,44 @@
+"""What people and editors work with: hooks, the container, and targets of make agree."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).parents[1]
+MAKEFILE = (ROOT / "Makefile").read_text()
+
+
+def test_hooks_run_what_make_check_runs() -> None:
+    (repository,) = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
+    assert repository["repo"] == "local"
+    hooks = {shlex.split(each["entry"])[-1] for each in repository["hooks"]}
+    (check,) = re.findall(r"^check: (.*?) ##", MAKEFILE, re.MULTILINE)
+    assert hooks == set(check.split())
+    for each in repository["hooks"]:
+        assert (each["language"], each["pass_filenames"]) == ("system", False)
+        assert re.search(rf"^{shlex.split(each['entry'])[-1]}:", MAKEFILE, re.MULTILINE)
+
+
+def test_the_container_for_development_has_what_ci_installs() -> None:
+    folder = ROOT / ".devcontainer"
+    settings = json.loads((folder / "devcontainer.json").read_text())
+    installed = (folder / settings["build"]["dockerfile"]).read_text().split()
+    ci = (ROOT / ".ci" / "run").read_text()
+    needed = {
+        package
+        for package in re.findall(r"[\w)]=([a-z][a-z0-9+-]+)", ci)
+        if package not in {"true", "target"}
+    }
+    assert {"make", "chromium", "postgresql", "python3-venv", "ninja-build"} <= needed
+    assert needed <= set(installed)
+    assert settings["postCreateCommand"].split() == ["make", "setup"]
+    assert f"USER {settings['remoteUser']}" in (folder / "Dockerfile").read_text()
+
+
+def test_every_target_that_is_listed_has_a_word_on_what_it_does() -> None:
+    targets = re.findall(r"^\.PHONY: (.*)$", MAKEFILE, re.MULTILINE)
+    documented = set(re.findall(r"^([a-z0-9-]+):.*## ", MAKEFILE, re.MULTILINE))
+    assert {name for line in targets for name in line.split()} <= documented
