@@ -379,3 +379,22 @@ async def test_thousands_of_pages_that_edit_one_graph_are_hardly_ever_tried(
         assert (await room.quiet()).doc.get("a", type=Map)["shared"] is False
     await rooms.close()
     assert tries < 30
+
+
+async def test_what_waits_for_ever_makes_no_trial_of_every_edit(journal: Journal) -> None:
+    tries = 0
+
+    async def counted(work: Callable[..., Any], *values: Any) -> Any:
+        nonlocal tries
+        tries += 1
+        return work(*values)
+
+    rooms = Rooms(journal, linger=60, window=0, tried=counted)
+    async with rooms.enter("graph/g") as room:
+        await room.submit(at_once(2_500, client=11, needs=9), "eve")
+        before = tries
+        for n in range(60):
+            await room.submit(page_edit(n), "ada")
+        assert room.seq == 61
+    await rooms.close()
+    assert tries == before

@@ -280,7 +280,10 @@ class Room:
                 return several, False
 
     def _is_doubtful(self, size: int) -> bool:
-        return self._replica.opening.is_doubtful_with(size + self._replica.waiting_bytes)
+        freed = min(
+            self._replica.waiting_bytes, LARGE
+        )  # what more than that frees is looked at alone
+        return self._replica.opening.is_doubtful_with(size + freed)
 
     def _take(self, batch: Sequence[Item]) -> Taken:
         """Apply a batch. After a panic the rest of it waits for a sound document."""
@@ -320,13 +323,15 @@ class Room:
         """Its outline; None where it has to be read again, since in a document with depth also what
         lies beside something deep counts. Raises Malformed, Panicked, TooSlow, NotNow,
         QuotaExceeded."""
-        large = len(offer.update) > LARGE or self._is_doubtful(len(offer.update))
-        read = None if large else outline(offer.update)
+        read = None if len(offer.update) > LARGE else outline(offer.update)
         released = [] if read is None else self._replica.freed_by(read)
-        if read is not None and sum(map(len, released)) <= LARGE:
+        freed = sum(map(len, released))
+        opening = self._replica.opening
+        small = read is not None and freed <= LARGE
+        if small and not opening.is_doubtful_with(len(offer.update) + freed):
             return read
         state = self._replica.doc.get_update()
-        waiting = released or self._replica.waiting
+        waiting = self._replica.waiting if read is None else released
         tried = await tried_for(offer.author, self._tried, state, offer.update, waiting)
         self._replica.opening.opened(tried.opening, len(state))
         self._replica.opening.refuse(tried)
