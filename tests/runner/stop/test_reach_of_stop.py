@@ -14,8 +14,7 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from runner.harness import ANN, BEN, Harness, at_once, clock_us, order, sequence, until, virtual
-from runner.registered_robots import Open, RegisteredRobots
-from runner.robots.test_robots import NEVER, fleet, group
+from runner.registered_robots import NEVER, Open, RegisteredRobots, fleet, group
 from runner.robots_in_network import PATROL, RobotsInNetwork, asked, shown
 
 
