@@ -13,8 +13,7 @@ import pytest
 
 from action_assistant.errors import Conflict, TooLarge, TooMany, Unavailable
 from action_assistant.runner.workers import Crashed, Lane, RunnerWorkers
-from action_assistant.web.auth import access
-from action_assistant.web.auth.access import Caller, done_for_nobody
+from action_assistant.web.auth.caller import Caller, called_by, done_for_nobody
 from runner.worker_tasks import devour, die, pid, refuse, spin, standing, stumble
 
 
@@ -31,7 +30,7 @@ async def lane() -> AsyncIterator[Lane]:
 
 @asynccontextmanager
 async def asked_by(person: str, receive: Callable[[], Any] | None = None) -> AsyncIterator[None]:
-    access._CALLER.set(Caller(person, receive))
+    called_by(Caller(person, receive))
     try:
         yield
     finally:

@@ -15,7 +15,7 @@ from action_assistant.editor.crdt.trial import TooSlow, tried
 from action_assistant.editor.crdt.update_scan import UpdateOutline
 from action_assistant.editor.rooms.member import Member
 from action_assistant.errors import BadInput, Refused, TooLarge
-from action_assistant.web.auth.access import acting_for
+from action_assistant.web.auth.caller import acting_for
 from action_assistant.web.workers.lanes import Crashed, RunInWorker
 
 LARGE: Final = 8 * 1024  # bytes of an update that is tried on a copy first, and by itself

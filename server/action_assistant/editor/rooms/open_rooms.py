@@ -11,7 +11,7 @@ from action_assistant.editor.rooms.batch_window import LENGTH, BatchWindow
 from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.web.auth.access import done_for_person
+from action_assistant.web.auth.caller import done_for_person
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 LINGER: Final = 5.0  # seconds that a room stays after the last one left

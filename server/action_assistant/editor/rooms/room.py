@@ -48,7 +48,7 @@ from action_assistant.editor.rooms.presence import PresenceNews, RoomPresence
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
-from action_assistant.web.auth.access import done_for_nobody
+from action_assistant.web.auth.caller import done_for_nobody
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 log: Final = logging.getLogger(__name__)

@@ -40,7 +40,7 @@ from action_assistant.runner.start.start_checks import (
 )
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.runner.stop.late_activity import LateActivity
-from action_assistant.web.auth.access import done_for_nobody
+from action_assistant.web.auth.caller import done_for_nobody
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)

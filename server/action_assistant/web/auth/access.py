@@ -6,9 +6,7 @@ import asyncio
 import getpass
 import logging
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import anyio
@@ -25,6 +23,7 @@ from action_assistant.errors import (
     WrongHost,
     WrongOrigin,
 )
+from action_assistant.web.auth.caller import Caller, called_by
 from action_assistant.web.auth.keys import Keys, Person, Session
 from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards
 from action_assistant.web.auth.roles import OWNER, Deed, allowed, may
@@ -105,50 +104,6 @@ def live_session(connection: ASGIConnection[Any, Any, Any, Any]) -> Session:
     return session
 
 
-class Caller(NamedTuple):
-    """Who waits for what is being done now. What is done for nobody may end."""
-
-    person: str
-    receive: Receive | None = None  # a socket's messages are not ours to read
-
-    async def gone(self) -> None:
-        """Wait until they have gone. Only after the request was read."""
-        if self.receive is None:
-            await anyio.sleep_forever()
-        else:
-            while (await self.receive())["type"] != "http.disconnect":
-                pass
-
-
-_CALLER: Final[ContextVar[Caller | None]] = ContextVar("caller", default=None)
-
-
-def caller() -> Caller | None:
-    """Whoever asked for what this task does; None when nobody did."""
-    return _CALLER.get()
-
-
-def done_for_person() -> None:
-    """From here on this task goes on also when the connection ends that it was begun for."""
-    asking = _CALLER.get()
-    _CALLER.set(None if asking is None else Caller(asking.person))
-
-
-@contextmanager
-def acting_for(person: str) -> Iterator[None]:
-    """What is asked for inside is asked for by this person."""
-    token = _CALLER.set(Caller(person))
-    try:
-        yield
-    finally:
-        _CALLER.reset(token)
-
-
-def done_for_nobody() -> None:
-    """From here on this task, and those that it begins, go on for themselves."""
-    _CALLER.set(None)
-
-
 class Plain(NamedTuple):
     """A connection as the server below gave it: for sockets whose every message counts."""
 
@@ -207,7 +162,7 @@ class Access:
         asked = receive if scope["type"] == ScopeType.HTTP else None
         if known is not None:
             scope["state"].get(KNOWN, _nobody)(known.id)
-        _CALLER.set(None if known is None else Caller(known.id, asked))
+        called_by(None if known is None else Caller(known.id, asked))
         if preflight:
             await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
             return

@@ -19,7 +19,7 @@ import anyio
 from anyio import CapacityLimiter, to_thread
 
 from action_assistant.errors import TooLarge, TooMany, Unavailable
-from action_assistant.web.auth.access import Caller, caller
+from action_assistant.web.auth.caller import Caller, caller
 from action_assistant.web.workers.child_process import LAST, child, serve, wire
 
 __all__ = ["HOPELESS", "Crashed", "GaveUp", "Lane", "RunInWorker", "child", "kept_warm", "run_here"]
