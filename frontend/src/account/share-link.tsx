@@ -35,6 +35,15 @@ function Copy({ link, label }: { link: string; label: string }) {
   );
 }
 
+function Code({ src, label }: { src: string; label: string }) {
+  return (
+    <figure className={style.code}>
+      <img src={src} alt={`QR code of the link for ${label}`} width={232} height={232} />
+      <figcaption>Point the camera of a phone or tablet at it.</figcaption>
+    </figure>
+  );
+}
+
 export function ShareLink({ invitation, origin }: { invitation: Invitation; origin: string }) {
   const { runner } = useLive();
   const revoke = useRevoke(runner);
@@ -103,17 +112,7 @@ export function ShareLink({ invitation, origin }: { invitation: Invitation; orig
           {errorText(revoke.error)}
         </p>
       )}
-      {code && (
-        <figure className={style.code}>
-          <img
-            src={codeUrl(invitation.id, origin)}
-            alt={`QR code of the link for ${label}`}
-            width={232}
-            height={232}
-          />
-          <figcaption>Point the camera of a phone or tablet at it.</figcaption>
-        </figure>
-      )}
+      {code && <Code src={codeUrl(invitation.id, origin)} label={label} />}
     </li>
   );
 }
