@@ -32,13 +32,14 @@ from action_assistant.runner.emulator.messages import (
     Stop,
     active,
     asked_for,
+    engine_inside,
     graph_plan_of,
     refusal,
     unknown,
 )
 from action_assistant.runner.emulator.view import PublishedGraphs
 from action_assistant.umrf.facts import PINNED, EngineFacts
-from action_assistant.umrf.semantics import Engine, Execution, GraphRefused, Script, Trace
+from action_assistant.umrf.semantics import Execution, GraphRefused, Script, Trace
 
 _NEXT_MS: Final = 0.2  # between two messages that wait
 _TOLD_MS: Final = 10.0  # from the end of a stop to the line that says so
@@ -75,7 +76,7 @@ class EmulatedEngine:
         self.gone = ""  # why its process has ended
         self._facts = facts
         self._index = index
-        self._engine = _engine_inside(index, quirks, facts, script, first)
+        self._engine = engine_inside(index, quirks, facts, script, first)
         self._now = self._tick = born_ms
         self._out: list[Said] = []
         self._tasks: list[tuple[float, int, Callable[[], None]]] = []
@@ -387,17 +388,3 @@ class EmulatedEngine:
         if not self.gone:
             self._out.append(Gone(self._now, why))
             self.gone = why
-
-
-def _engine_inside(
-    index: EmulatedIndex, quirks: EngineTraits, facts: EngineFacts, script: Script, actor: str
-) -> Engine:
-    """What runs the graphs, without the node around it."""
-    return Engine(
-        facts=facts,
-        script=script,
-        library={name: plan.graph for name, plan in index.graphs.items()},
-        actor=actor,
-        signatures=index.actions if index.actions and quirks.checks_actions else None,
-        loading_ms=quirks.loading_ms,
-    )
