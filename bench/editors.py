@@ -10,8 +10,9 @@ import sys
 import time
 from typing import Any, Final
 
-from load import Crowd, Person, Plan
+from load import Crowd
 from pycrdt import Doc, Map
+from yjs_socket import Person, Plan
 
 DESCRIBED: Final = 0.2  # of all edits; the others are moves
 

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -125,6 +126,51 @@ def _told(answer: httpx.Response, what: str) -> float:
     return float(parts[what]) / 1e3
 
 
+class Stops:
+    """How long stops took, and whose time that was, in seconds."""
+
+    def __init__(self, share: Share) -> None:
+        self._share = share
+        self._took: list[float] = []
+        self._own: list[float] = []
+        self._inside: list[float] = []
+        self._used: list[float] = []
+        self._waited: list[float] = []
+
+    def timed(self, ask: Callable[[], httpx.Response]) -> httpx.Response:
+        """One more."""
+        cpu, ready = self._share.now()
+        began = time.perf_counter()
+        answer = ask()
+        took = time.perf_counter() - began
+        cpu_after, ready_after = self._share.now()
+        self._took.append(took)
+        self._own.append(_told(answer, "cpu"))
+        self._inside.append(_told(answer, "total"))
+        self._used.append(min(took, cpu_after - cpu))
+        self._waited.append(min(took, ready_after - ready))
+        return answer
+
+    def told(self) -> tuple[float, float]:
+        """Print all of it; p99 and the longest of the runner's own share."""
+        told("click to answer", self._took)
+        found = told("the runner's own share of it", self._own)
+        told("inside the runner", self._inside)
+        told("what it did for everybody meanwhile", self._used)
+        told("the runner was ready, others had the CPUs", self._waited)
+        return found
+
+
+def all_stopped(runner: RunnerProcess, runs: list[str]) -> None:
+    """Waits until each of them is, a minute at most."""
+    with runner.client() as client:
+        for run in runs:
+            deadline = time.monotonic() + 60
+            while client.get(f"/api/runs/{run}").json()["state"] != "stopped":
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
+
+
 @pytest.mark.timeout(0)
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux who used the processors")
 def test_stop_is_taken_whatever_everybody_does(runner: RunnerProcess) -> None:
@@ -138,12 +184,7 @@ def test_stop_is_taken_whatever_everybody_does(runner: RunnerProcess) -> None:
         "cookie": ODD.replace("{port}", str(runner.port - 1)) + cookie,
         "origin": f"http://127.0.0.1:{runner.port - 1}",
     }
-    share = Share(runner.pid)
-    took: list[float] = []
-    own: list[float] = []
-    inside: list[float] = []
-    used: list[float] = []
-    waited: list[float] = []
+    shares = Stops(Share(runner.pid))
     late: list[float] = []
     with crowd(runner, str(SILENT), str(CLIENTS)), overslept(late):
         time.sleep(2)
@@ -158,35 +199,17 @@ def test_stop_is_taken_whatever_everybody_does(runner: RunnerProcess) -> None:
                 more: dict[str, Any] = (
                     {"headers": raw, "trust_env": False, "timeout": 60} if fresh else {}
                 )
-                cpu, ready = share.now()
-                began = time.perf_counter()
-                answer = asked(
-                    f"{base}{path}" if fresh else path, json={"stop_id": str(number)}, **more
-                )
-                took.append(time.perf_counter() - began)
-                cpu_after, ready_after = share.now()
-                own.append(_told(answer, "cpu"))
-                inside.append(_told(answer, "total"))
-                used.append(min(took[-1], cpu_after - cpu))
-                waited.append(min(took[-1], ready_after - ready))
+                url = f"{base}{path}" if fresh else path
+                answer = shares.timed(partial(asked, url, json={"stop_id": str(number)}, **more))
                 assert answer.status_code == 202, answer.text
                 time.sleep(0.01)
     sys.stdout.write("\n")
-    told("click to answer", took)
-    p99, longest = told("the runner's own share of it", own)
-    told("inside the runner", inside)
-    told("what it did for everybody meanwhile", used)
-    told("the runner was ready, others had the CPUs", waited)
+    p99, longest = shares.told()
     told("an idle process woke up late by", late)
     if WHOLE:
         assert p99 < 0.05
         assert longest < 0.15
-    with runner.client() as client:
-        for run in runs:
-            deadline = time.monotonic() + 60
-            while client.get(f"/api/runs/{run}").json()["state"] != "stopped":
-                assert time.monotonic() < deadline
-                time.sleep(0.1)
+    all_stopped(runner, runs)
 
 
 def _workers(runner: RunnerProcess) -> list[psutil.Process]:

@@ -1,4 +1,6 @@
-"""The tree of the server: folders that can be looked over, no circles, one name for one thing."""
+"""The tree of the server: folders that can be looked over, no circles, one name for one thing; and
+how long files and functions are, of the page's files too (its functions: `frontend/src/tree.test.ts`).
+"""
 
 import ast
 from collections import defaultdict
@@ -14,6 +16,25 @@ SERVER: Final = TESTS.parent / "server" / PACKAGE
 MOST: Final = 15  # modules of a folder
 #: Below each of these, packages stand on so many floors at most.
 FLOORS: Final = {"runner": 6, "editor": 6, "web": 6, "umrf": 6}
+ROOT: Final = TESTS.parent
+LINES: Final = 400  # of a file
+OWN_LINES: Final = 40  # of a function
+SOURCES: Final = ("server", "tests", "bench", "frontend/src", "frontend/e2e")
+#: Files that are longer, and why a split would be worse.
+LONG_FILES: Final = {
+    "server/action_assistant/runner/execution/service.py": "starts and stops over the same open runs",
+    "server/action_assistant/runner/execution/run_loop.py": "all that one open run holds and does",
+    "server/action_assistant/umrf/semantics/core.py": "one recursion: results, runs, stops, pauses",
+}
+#: Functions that are longer, and why.
+LONG_FUNCTIONS: Final = {
+    "migrations/editor/editor_0001_log_and_catalogue.py upgrade": "migrations never change again",
+    "migrations/runner/runner_0001_log_and_runs.py upgrade": "migrations never change again",
+    "server/action_assistant/commands/backups/backup.py _backup": "the steps of a backup in order",
+    "server/action_assistant/commands/files.py add_to": "a list of commands and their options",
+    "server/action_assistant/commands/processes.py add_to": "a list of commands and their options",
+    "server/action_assistant/commands/remote.py add_to": "a list of commands and their options",
+}
 #: Class names that stand in several modules, and why they may.
 SHARED: Final[dict[str, str]] = {}
 
@@ -121,3 +142,44 @@ def test_a_class_name_stands_in_one_module() -> None:
     several = {name: sorted(places) for name, places in where.items() if len(places) > 1}
     assert {name: at for name, at in several.items() if name not in SHARED} == {}
     assert set(SHARED) <= set(several), "a reason without a name that needs it"
+
+
+def own_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """From `def` to its end; functions inside, their decorators, and its docstring do not count."""
+    assert function.end_lineno is not None
+    lines = set(range(function.lineno, function.end_lineno + 1))
+    first = function.body[0]
+    inside: list[tuple[int, int | None]] = []
+    if ast.get_docstring(function, clean=False) is not None:
+        inside.append((first.lineno, first.end_lineno))
+    for node in ast.walk(function):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node is not function:
+            starts = [node.lineno, *(each.lineno for each in node.decorator_list)]
+            inside.append((min(starts), node.end_lineno))
+    for begin, end in inside:
+        lines -= set(range(begin, (end or begin) + 1))
+    return len(lines)
+
+
+def test_functions_are_short() -> None:
+    found: dict[str, int] = defaultdict(int)
+    for top in ("server", "migrations", "bench", "tests"):
+        for path in sorted((ROOT / top).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                    name = f"{path.relative_to(ROOT)} {node.name}"
+                    found[name] = max(found[name], own_lines(node))
+    long = {name: lines for name, lines in found.items() if lines > OWN_LINES}
+    assert {name: lines for name, lines in long.items() if name not in LONG_FUNCTIONS} == {}
+    assert set(LONG_FUNCTIONS) <= set(long), "a reason without a function that needs it"
+
+
+def test_files_are_short() -> None:
+    found = {}
+    for top in SOURCES:
+        for path in sorted((ROOT / top).rglob("*")):
+            if path.suffix in {".py", ".ts", ".tsx"}:
+                found[str(path.relative_to(ROOT))] = len(path.read_text().splitlines())
+    long = {name: lines for name, lines in found.items() if lines > LINES}
+    assert {name: lines for name, lines in long.items() if name not in LONG_FILES} == {}
+    assert set(LONG_FILES) <= set(long), "a reason without a file that needs it"

@@ -62,6 +62,23 @@ def test_the_wheel_carries_neither_tests_nor_what_builds(wheel: Path) -> None:
     assert not [each for each in names if "test" in each.name or "tests" in each.parts]
 
 
+def _bare_environment(folder: Path) -> dict[str, str]:
+    """Without any tool, and with modules of another workspace, as a sourced ROS 2 brings them."""
+    tools, harmful = folder / "bin", folder / "sourced"
+    tools.mkdir()
+    harmful.mkdir()
+    for name in ("litestar", "msgspec", "sqlalchemy"):
+        (harmful / f"{name}.py").write_text("raise ImportError('of another workspace')")
+    return {
+        "PYTHONPATH": str(harmful),
+        "AMENT_PREFIX_PATH": str(folder),
+        "PATH": str(tools),
+        "HOME": str(folder),
+        "ACTION_ASSISTANT_TOKEN": TOKEN,
+        "LANG": os.environ.get("LANG", "C.UTF-8"),
+    }
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: Path) -> None:
@@ -72,19 +89,7 @@ def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: 
     subprocess.run([IMAGE, "install", environment, files], check=True)
     assert tools_in(environment) == set()
     product = Product(tmp_path / "data")
-    tools, harmful = tmp_path / "bin", tmp_path / "sourced"
-    tools.mkdir()
-    harmful.mkdir()
-    for name in ("litestar", "msgspec", "sqlalchemy"):
-        (harmful / f"{name}.py").write_text("raise ImportError('of another workspace')")
-    clean = {
-        "PYTHONPATH": str(harmful),  # as a sourced ROS 2 sets it
-        "AMENT_PREFIX_PATH": str(tmp_path),
-        "PATH": str(tools),
-        "HOME": str(tmp_path),
-        "ACTION_ASSISTANT_TOKEN": TOKEN,
-        "LANG": os.environ.get("LANG", "C.UTF-8"),
-    }
+    clean = _bare_environment(tmp_path)
     assert shutil.which("node", path=clean["PATH"]) is None
     command = [str(environment / "bin" / "action-assistant"), "serve", "--no-open"]
     process = subprocess.Popen(

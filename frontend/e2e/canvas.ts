@@ -213,3 +213,19 @@ export async function meant(product: Product, file: object): Promise<object> {
   });
   return meaningOf(product, id);
 }
+
+export const CARD = ".react-flow__node-action";
+
+export const chosen = (page: Page) => page.locator(`${CARD}.selected`);
+
+/** Selects actions, and nothing else. */
+export async function pick(page: Page, ...names: readonly [string, number][]): Promise<void> {
+  await page.keyboard.press("Escape");
+  for (const [i, [name, instance]] of names.entries()) {
+    await card(page, name, instance).click({
+      position: { x: 60, y: 12 },
+      modifiers: i > 0 ? ["Shift"] : [],
+    });
+  }
+  await expect(chosen(page)).toHaveCount(names.length);
+}

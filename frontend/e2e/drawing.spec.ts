@@ -5,11 +5,14 @@ import {
   add,
   arrows,
   boxOf,
+  CARD,
   card,
+  chosen,
   connect,
   enter,
   meaningOf,
   meant,
+  pick,
   saved,
   umrfOf,
 } from "./canvas";
@@ -21,9 +24,7 @@ const product = new Product();
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
-const CARD = ".react-flow__node-action";
 const cards = (page: Page) => page.locator(CARD);
-const chosen = (page: Page) => page.locator(`${CARD}.selected`);
 
 /** Does a deed by its name in the palette. */
 async function deed(page: Page, name: string): Promise<void> {
@@ -33,17 +34,6 @@ async function deed(page: Page, name: string): Promise<void> {
   await expect(page.getByRole("option").first()).toContainText(name);
   await search.press("Enter");
   await expect(search).toBeHidden();
-}
-
-async function pick(page: Page, ...names: readonly [string, number][]): Promise<void> {
-  await page.keyboard.press("Escape");
-  for (const [i, [name, instance]] of names.entries()) {
-    await card(page, name, instance).click({
-      position: { x: 60, y: 12 },
-      modifiers: i > 0 ? ["Shift"] : [],
-    });
-  }
-  await expect(chosen(page)).toHaveCount(names.length);
 }
 
 /** Takes one end of an arrow and drops it on something, or on empty canvas. */

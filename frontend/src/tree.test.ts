@@ -1,6 +1,7 @@
 /** The tree of the page: small folders, layers without circles, and one meaning for each type name. */
 import { readdirSync, readFileSync } from "node:fs";
 import { dirname, join, relative, resolve } from "node:path";
+import ts from "typescript";
 import { expect, test } from "vitest";
 
 const SRC = import.meta.dirname;
@@ -125,4 +126,56 @@ test("a type name has one meaning", () => {
   // `Props` are those of the one component that a module exports.
   const several = [...homes].filter(([name, where]) => name !== "Props" && where.length > 1);
   expect(several).toEqual([]);
+});
+
+/** Lines that a function may have of its own, by the kind of file; functions inside do not count. */
+const OWN_LINES = {
+  ".ts": 40,
+  ".tsx": 80, // JSX has one attribute a line, and what stands beside each other is read together
+  ".test.ts": 50,
+  ".test.tsx": 80,
+  ".spec.ts": 90, // what people do in a browser, step after step
+};
+/** Functions that have more, and why. */
+const LONG_FUNCTIONS: Readonly<Record<string, string>> = {
+  "api/live/live-socket.ts #hear": "one arm for each message of the socket",
+  "../e2e/two-people.spec.ts test": "one story, in which each step needs those before",
+};
+
+const nameOf = (node: ts.Node): string => {
+  if (ts.isFunctionLike(node) && node.name !== undefined) return node.name.getText();
+  if (ts.isVariableDeclaration(node.parent)) return node.parent.name.getText();
+  return ts.isCallExpression(node.parent) ? node.parent.expression.getText() : "";
+};
+
+/** Every function of a file with its own lines. */
+function ownLinesOf(file: string): [string, number][] {
+  const source = ts.createSourceFile(file, textOf(file), ts.ScriptTarget.Latest, true);
+  const lineOf = (at: number) => source.getLineAndCharacterOfPosition(at).line;
+  const found: [string, number][] = [];
+  /** Lines of functions directly inside, but where they begin; lines of `node` itself if it is one. */
+  const visit = (node: ts.Node): number => {
+    let inside = 0;
+    ts.forEachChild(node, (child) => {
+      inside += visit(child);
+    });
+    if (!ts.isFunctionLike(node) || !("body" in node) || node.body === undefined) return inside;
+    const more = lineOf(node.end) - lineOf(node.getStart());
+    found.push([`${file} ${nameOf(node)}`, more + 1 - inside]);
+    return more;
+  };
+  visit(source);
+  return found;
+}
+
+test("functions are short", { timeout: 60_000 }, () => {
+  const specs = readdirSync(join(SRC, "../e2e")).filter((file) => file.endsWith(".ts"));
+  const long = [...files, ...specs.map((file) => `../e2e/${file}`)].flatMap((file) => {
+    const [, end = ""] = /((?:\.(?:test|spec))?\.tsx?)$/.exec(file) ?? [];
+    const most = OWN_LINES[end as keyof typeof OWN_LINES];
+    return ownLinesOf(file).filter(([, lines]) => lines > most);
+  });
+  expect(long.filter(([name]) => !(name in LONG_FUNCTIONS))).toEqual([]);
+  const names = new Set(long.map(([name]) => name));
+  expect(Object.keys(LONG_FUNCTIONS).filter((name) => !names.has(name))).toEqual([]);
 });

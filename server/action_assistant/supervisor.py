@@ -230,17 +230,10 @@ def _greet(
 ) -> None:
     """Say where the page is once both processes answer, and open it."""
     here = plan.host if plan.host not in {"0.0.0.0", "::", "localhost", EVERYWHERE} else "127.0.0.1"
-    shown = f"[{here}]" if ":" in here else here
-    scheme = "https" if plan.tls else "http"
-    deadline = time.monotonic() + _PATIENCE
-    for child in children:
-        while not is_ours(f"{scheme}://{shown}:{child.port}", keys, trust):
-            if enough.within(_TICK):
-                return
-            if time.monotonic() > deadline:
-                _say(f"{child.name} does not answer yet; the messages above may say why")
-                deadline = float("inf")
-    base = f"{scheme}://{shown}:{plan.port}"
+    origin = f"{'https' if plan.tls else 'http'}://{f'[{here}]' if ':' in here else here}"
+    if not _answer(origin, keys, trust, children, enough):
+        return
+    base = f"{origin}:{plan.port}"
     url = f"{base}/#t={keys.token}"
     shown_at = f"{plan.reached.public.page}/#t={keys.token}" if plan.reached.public else url
     # Through a file that only this user can read: arguments of a browser are visible to all.
@@ -263,6 +256,25 @@ def _greet(
         _say(invitations_as_text(base, keys, trust, secret=not at_terminal))
     if opens:
         webbrowser.open(redirect.as_uri())
+
+
+def _answer(
+    origin: str,
+    keys: Keys,
+    trust: ssl.SSLContext | None,
+    children: list[Child],
+    enough: EndSignal,
+) -> bool:
+    """Waits until every process answers; False if it is told to end before."""
+    deadline = time.monotonic() + _PATIENCE
+    for child in children:
+        while not is_ours(f"{origin}:{child.port}", keys, trust):
+            if enough.within(_TICK):
+                return False
+            if time.monotonic() > deadline:
+                _say(f"{child.name} does not answer yet; the messages above may say why")
+                deadline = float("inf")
+    return True
 
 
 def _has_screen() -> bool:

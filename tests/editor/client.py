@@ -9,7 +9,10 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.documents.fingerprint import Fingerprint
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.room import Room
+from action_assistant.journal.journal import Journal
 from action_assistant.web.auth.keys import Person
+
+STREAM = "graph/g"
 
 
 class Client:
@@ -120,3 +123,24 @@ async def settle(*clients: Client) -> None:
                 await asyncio.sleep(0)  # the room tells who is where when the window opens
                 await client.room.quiet()
                 busy = await client.listen() or busy
+
+
+def updates(*changes: tuple[str, str | None]) -> list[bytes]:
+    """The updates of one author who writes or erases things, in order."""
+    client = Client("author")
+    for name, value in changes:
+        if value is None:
+            del client.map[name]
+        else:
+            client.map[name] = value
+    return [bytes(frame_update(frame)) for frame in client.out]
+
+
+def frame_update(frame: bytes) -> bytes:
+    message = messages.parse(frame)
+    assert isinstance(message, messages.Edit)
+    return message.update
+
+
+async def bodies(journal: Journal) -> list[bytes]:
+    return [event.body for event in await journal.read(STREAM)]

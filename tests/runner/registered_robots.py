@@ -1,10 +1,12 @@
 """Robots in virtual time that also tell what they hear and know, for tests of the registry."""
 
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from typing import Any
 
 import msgspec
 
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
@@ -19,12 +21,16 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
 )
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.start.preflight import Preflight
+from action_assistant.runner.start.start_checks import GroupRequest
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph, Parameter
-from runner.harness import Robot, clock_us, engine
+from runner.harness import ANN, Harness, Robot, at_once, clock_us, engine, order, until
 
 WORK = codec.write_action(Action(key="work", name="Work"))
+NEVER = {"*": [{"never": True}]}
 
 
 class Open(Robot):
@@ -108,3 +114,33 @@ def given(graph: Graph, name: str) -> Graph:
         msgspec.structs.replace(action, inputs=(*action.inputs, extra)) for action in graph.actions
     )
     return msgspec.structs.replace(graph, actions=actions)
+
+
+@asynccontextmanager
+async def fleet(harness: Harness, **robots: Open) -> AsyncIterator[ExecutionService]:
+    """A runner that knows these robots, after they have answered for the first time."""
+    reach = Robots(reach=RegisteredRobots(**robots))
+    async with ExecutionService.opened(
+        harness.ledger, reach, clock_us=clock_us, run_in_worker=at_once
+    ) as control:
+        for name in robots:
+            await control.register(Registration(name=name), ANN)
+        await until(lambda: all(control.robots.robot(name).heard_at for name in robots))
+        yield control
+
+
+def group(graph: Graph, *engines: str, **fields: object) -> GroupRequest:
+    asked = order(graph)
+    request = GroupRequest(
+        version="v1", digest=asked.digest, umrf=asked.umrf, engines=engines, request_id="g"
+    )
+    return msgspec.structs.replace(request, **fields)
+
+
+def verdicts(look: Preflight) -> dict[str, str]:
+    return {item.code: item.verdict for item in look.items}
+
+
+def change(graph: Graph) -> bytes:
+    asked = order(graph)
+    return msgspec.json.encode({"version": "v2", "digest": asked.digest, "umrf": asked.umrf})

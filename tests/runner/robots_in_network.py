@@ -9,6 +9,7 @@ import anyio
 
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import EngineTraits, Start
+from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs import views
 from action_assistant.umrf.semantics import script_from
@@ -23,6 +24,10 @@ SCRIPT: dict[str, Any] = {
     "other/Work_0": [{"never": True, "ignores_stop": True}],
     "*": [{"never": True}],
 }
+#: Nothing ever obeys.
+STUBBORN: dict[str, Any] = {"*": [{"never": True, "ignores_stop": True}]}
+#: What somebody says who has looked.
+LOOKED = RestRequest("I stand beside it; nothing moves.")
 
 
 class RobotsInNetwork:

@@ -97,7 +97,7 @@ def requests() -> list[tuple[str, str, bytes]]:
     group = b'"engines":["simulator"]'
     never = b',"script":{"behaviours":{"*":[{"never":true}]}}}'
     quick = b',"script":{"behaviours":{"*":[{"after_s":0}]}}}'
-    return [
+    commands = [
         ("POST", "/api/runs", start(wide)[:-1] + never),
         ("POST", "/api/runs", start(wide)[:-1] + quick),
         ("POST", "/api/runs", start(many)),
@@ -115,23 +115,30 @@ def requests() -> list[tuple[str, str, bytes]]:
         ("POST", "/api/stop", b"[" * 1_000_000),
         ("POST", f"/api/runs/{LONG}/stop", b"x" * 1_000_000),
         ("PATCH", f"/api/runs/{LONG}/marks", msgspec.json.encode({"note": "n" * 4_000})),
-        ("GET", "/api/runs?limit=1000&text=a", b""),
-        ("GET", f"/api/runs/{LONG}", b""),
-        ("GET", f"/api/runs/{LONG}/film", b""),
-        ("GET", f"/api/runs/{LONG}/film?after=2000", b""),
-        ("GET", f"/api/runs/{LONG}/causes", b""),
-        ("GET", f"/api/runs/{LONG}/script", b""),
-        ("GET", f"/api/runs/{LONG}/umrf", b""),
-        ("GET", f"/api/runs/{LONG}/events", b""),
-        ("GET", f"/api/runs/{LONG}/export?format=jsonl", b""),
-        ("GET", f"/api/runs/{LONG}/export?format=csv", b""),
-        ("GET", f"/api/runs/{LONG}/export?format=mcap", b""),
-        ("GET", f"/api/comparison?a={LONG}&b={LONG}", b""),
-        ("GET", "/api/statistics?graph=hostile&last=1000", b""),
-        ("GET", "/api/expectations", b""),
-        ("GET", "/api/robots", b""),
-        ("GET", "/schema/openapi.json", b""),
     ]  # fmt: skip
+    return commands + [("GET", path, b"") for path in _asked_for()]
+
+
+def _asked_for() -> list[str]:
+    """Everything that is read and may be long."""
+    return [
+        "/api/runs?limit=1000&text=a",
+        f"/api/runs/{LONG}",
+        f"/api/runs/{LONG}/film",
+        f"/api/runs/{LONG}/film?after=2000",
+        f"/api/runs/{LONG}/causes",
+        f"/api/runs/{LONG}/script",
+        f"/api/runs/{LONG}/umrf",
+        f"/api/runs/{LONG}/events",
+        f"/api/runs/{LONG}/export?format=jsonl",
+        f"/api/runs/{LONG}/export?format=csv",
+        f"/api/runs/{LONG}/export?format=mcap",
+        f"/api/comparison?a={LONG}&b={LONG}",
+        "/api/statistics?graph=hostile&last=1000",
+        "/api/expectations",
+        "/api/robots",
+        "/schema/openapi.json",
+    ]
 
 
 async def press(port: int, head: bytes, deeds: list[tuple[str, str, bytes]]) -> None:

@@ -25,6 +25,24 @@ const schemes = [
   { value: "auto", label: <IconDeviceDesktop size={15} aria-label="Like the system" /> },
 ];
 
+function Appearance() {
+  const { colorScheme, setColorScheme } = useMantineColorScheme();
+  return (
+    <div>
+      <Text size="sm" mb={4}>
+        Appearance
+      </Text>
+      <SegmentedControl
+        fullWidth
+        size="xs"
+        data={schemes}
+        value={colorScheme}
+        onChange={(value) => setColorScheme(value as "light" | "dark" | "auto")}
+      />
+    </div>
+  );
+}
+
 /** `onShare` for who may: the bar of a narrow screen has no room for a button of its own. */
 export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
   const { person, rename } = usePerson();
@@ -32,7 +50,6 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
   const [open, setOpen] = useState(false);
   const [name, setName] = useState(rememberedName() || person.name);
   const [problem, setProblem] = useState("");
-  const { colorScheme, setColorScheme } = useMantineColorScheme();
   const save = async () => {
     try {
       await rename(name.trim());
@@ -108,18 +125,7 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
                 server, need <code>--tls</code>.
               </Text>
             )}
-            <div>
-              <Text size="sm" mb={4}>
-                Appearance
-              </Text>
-              <SegmentedControl
-                fullWidth
-                size="xs"
-                data={schemes}
-                value={colorScheme}
-                onChange={(value) => setColorScheme(value as "light" | "dark" | "auto")}
-              />
-            </div>
+            <Appearance />
             <Button
               variant="default"
               leftSection={<IconLogout size={15} aria-hidden />}

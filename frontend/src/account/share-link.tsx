@@ -33,6 +33,15 @@ function Copy({ link, label }: { link: string; label: string }) {
   );
 }
 
+function Code({ src, label }: { src: string; label: string }) {
+  return (
+    <figure className={style.code}>
+      <img src={src} alt={`QR code of the link for ${label}`} width={232} height={232} />
+      <figcaption>Point the camera of a phone or tablet at it.</figcaption>
+    </figure>
+  );
+}
+
 interface Props {
   invitation: Invitation;
   origin: string;
@@ -101,17 +110,7 @@ export function ShareLink({ invitation, origin, revoke }: Props) {
           </Button>
         </div>
       )}
-      {code && (
-        <figure className={style.code}>
-          <img
-            src={codeUrl(invitation.id, origin)}
-            alt={`QR code of the link for ${label}`}
-            width={232}
-            height={232}
-          />
-          <figcaption>Point the camera of a phone or tablet at it.</figcaption>
-        </figure>
-      )}
+      {code && <Code src={codeUrl(invitation.id, origin)} label={label} />}
     </li>
   );
 }

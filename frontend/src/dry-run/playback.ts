@@ -96,27 +96,15 @@ function wordOf({ state, result }: PlayedVisit, over: boolean): { tone: Tone; wo
   }
 }
 
-/** What there is to see after the first `to` events. */
-export function playbackStateAt(
-  trace: readonly TraceEvent[],
-  to: number,
-  graph: Graph,
-  keys = keysByName(graph),
-): PlaybackState {
+/** What happened to each action by then, and the state of the graph. */
+function played(trace: readonly TraceEvent[], to: number, graph: Graph) {
   const visits = new Map<string, PlayedVisit>();
   let state = "";
   for (const event of trace.slice(0, to)) {
     if (event.graph !== graph.name) continue;
     if (event.kind === "graph_state") state = event.state;
     if (event.kind !== "node_state" && event.kind !== "node_result") continue;
-    const visit = visits.get(event.node) ?? {
-      state: "",
-      result: null,
-      since: event.t_ms,
-      took: null,
-      visits: 0,
-      message: null,
-    };
+    const visit = visits.get(event.node) ?? { ...WAITING, since: event.t_ms };
     visits.set(event.node, visit);
     if (event.kind === "node_result") {
       visit.result = event.result;
@@ -133,6 +121,17 @@ export function playbackStateAt(
       visit.state = event.state;
     }
   }
+  return { visits, state };
+}
+
+/** What there is to see after the first `to` events. */
+export function playbackStateAt(
+  trace: readonly TraceEvent[],
+  to: number,
+  graph: Graph,
+  keys = keysByName(graph),
+): PlaybackState {
+  const { visits, state } = played(trace, to, graph);
   const over = ENDED.has(state);
   const progress = new Map<Key, Progress>();
   const going: RunningAction[] = [];
@@ -164,13 +163,11 @@ export function momentWords(
   before: number,
   nameOf: (node: string) => string = (node) => node,
 ): string[] {
-  const events = trace.slice(before, moment.to);
   const ends: string[] = [];
   const begins: string[] = [];
   const waits = new Map<string, string>();
-  const graph: string[] = [];
-  const hazards: string[] = [];
-  for (const event of events) {
+  const [graph, hazards]: [string[], string[]] = [[], []];
+  for (const event of trace.slice(before, moment.to)) {
     switch (event.kind) {
       case "node_result":
         ends.push(`${nameOf(event.node)} ${ENDINGS[event.result] ?? event.result}`);
@@ -178,7 +175,7 @@ export function momentWords(
       case "node_state":
         waits.delete(event.node);
         if (event.state === "RUNNING") begins.push(nameOf(event.node));
-        else if (event.state in SAID) ends.push(`${nameOf(event.node)} ${SAID[event.state]}`);
+        if (event.state in SAID) ends.push(`${nameOf(event.node)} ${SAID[event.state]}`);
         break;
       case "not_ready":
         waits.set(event.node, waitWords(event.why));
@@ -197,9 +194,12 @@ export function momentWords(
         break;
     }
   }
-  const run = begins.length > 0 ? [`${listed(begins)} ${begins.length > 1 ? "run" : "runs"}`] : [];
-  const wait = [...waits].map(([node, why]) => `${nameOf(node)} ${why}`);
-  return [...hazards, ...ends, ...graph, ...run, ...wait];
+  const waiting = [...waits].map(([node, why]) => `${nameOf(node)} ${why}`);
+  return [...hazards, ...ends, ...graph, ...runWords(begins), ...waiting];
+}
+
+function runWords(names: readonly string[]): string[] {
+  return names.length > 0 ? [`${listed(names)} ${names.length > 1 ? "run" : "runs"}`] : [];
 }
 
 const ENDINGS: Readonly<Record<string, string>> = {

@@ -1,6 +1,13 @@
 /** The state of a dry-run: what is played, where in it one is, and what was decided. */
-import { useCallback, useEffect, useMemo, useState } from "react";
-import { useDryRunResult } from "../api/dry-runs";
+import {
+  type Dispatch,
+  type SetStateAction,
+  useCallback,
+  useEffect,
+  useMemo,
+  useState,
+} from "react";
+import { type TraceEvent, useDryRunResult } from "../api/dry-runs";
 import type { Graph, Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import type { Progress } from "../status/progress";
@@ -50,32 +57,13 @@ export interface DryRun {
 
 const EMPTY: PlaybackState = { progress: new Map<Key, Progress>(), running: [], state: "" };
 
-/** Null while no dry-run is open. `seq` is the moment of the graph that the page shows. */
-export function useDryRun(id: string, graph: Graph, seq: number) {
-  const [open, setOpen] = useState(false);
-  const [decided, setDecided] = useState(NOTHING_DECIDED);
-  const [at, setAt] = useState(0);
-  const [goal, setGoal] = useState<number | null>(null);
-  const [playing, play] = useState(false);
-  const [speed, setSpeed] = useState<number>(1);
-  const wanted = useMemo(
-    () => (open ? { seq, script: scriptOf(decided), commands: commandsOf(decided) } : null),
-    [open, seq, decided],
-  );
-  const { data, isPlaceholderData, error } = useDryRunResult(id, wanted);
-  const busy = data === undefined || isPlaceholderData;
-  const trace = useMemo(() => data?.trace ?? [], [data]);
+/** The moment that is shown: which one, what is seen there, and what it says in words. */
+function useShownMoment(trace: readonly TraceEvent[], at: number, graph: Graph) {
   const moments = useMemo(() => momentsOf(trace), [trace]);
-
-  // After a decision the next thing that happens is shown, as soon as it is known.
-  useEffect(() => {
-    if (goal === null || busy) return;
-    setAt((moments.find((moment) => moment.at > goal) ?? moments.at(-1))?.at ?? 0);
-    setGoal(null);
-  }, [goal, busy, moments]);
-
-  const found = moments.findLastIndex((moment) => moment.at <= at);
-  const index = Math.max(0, found);
+  const index = Math.max(
+    0,
+    moments.findLastIndex((moment) => moment.at <= at),
+  );
   const sighting = useMemo(() => {
     const moment = moments[index];
     return moment ? playbackStateAt(trace, moment.to, graph, keysByName(graph)) : EMPTY;
@@ -89,13 +77,15 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
     };
     return moment ? momentWords(trace, moment, moments[index - 1]?.to ?? 0, nameOf) : [];
   }, [trace, moments, index, graph]);
+  return useMemo(() => ({ moments, index, sighting, words }), [moments, index, sighting, words]);
+}
 
-  const go = useCallback(
-    (to: number) => setAt(moments[Math.max(0, Math.min(moments.length - 1, to))]?.at ?? 0),
-    [moments],
-  );
-  usePlaying({ on: open && playing && !busy, moments, index, speed, go, play });
-
+/** Decides at the moment that is shown; `setGoal`: what comes after it is to be shown next. */
+function useDeciding(
+  { moments, index, sighting }: ReturnType<typeof useShownMoment>,
+  setDecided: Dispatch<SetStateAction<Decisions>>,
+  setGoal: (goal: number) => void,
+) {
   const choose = useCallback(
     (outcome: DecidedOutcome, key?: Key) => {
       const going = sighting.running.find((each) => each.key === key) ?? sighting.running[0];
@@ -104,7 +94,7 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
       setDecided((before) => decide(before, going, outcome, now));
       setGoal(now);
     },
-    [sighting, moments, index],
+    [sighting, moments, index, setDecided, setGoal],
   );
   const inject = useCallback(
     (fault: DecidedFault | null) => {
@@ -112,8 +102,48 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
       const now = moments[index]?.at;
       if (fault?.kind === "stop" && now !== undefined) setGoal(now);
     },
-    [moments, index],
+    [moments, index, setDecided, setGoal],
   );
+  return useMemo(() => ({ choose, inject }), [choose, inject]);
+}
+
+/** What comes of the decisions, asked of the editor while a dry-run is open. */
+function useResult(id: string, open: boolean, seq: number, decided: Decisions) {
+  const wanted = useMemo(
+    () => (open ? { seq, script: scriptOf(decided), commands: commandsOf(decided) } : null),
+    [open, seq, decided],
+  );
+  return useDryRunResult(id, wanted);
+}
+
+/** Null while no dry-run is open. `seq` is the moment of the graph that the page shows. */
+export function useDryRun(id: string, graph: Graph, seq: number) {
+  const [open, setOpen] = useState(false);
+  const [decided, setDecided] = useState(NOTHING_DECIDED);
+  const [at, setAt] = useState(0);
+  const [goal, setGoal] = useState<number | null>(null);
+  const [playing, play] = useState(false);
+  const [speed, setSpeed] = useState<number>(1);
+  const { data, isPlaceholderData, error: failed } = useResult(id, open, seq, decided);
+  const busy = data === undefined || isPlaceholderData;
+  const trace = useMemo(() => data?.trace ?? [], [data]);
+  const shown = useShownMoment(trace, at, graph);
+  const { moments, index } = shown;
+
+  // After a decision the next thing that happens is shown, as soon as it is known.
+  useEffect(() => {
+    if (goal === null || busy) return;
+    setAt((moments.find((moment) => moment.at > goal) ?? moments.at(-1))?.at ?? 0);
+    setGoal(null);
+  }, [goal, busy, moments]);
+
+  const go = useCallback(
+    (to: number) => setAt(moments[Math.max(0, Math.min(moments.length - 1, to))]?.at ?? 0),
+    [moments],
+  );
+  usePlaying({ on: open && playing && !busy, moments, index, speed, go, play });
+
+  const deciding = useDeciding(shown, setDecided, setGoal);
   const restart = useCallback(() => {
     setDecided(NOTHING_DECIDED);
     setAt(0);
@@ -125,47 +155,14 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
   }, [restart]);
   const begin = useCallback(() => setOpen(true), []);
 
+  const cut = data?.cut === true;
+  const commands = useMemo(
+    () => ({ go, play, setSpeed, ...deciding, restart, close }),
+    [go, deciding, restart, close],
+  );
   const dryRun = useMemo<DryRun | null>(
-    () =>
-      open
-        ? {
-            moments,
-            index,
-            sighting,
-            words,
-            playing,
-            speed,
-            decided,
-            busy,
-            failed: error,
-            cut: data?.cut === true,
-            go,
-            play,
-            setSpeed,
-            choose,
-            inject,
-            restart,
-            close,
-          }
-        : null,
-    [
-      open,
-      moments,
-      index,
-      sighting,
-      words,
-      playing,
-      speed,
-      decided,
-      busy,
-      error,
-      data,
-      go,
-      choose,
-      inject,
-      restart,
-      close,
-    ],
+    () => (open ? { ...shown, playing, speed, decided, busy, failed, cut, ...commands } : null),
+    [open, shown, playing, speed, decided, busy, failed, cut, commands],
   );
   return { dryRun, begin };
 }

@@ -38,18 +38,46 @@ interface Props {
   corner: ReactNode;
 }
 
-function Inside({
-  me,
-  canvasHandle,
-  progress,
-  marks,
-  compact,
-  phone,
-  run,
-  writing,
-  record,
-  corner,
-}: Props) {
+/** What is said while there is nothing to see. */
+function Emptiness({ arrived, context }: { arrived: boolean; context: EditorContext }) {
+  if (!arrived) {
+    return (
+      <div className={style.waiting} aria-busy="true">
+        <Skeleton height={92} width={208} radius="lg" />
+        <Skeleton height={92} width={208} radius="lg" />
+      </div>
+    );
+  }
+  if (context.graph.actions.length > 0) return null;
+  if (!context.mayEdit) {
+    return (
+      <div className={style.empty}>
+        <Empty icon={<IconRouteAltLeft size={22} />} title="Nothing is drawn yet">
+          What the others draw appears here. You are here to look.
+        </Empty>
+      </div>
+    );
+  }
+  return (
+    <div className={style.empty}>
+      <Empty
+        icon={<IconRouteAltLeft size={22} />}
+        title="What shall be done first?"
+        action={
+          <Button variant="filled" onClick={() => context.openAdd()}>
+            Add an action
+          </Button>
+        }
+      >
+        Double-click the canvas, press <b>A</b>, or drag an action from the list. Then drag from
+        Entry to it, and from its outcomes to what follows.
+      </Empty>
+    </div>
+  );
+}
+
+function Inside(props: Props) {
+  const { me, canvasHandle, progress, marks, compact, phone, run, writing, record, corner } = props;
   const calm = useEditorContext();
   const graph = useGraph();
   // The canvas keeps up with the hands of others; what stands beside it comes after.
@@ -101,35 +129,7 @@ function Inside({
           pointer={pointer}
           writing={writing}
         />
-        {!arrived && (
-          <div className={style.waiting} aria-busy="true">
-            <Skeleton height={92} width={208} radius="lg" />
-            <Skeleton height={92} width={208} radius="lg" />
-          </div>
-        )}
-        {arrived && context.graph.actions.length === 0 && !context.mayEdit && (
-          <div className={style.empty}>
-            <Empty icon={<IconRouteAltLeft size={22} />} title="Nothing is drawn yet">
-              What the others draw appears here. You are here to look.
-            </Empty>
-          </div>
-        )}
-        {arrived && context.graph.actions.length === 0 && context.mayEdit && (
-          <div className={style.empty}>
-            <Empty
-              icon={<IconRouteAltLeft size={22} />}
-              title="What shall be done first?"
-              action={
-                <Button variant="filled" onClick={() => context.openAdd()}>
-                  Add an action
-                </Button>
-              }
-            >
-              Double-click the canvas, press <b>A</b>, or drag an action from the list. Then drag
-              from Entry to it, and from its outcomes to what follows.
-            </Empty>
-          </div>
-        )}
+        <Emptiness arrived={arrived} context={context} />
         {!compact && (
           <div className={style.robots}>
             <RobotFilter />

@@ -58,20 +58,11 @@ export interface EditorState {
   closeFind(): void;
 }
 
-export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorState {
-  const { doc, undo, presence } = useRoom();
+/** What is edited, and whether this person may. */
+function useEdited(id: string) {
+  const { doc, undo } = useRoom();
   const graph = useThrottledGraph();
   const { canUndo, canRedo } = useUndo();
-  const [selection, setSelection] = useState(NONE);
-  const [tool, setTool] = useState<Tool>("pan");
-  const [panel, setPanelNow] = useState<Panel>("details");
-  const [adding, setAdding] = useState<AddRequest | null>(null);
-  const [overlay, setSurface] = useState<Overlay | null>(null);
-  const [snap, setSnap] = useLocalStorage({
-    key: "aa.snap",
-    defaultValue: false,
-    getInitialValueInEffect: false,
-  });
   const role = useMay("edit");
   const { readOnly, seq } = useThrottledLink();
   const { dryRun, begin: beginDryRun } = useDryRun(id, graph, seq);
@@ -79,13 +70,22 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   // would know nothing of what it replaces.
   const arrived = useLinkPart((link) => link.seq > 0);
   const mayEdit = role && readOnly === undefined && arrived;
-  const [finding, setFinding] = useState(false);
-  const canvasHandle = useRef<CanvasHandle>({
-    view: NO_CANVAS_VIEW,
-    positions: () => new Map(),
-    sizes: () => new Map(),
-  });
+  return useMemo(
+    () => ({ id, doc, undo, graph, canUndo, canRedo, mayEdit, dryRun, beginDryRun }),
+    [id, doc, undo, graph, canUndo, canRedo, mayEdit, dryRun, beginDryRun],
+  );
+}
 
+/** What is selected, and how the pointer works. */
+function useTools() {
+  const { presence } = useRoom();
+  const [selection, setSelection] = useState(NONE);
+  const [tool, setTool] = useState<Tool>("pan");
+  const [snap, setSnap] = useLocalStorage({
+    key: "aa.snap",
+    defaultValue: false,
+    getInitialValueInEffect: false,
+  });
   const select = useCallback(
     (ids: Iterable<string>) => {
       const next = new Set(ids);
@@ -94,6 +94,18 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
     },
     [presence],
   );
+  return useMemo(
+    () => ({ selection, select, tool, setTool, snap, setSnap }),
+    [selection, select, tool, snap, setSnap],
+  );
+}
+
+/** What stands beside the canvas or over it, opened by edit actions. `latest`: their context. */
+function useDialogs(latest: RefObject<EditorContext | null>, onPanel: (panel: Panel) => void) {
+  const [panel, setPanelNow] = useState<Panel>("details");
+  const [adding, setAdding] = useState<AddRequest | null>(null);
+  const [overlay, openOverlay] = useState<Overlay | null>(null);
+  const [finding, setFinding] = useState(false);
   const setPanel = useCallback(
     (next: Panel) => {
       // The outline stands beside the panel of details, which stays as it is.
@@ -102,90 +114,66 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
     },
     [onPanel],
   );
-  const latest = useRef<EditorContext | null>(null);
-  const openAdd = useCallback((request?: AddRequest) => {
-    if (latest.current?.mayEdit === false) return;
-    if (request || latest.current === null) {
-      setAdding(request ?? null);
-      return;
-    }
-    const [x, y] = freePosition(latest.current);
-    const at = [x + CARD.width / 2, y] as const;
-    setAdding({ screen: latest.current.view.screenOf(at), at, from: null });
-  }, []);
+  const openAdd = useCallback(
+    (request?: AddRequest) => {
+      if (latest.current?.mayEdit === false) return;
+      if (request || latest.current === null) {
+        setAdding(request ?? null);
+        return;
+      }
+      const [x, y] = freePosition(latest.current);
+      const at = [x + CARD.width / 2, y] as const;
+      setAdding({ screen: latest.current.view.screenOf(at), at, from: null });
+    },
+    [latest],
+  );
   const closeAdd = useCallback(() => setAdding(null), []);
-  const close = useCallback(() => setSurface(null), []);
+  const closeOverlay = useCallback(() => openOverlay(null), []);
+  const closeFind = useCallback(() => setFinding(false), []);
+  const openers = useMemo(
+    () => ({ setPanel, openAdd, openOverlay, openFind: () => setFinding(true) }),
+    [setPanel, openAdd],
+  );
+  return { openers, shown: { panel, adding, overlay, finding, closeAdd, closeOverlay, closeFind } };
+}
+
+/** The canvas that is there at the moment. */
+function canvasOf(handle: RefObject<CanvasHandle>) {
+  const view: CanvasView = {
+    fit: () => handle.current.view.fit(),
+    zoomIn: () => handle.current.view.zoomIn(),
+    zoomOut: () => handle.current.view.zoomOut(),
+    show: (keys, goal) => handle.current.view.show(keys, goal),
+    reveal: (at) => handle.current.view.reveal(at),
+    middle: () => handle.current.view.middle(),
+    screenOf: (at) => handle.current.view.screenOf(at),
+    pointer: () => handle.current.view.pointer(),
+    focus: (key) => handle.current.view.focus(key),
+  };
+  return {
+    view,
+    positions: () => handle.current.positions(),
+    sizes: () => handle.current.sizes(),
+  };
+}
+
+export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorState {
+  const latest = useRef<EditorContext | null>(null);
+  const edited = useEdited(id);
+  const tools = useTools();
+  const { openers, shown } = useDialogs(latest, onPanel);
+  const canvasHandle = useRef<CanvasHandle>({
+    view: NO_CANVAS_VIEW,
+    positions: () => new Map(),
+    sizes: () => new Map(),
+  });
   const download = useCallback((format: ExportFormat = "umrf") => {
     if (latest.current) void exportGraph(latest.current, format);
   }, []);
-  const closeFind = useCallback(() => setFinding(false), []);
-
   const context = useMemo<EditorContext>(
-    () => ({
-      id,
-      doc,
-      undo,
-      graph,
-      canUndo,
-      canRedo,
-      mayEdit,
-      selection,
-      tool,
-      snap,
-      dryRun,
-      beginDryRun,
-      select,
-      setTool,
-      setSnap,
-      setPanel,
-      openAdd,
-      openOverlay: setSurface,
-      openFind: () => setFinding(true),
-      view: {
-        fit: () => canvasHandle.current.view.fit(),
-        zoomIn: () => canvasHandle.current.view.zoomIn(),
-        zoomOut: () => canvasHandle.current.view.zoomOut(),
-        show: (keys, goal) => canvasHandle.current.view.show(keys, goal),
-        reveal: (at) => canvasHandle.current.view.reveal(at),
-        middle: () => canvasHandle.current.view.middle(),
-        screenOf: (at) => canvasHandle.current.view.screenOf(at),
-        pointer: () => canvasHandle.current.view.pointer(),
-        focus: (key) => canvasHandle.current.view.focus(key),
-      },
-      positions: () => canvasHandle.current.positions(),
-      sizes: () => canvasHandle.current.sizes(),
-      download,
-    }),
-    [
-      id,
-      doc,
-      undo,
-      graph,
-      canUndo,
-      canRedo,
-      mayEdit,
-      selection,
-      tool,
-      snap,
-      dryRun,
-      beginDryRun,
-      select,
-      setSnap,
-      setPanel,
-      openAdd,
-      download,
-    ],
+    () => ({ ...edited, ...tools, ...openers, ...canvasOf(canvasHandle), download }),
+    [edited, tools, openers, download],
   );
   latest.current = context;
-  return {
-    context,
-    panel,
-    adding,
-    finding,
-    overlay,
-    canvasHandle,
-    closeAdd,
-    closeFind,
-    closeOverlay: close,
-  };
+  return { context, canvasHandle, ...shown };
 }

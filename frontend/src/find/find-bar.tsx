@@ -22,6 +22,54 @@ interface Props {
   onClose: () => void;
 }
 
+interface FoundProps {
+  id: string;
+  hit: Hit;
+  current: boolean;
+  onChoose: () => void;
+}
+
+function Found({ id, hit, current, onChoose }: FoundProps) {
+  return (
+    // biome-ignore lint/a11y/useKeyWithClickEvents: the keys are those of the field
+    <div
+      id={id}
+      className={style.hit}
+      role="option"
+      tabIndex={-1}
+      aria-selected={current}
+      onClick={onChoose}
+    >
+      {hit.kind === "action" ? (
+        <IconSquareRounded size={14} aria-hidden />
+      ) : (
+        <IconArrowRight size={14} aria-hidden />
+      )}
+      <span className={style.text}>
+        <b>{hit.title}</b>
+        {hit.why !== "" && <span className={style.why}>{hit.why}</span>}
+      </span>
+    </div>
+  );
+}
+
+function Steps({ disabled, onStep }: { disabled: boolean; onStep: (step: 1 | -1) => void }) {
+  return (
+    <>
+      <Tooltip label="Previous (Shift Enter)">
+        <ActionIcon aria-label="Previous hit" disabled={disabled} onClick={() => onStep(-1)}>
+          <IconChevronUp size={16} />
+        </ActionIcon>
+      </Tooltip>
+      <Tooltip label="Next (Enter)">
+        <ActionIcon aria-label="Next hit" disabled={disabled} onClick={() => onStep(1)}>
+          <IconChevronDown size={16} />
+        </ActionIcon>
+      </Tooltip>
+    </>
+  );
+}
+
 export function FindBar({ problems, onClose }: Props) {
   const context = useEditorContext();
   const [query, setQuery] = useState("");
@@ -90,24 +138,7 @@ export function FindBar({ problems, onClose }: Props) {
         <span className={style.count} role="status">
           {hits.length > 0 ? `${current + 1} of ${hits.length}` : none ? "None" : ""}
         </span>
-        <Tooltip label="Previous (Shift Enter)">
-          <ActionIcon
-            aria-label="Previous hit"
-            disabled={hits.length === 0}
-            onClick={() => go(current - 1)}
-          >
-            <IconChevronUp size={16} />
-          </ActionIcon>
-        </Tooltip>
-        <Tooltip label="Next (Enter)">
-          <ActionIcon
-            aria-label="Next hit"
-            disabled={hits.length === 0}
-            onClick={() => go(current + 1)}
-          >
-            <IconChevronDown size={16} />
-          </ActionIcon>
-        </Tooltip>
+        <Steps disabled={hits.length === 0} onStep={(step) => go(current + step)} />
         <ActionIcon aria-label="Close the search" onClick={close}>
           <IconX size={16} />
         </ActionIcon>
@@ -121,26 +152,13 @@ export function FindBar({ problems, onClose }: Props) {
         hidden={hits.length === 0}
       >
         {hits.slice(0, MOST).map((hit, i) => (
-          // biome-ignore lint/a11y/useKeyWithClickEvents: the keys are those of the field
-          <div
+          <Found
             key={hit.id}
             id={`${id}-${i}`}
-            className={style.hit}
-            role="option"
-            tabIndex={-1}
-            aria-selected={i === current}
-            onClick={() => go(i)}
-          >
-            {hit.kind === "action" ? (
-              <IconSquareRounded size={14} aria-hidden />
-            ) : (
-              <IconArrowRight size={14} aria-hidden />
-            )}
-            <span className={style.text}>
-              <b>{hit.title}</b>
-              {hit.why !== "" && <span className={style.why}>{hit.why}</span>}
-            </span>
-          </div>
+            hit={hit}
+            current={i === current}
+            onChoose={() => go(i)}
+          />
         ))}
       </div>
       {none && (

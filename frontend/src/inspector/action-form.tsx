@@ -22,27 +22,31 @@ function wholeNumber(draft: string): string | null {
     : "A whole number from 0 to 65535.";
 }
 
+/** An action that arrows name and that is not there. */
+function Ghost({ action }: { action: Action }) {
+  const { doc } = useEditorContext();
+  return (
+    <div className={style.say} data-tone="error">
+      <IconGhost2 size={16} aria-hidden />
+      <div>
+        Arrows name{" "}
+        <b>
+          {action.name} {action.instanceId}
+        </b>
+        , but the graph has no such action. It cannot be started like this.
+        <Group mt="sm">
+          <Button size="compact-sm" onClick={() => adoptGhost(doc, action.key)}>
+            Make it an action
+          </Button>
+        </Group>
+      </div>
+    </div>
+  );
+}
+
 export function ActionForm({ action }: { action: Action }) {
   const { doc, graph } = useEditorContext();
-  if (action.missing) {
-    return (
-      <div className={style.say} data-tone="error">
-        <IconGhost2 size={16} aria-hidden />
-        <div>
-          Arrows name{" "}
-          <b>
-            {action.name} {action.instanceId}
-          </b>
-          , but the graph has no such action. It cannot be started like this.
-          <Group mt="sm">
-            <Button size="compact-sm" onClick={() => adoptGhost(doc, action.key)}>
-              Make it an action
-            </Button>
-          </Group>
-        </div>
-      </div>
-    );
-  }
+  if (action.missing) return <Ghost action={action} />;
   return (
     <div className={style.form}>
       <div className={style.nameRow}>

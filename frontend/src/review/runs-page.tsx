@@ -190,6 +190,46 @@ function BringExamples({ runner, onDone }: { runner: string | undefined; onDone:
   );
 }
 
+interface NoRunsProps {
+  runner: string | undefined;
+  failed: Error | null;
+  isKnown: boolean;
+  filtered: boolean;
+  /** Some began since the list was asked for. */
+  isNew: boolean;
+  onChanged: () => void;
+}
+
+/** Why the list is empty. */
+function NoRuns({ runner, failed, isKnown, filtered, isNew, onChanged }: NoRunsProps) {
+  if (failed !== null) {
+    return (
+      <Empty icon={<IconAlertTriangle size={22} />} title="The runs cannot be read">
+        {errorText(failed)} What was recorded is safe; it shows again when the runner answers.
+      </Empty>
+    );
+  }
+  if (!isKnown) return null;
+  if (filtered) {
+    return (
+      <Empty icon={<IconSearch size={22} />} title="No run fits">
+        Nothing that was recorded matches this search and filter.
+      </Empty>
+    );
+  }
+  if (isNew) return null;
+  return (
+    <Empty
+      icon={<IconHistory size={22} />}
+      title="Nothing ran yet"
+      action={<BringExamples runner={runner} onDone={onChanged} />}
+    >
+      Open a graph and hold <b>Start</b>. Every run is kept here, with its exact version and what
+      each action did.
+    </Empty>
+  );
+}
+
 export function RunsPage() {
   const { runner, now } = useLive();
   const [, go] = useLocation();
@@ -207,11 +247,7 @@ export function RunsPage() {
   const newest = stored[0]?.number ?? 0;
   const waiting = listed.isSuccess ? newcomers(stored, now.runs, newest) : 0;
   const filtered = queryOf(filter).size > 0;
-  const engines = useMemo(
-    () =>
-      [...new Set(["simulator", filter.robot, ...stored.map((run) => run.engine)])].filter(Boolean),
-    [stored, filter.robot],
-  );
+  const engines = useMemo(() => enginesOf(stored, filter.robot), [stored, filter.robot]);
   const choose = (run: string, on: boolean) =>
     setChosen(on ? [...chosen.slice(-1), run] : chosen.filter((each) => each !== run));
   const [b = "", a = ""] = [...chosen].sort((x, y) => numberOf(runs, y) - numberOf(runs, x));
@@ -253,26 +289,15 @@ export function RunsPage() {
           )}
         </div>
         {listed.isPending && <Waiting />}
-        {listed.isError && runs.length === 0 && (
-          <Empty icon={<IconAlertTriangle size={22} />} title="The runs cannot be read">
-            {errorText(listed.error)} What was recorded is safe; it shows again when the runner
-            answers.
-          </Empty>
-        )}
-        {listed.isSuccess && runs.length === 0 && !filtered && waiting === 0 && (
-          <Empty
-            icon={<IconHistory size={22} />}
-            title="Nothing ran yet"
-            action={<BringExamples runner={runner} onDone={() => void listed.refetch()} />}
-          >
-            Open a graph and hold <b>Start</b>. Every run is kept here, with its exact version and
-            what each action did.
-          </Empty>
-        )}
-        {listed.isSuccess && runs.length === 0 && filtered && (
-          <Empty icon={<IconSearch size={22} />} title="No run fits">
-            Nothing that was recorded matches this search and filter.
-          </Empty>
+        {runs.length === 0 && (
+          <NoRuns
+            runner={runner}
+            failed={listed.error}
+            isKnown={listed.isSuccess}
+            filtered={filtered}
+            isNew={waiting > 0}
+            onChanged={() => void listed.refetch()}
+          />
         )}
         {runs.length > 0 && <Rows runs={runs} chosen={chosen} onChoose={choose} />}
         {listed.hasNextPage && (
@@ -287,6 +312,10 @@ export function RunsPage() {
       </div>
     </main>
   );
+}
+
+function enginesOf(runs: readonly ListedRun[], chosen: string): string[] {
+  return [...new Set(["simulator", chosen, ...runs.map((run) => run.engine)])].filter(Boolean);
 }
 
 function numberOf(runs: readonly ListedRun[], id: string): number {

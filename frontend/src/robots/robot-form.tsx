@@ -73,6 +73,39 @@ function Profile(props: {
   );
 }
 
+interface ReachProps {
+  robot: Registration;
+  errorOf: (field: RobotFormField) => string | undefined;
+  onChange: (robot: Registration) => void;
+}
+
+/** Where its engine is found, and what is known of it. */
+function Reach({ robot, errorOf, onChange }: ReachProps) {
+  return (
+    <Stack gap="md">
+      <TextInput
+        label="Path of its get service"
+        description="Two engines on one path prove nothing: give each a domain of its own."
+        value={robot.get_service}
+        error={errorOf("get_service")}
+        onChange={(event) => onChange({ ...robot, get_service: event.currentTarget.value.trim() })}
+      />
+      <TextInput
+        label="Middleware"
+        placeholder="that of the runner"
+        value={robot.rmw}
+        error={errorOf("rmw")}
+        onChange={(event) => onChange({ ...robot, rmw: event.currentTarget.value.trim() })}
+      />
+      <Profile
+        profile={robot.profile}
+        error={errorOf("profile")}
+        onChange={(profile) => onChange({ ...robot, profile })}
+      />
+    </Stack>
+  );
+}
+
 export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose: () => void }) {
   const { runner } = useLive();
   const client = useQueryClient();
@@ -134,29 +167,7 @@ export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose:
             {more ? "Less" : "Path, middleware and engine …"}
           </Button>
           <Collapse expanded={more}>
-            <Stack gap="md">
-              <TextInput
-                label="Path of its get service"
-                description="Two engines on one path prove nothing: give each a domain of its own."
-                value={robot.get_service}
-                error={at("get_service")}
-                onChange={(event) =>
-                  setRobot({ ...robot, get_service: event.currentTarget.value.trim() })
-                }
-              />
-              <TextInput
-                label="Middleware"
-                placeholder="that of the runner"
-                value={robot.rmw}
-                error={at("rmw")}
-                onChange={(event) => setRobot({ ...robot, rmw: event.currentTarget.value.trim() })}
-              />
-              <Profile
-                profile={robot.profile}
-                error={at("profile")}
-                onChange={(profile) => setRobot({ ...robot, profile })}
-              />
-            </Stack>
+            <Reach robot={robot} errorOf={at} onChange={setRobot} />
           </Collapse>
           {error !== null && place === "" && (
             <Text c="var(--error)" role="alert">

@@ -89,8 +89,66 @@ function toldOf(run: Run): string {
   return run.ended_at === null ? alarm : run.detail || alarm;
 }
 
+interface HeadProps extends Props {
+  run: Run;
+  present: number;
+  /** What fits beside the rest; empty where it does not, or there is nothing. */
+  told: string;
+  announces: boolean;
+}
+
+/** The run in one line, with what can be done with it. */
+function Head(props: HeadProps) {
+  const { run, present, told, announces, going, versionLabel, onChoose, folded, onFold } = props;
+  const { now } = useLive();
+  const goes = run.ended_at === null;
+  const down = now.link === "down";
+  const unsure = down && goes;
+  const until = down ? now.since : present;
+  const start = instant(run.started_at) ?? present;
+  const when = day(start, present);
+  const started = when === "today" ? `at ${clock(start)}` : `${when} ${clock(start)}`;
+  const { tone, word } = runLabel(run);
+  return (
+    <header className={style.head}>
+      <b>Run {run.number}</b>
+      <Whose run={run} going={going} onChoose={onChoose} />
+      <span className={style.version}>{versionLabel}</span>
+      <StateLabel
+        pill
+        tone={unsure ? "unknown" : tone}
+        word={unsure ? `unknown since ${clock(now.since)}` : goes ? word : runEndText(run)}
+      />
+      <Text span c="dimmed" size="xs" truncate>
+        {run.simulated && "simulated · "}
+        started by {authorName(run.author)} {started} ·{" "}
+        {(!goes && boundsText(run.took)) || stopwatch((instant(run.ended_at) ?? until) - start)}
+      </Text>
+      <span className={style.gap} />
+      {told !== "" && (
+        <span className={style.alarm} role={announces ? "alert" : undefined} title={told}>
+          {told}
+        </span>
+      )}
+      {goes && <ConfirmRestButton run={run} />}
+      {!run.recorded && <span className={style.alarm}>not recorded</span>}
+      {goes && <PauseButton run={run} />}
+      <Button
+        component={Link}
+        to={`/runs/${run.id}`}
+        size="compact-xs"
+        variant="subtle"
+        flex="none"
+      >
+        Open run
+      </Button>
+      {folded !== null && <FoldButton folded={folded} onFold={onFold} />}
+    </header>
+  );
+}
+
 export function RunStrip(props: Props) {
-  const { run, going, graph, versionLabel, selected, onPick, onChoose, folded, onFold } = props;
+  const { run, graph, selected, onPick, folded } = props;
   const { now } = useLive();
   const goes = run?.ended_at === null;
   const present = useNow(250, goes);
@@ -110,11 +168,7 @@ export function RunStrip(props: Props) {
     );
   }
   const down = now.link === "down";
-  const start = instant(run.started_at) ?? present;
   const until = down ? now.since : present;
-  const when = day(start, present);
-  const started = when === "today" ? `at ${clock(start)}` : `${when} ${clock(start)}`;
-  const { tone, word } = runLabel(run);
   const told = toldOf(run);
   const announces = goes && !SHOUTED.has(currentAlarm(run)?.code ?? "");
   const inLine = folded === true || told.length < SHORT;
@@ -127,40 +181,13 @@ export function RunStrip(props: Props) {
       data-alone={folded === null || undefined}
       aria-label="Run"
     >
-      <header className={style.head}>
-        <b>Run {run.number}</b>
-        <Whose run={run} going={going} onChoose={onChoose} />
-        <span className={style.version}>{versionLabel}</span>
-        <StateLabel
-          pill
-          tone={unsure ? "unknown" : tone}
-          word={unsure ? `unknown since ${clock(now.since)}` : goes ? word : runEndText(run)}
-        />
-        <Text span c="dimmed" size="xs" truncate>
-          {run.simulated && "simulated · "}
-          started by {authorName(run.author)} {started} ·{" "}
-          {(!goes && boundsText(run.took)) || stopwatch((instant(run.ended_at) ?? until) - start)}
-        </Text>
-        <span className={style.gap} />
-        {inLine && told !== "" && (
-          <span className={style.alarm} role={announces ? "alert" : undefined} title={told}>
-            {told}
-          </span>
-        )}
-        {goes && <ConfirmRestButton run={run} />}
-        {!run.recorded && <span className={style.alarm}>not recorded</span>}
-        {goes && <PauseButton run={run} />}
-        <Button
-          component={Link}
-          to={`/runs/${run.id}`}
-          size="compact-xs"
-          variant="subtle"
-          flex="none"
-        >
-          Open run
-        </Button>
-        {folded !== null && <FoldButton folded={folded} onFold={onFold} />}
-      </header>
+      <Head
+        {...props}
+        run={run}
+        present={present}
+        told={inLine ? told : ""}
+        announces={announces}
+      />
       {!inLine && (
         <p
           className={style.told}

@@ -25,6 +25,14 @@ export interface UnsavedEdit {
   readonly before?: ReplacedEntries;
 }
 
+/** An edit that was made at this moment. */
+export const madeNow = (update: Uint8Array, before: ReplacedEntries): UnsavedEdit => ({
+  id: freshId(),
+  update,
+  at: Date.now(),
+  before,
+});
+
 export interface StoredCopy {
   /** One history of the graph, see `epochName`. */
   readonly epoch: string;

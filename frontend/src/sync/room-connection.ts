@@ -17,14 +17,13 @@ import { Awareness, removeAwarenessStates } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
 import { FingerprintCheck } from "./fingerprint";
-import { browserStore, epochName, freshId, type StoredCopy, type UnsavedEdit } from "./indexed-db";
+import { browserStore, epochName, madeNow, type StoredCopy } from "./indexed-db";
 import * as messages from "./messages";
 import { Outbox } from "./outbox";
 import { Persistence } from "./persistence";
 import { ReconnectingSocket, type SocketHandler } from "./reconnecting-socket";
 import {
   lacksKnownEdits,
-  type ReplacedEntries,
   ReplacedValues,
   type StrandedEdits,
   strandedEditsIn,
@@ -47,13 +46,6 @@ type LinkChange = Partial<Omit<RoomLink, "why" | "readOnly">> & {
   why?: RefusalReason | undefined;
   readOnly?: string | undefined;
 };
-
-const madeNow = (update: Uint8Array, before: ReplacedEntries): UnsavedEdit => ({
-  id: freshId(),
-  update,
-  at: Date.now(),
-  before,
-});
 
 export function connectRoom(options: RoomOptions): Room {
   return new Connection(options);

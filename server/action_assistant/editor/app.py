@@ -8,7 +8,7 @@ from typing import Final
 
 import anyio
 from litestar import Litestar
-from litestar.types import ASGIApp
+from litestar.types import ASGIApp, ControllerRouterHandler
 
 from action_assistant import paths
 from action_assistant.editor.api import drawing, editor, graphs, invitations, room, versions
@@ -24,7 +24,7 @@ from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.sessions import session_routes
-from action_assistant.web.network.addresses import addresses_of
+from action_assistant.web.network.addresses import Addresses, addresses_of
 from action_assistant.web.server.application import Readiness, application
 from action_assistant.web.workers.lanes import run_here
 
@@ -70,14 +70,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     revoked = Revocations(settings.data)
     browsers = SessionFiles(settings.data, revoked)
     browsers.every()  # forgets those that are over
-    addresses = addresses_of(
-        host=settings.host,
-        page_port=settings.port,
-        hosts=settings.hosts,
-        share=settings.share,
-        secure=settings.tls,
-        public=settings.reached.public,
-    )
+    addresses = _addresses(settings)
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
@@ -88,24 +81,17 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     async def ready() -> Readiness:
         return await _readiness(app_state.services)
 
+    signing_in = session_routes(
+        keys,
+        settings.port,
+        addresses=addresses,
+        limits=settings.limits,
+        reception=lambda: app_state.services.invitations,
+        revoked=revoked,
+        browsers=browsers,
+    )
     return application(
-        [
-            *session_routes(
-                keys,
-                settings.port,
-                addresses=addresses,
-                limits=settings.limits,
-                reception=lambda: app_state.services.invitations,
-                revoked=revoked,
-                browsers=browsers,
-            ),
-            *invitations.routes(app_state, addresses, browsers),
-            *editor.routes(app_state, addresses),
-            *graphs.routes(app_state),
-            *versions.routes(app_state),
-            *drawing.routes(app_state),
-            *room.routes(app_state),
-        ],
+        [*signing_in, *_routes(app_state, addresses, browsers)],
         title="TeMoto Action Assistant: editor",
         keys=keys,
         revoked=revoked,
@@ -119,6 +105,30 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         mount=settings.reached.public.path if settings.reached.public is not None else "",
         body_limit=SMALL,
     )
+
+
+def _addresses(settings: EditorSettings) -> Addresses:
+    return addresses_of(
+        host=settings.host,
+        page_port=settings.port,
+        hosts=settings.hosts,
+        share=settings.share,
+        secure=settings.tls,
+        public=settings.reached.public,
+    )
+
+
+def _routes(
+    app_state: EditorState, addresses: Addresses, browsers: SessionFiles
+) -> list[ControllerRouterHandler]:
+    return [
+        *invitations.routes(app_state, addresses, browsers),
+        *editor.routes(app_state, addresses),
+        *graphs.routes(app_state),
+        *versions.routes(app_state),
+        *drawing.routes(app_state),
+        *room.routes(app_state),
+    ]
 
 
 async def _greet(services: EditorServices, folder: Path) -> None:

@@ -56,50 +56,59 @@ async def open_services(
         folder, prunes = settings.data / "recordings", keep.raw is None
         recordings = Recordings(folder, on_disk, prunes=prunes)
         archive_store = ArchiveStore(journal, keep.folder, on_disk)
-        async with RunnerWorkers.opened() as workers:
-            place = StoragePaths(_file(settings), keep.folder)
-            services.asked = WorkerQueries(workers.looks, place, archive_store)
-            ours = WorkerQueries(
-                workers.ours, place, archive_store
-            )  # what moves again waits behind nobody
-            services.run_in_worker = workers.looks
-            reach = ros2_reach(utc_us)
-            robots = Robots(reach=reach, recordings=recordings)
-            async with (
-                _kept(reach),
-                ExecutionService.opened(
-                    archive_store,
-                    robots,
-                    clock_us=utc_us,
-                    run_in_worker=workers.starts,
-                    simulator=Simulators(),
-                    past=lambda run, whole: (ours if whole else services.asked).past(run, whole),
-                ) as control,
-            ):
-                services.asked.opened = ours.opened = control.open
-                services.control, services.hub = control, Hub(control, utc_us)
-                services.connection_limits = ConnectionLimits(
-                    limits=settings.limits, keeps_one=True
-                )
-                services.journal = journal
-                services.review_service = ReviewService(
-                    control, archive_store, on_disk, utc_us, services.asked
-                )
-                services.retention = Retention(
-                    journal,
-                    recordings,
-                    keep,
-                    is_open=control.open.__contains__,
-                    clock_us=utc_us,
-                    run_in_worker=on_disk,
-                )
-                async with anyio.create_task_group() as tasks:
-                    tasks.start_soon(services.review_service.run)
-                    tasks.start_soon(services.retention.run)
-                    yield services
-                    tasks.cancel_scope.cancel()
+        place = StoragePaths(_file(settings), keep.folder)
+        async with _executing(services, archive_store, recordings, place) as control:
+            services.connection_limits = ConnectionLimits(limits=settings.limits, keeps_one=True)
+            services.journal = journal
+            services.review_service = ReviewService(
+                control, archive_store, on_disk, utc_us, services.asked
+            )
+            services.retention = Retention(
+                journal,
+                recordings,
+                keep,
+                is_open=control.open.__contains__,
+                clock_us=utc_us,
+                run_in_worker=on_disk,
+            )
+            async with anyio.create_task_group() as tasks:
+                tasks.start_soon(services.review_service.run)
+                tasks.start_soon(services.retention.run)
+                yield services
+                tasks.cancel_scope.cancel()
     finally:
         await journal.close()
+
+
+@asynccontextmanager
+async def _executing(
+    services: RunnerServices,
+    archive_store: ArchiveStore,
+    recordings: Recordings,
+    place: StoragePaths,
+) -> AsyncIterator[ExecutionService]:
+    """Workers, robots, and what drives runs on them."""
+    async with RunnerWorkers.opened() as workers:
+        services.run_in_worker = workers.looks
+        asked = WorkerQueries(workers.looks, place, archive_store)
+        ours = WorkerQueries(workers.ours, place, archive_store)  # waits behind nobody's questions
+        reach = ros2_reach(utc_us)
+        async with (
+            _kept(reach),
+            ExecutionService.opened(
+                archive_store,
+                Robots(reach=reach, recordings=recordings),
+                clock_us=utc_us,
+                run_in_worker=workers.starts,
+                simulator=Simulators(),
+                # What moves again is read whole.
+                past=lambda run, whole: (ours if whole else asked).past(run, whole),
+            ) as control,
+        ):
+            asked.opened = ours.opened = control.open
+            services.asked, services.control = asked, control
+            services.hub = Hub(control, utc_us)
+            yield control
 
 
 @asynccontextmanager

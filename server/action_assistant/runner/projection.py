@@ -17,6 +17,7 @@ from action_assistant.runner.runs.events import (
     Proof,
     Published,
     Requested,
+    RunEvent,
     Silent,
     StopRequested,
     decode,
@@ -36,27 +37,26 @@ def fold(event: Event) -> Sequence[Executable]:
     if event.kind == RobotRemoved.kind:
         gone = msgspec.json.decode(event.body, type=RobotRemoved)
         return (update(robot).where(robot.c.name == gone.name).values(retired_at=gone.at),)
-    if not event.stream.startswith("run/"):
-        return ()
-    change = update(run).where(run.c.id == event.stream.removeprefix("run/"))
-    match decode(event.kind, event.body):
+    if event.stream.startswith("run/"):
+        return _run_changes(event.stream.removeprefix("run/"), decode(event.kind, event.body))
+    return ()
+
+
+def _run_changes(id_: str, event: RunEvent) -> Sequence[Executable]:
+    change = update(run).where(run.c.id == id_)
+    match event:
         case Requested() as asked:
             return (_run(asked),)
         case Published() as sent:
             return (change.values(started_at=sent.at),)
         case StopRequested() as stop:
-            first = change.where(run.c.desired != "stopped")
-            return (
-                first.values(
-                    desired="stopped",
-                    stopped_by=stop.author.name,
-                    summary=func.json_set(
-                        run.c.summary,
-                        "$.stopped_by",
-                        func.json(msgspec.json.encode(stop.author).decode()),
-                    ),
-                ),
-            )
+            by = func.json(msgspec.json.encode(stop.author).decode())
+            stopped = {
+                "desired": "stopped",
+                "stopped_by": stop.author.name,
+                "summary": func.json_set(run.c.summary, "$.stopped_by", by),
+            }
+            return (change.where(run.c.desired != "stopped").values(**stopped),)
         case Proof() as proof:
             return (change.values(summary=func.json_set(run.c.summary, "$.proof_at", proof.at)),)
         case Silent() as silent:
@@ -69,7 +69,7 @@ def fold(event: Event) -> Sequence[Executable]:
             more = func.json_insert(run.c.summary, "$.alarms[#]", func.json(text.decode()))
             return (change.values(summary=more),)
         case MovesAgain() as again_:
-            return _open_again(event.stream.removeprefix("run/"), again_)
+            return _open_again(id_, again_)
         case Ended() as end:
             summary = func.json_set(run.c.summary, "$.detail", end.detail)
             if end.at_rest is not None:

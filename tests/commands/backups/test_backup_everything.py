@@ -74,6 +74,17 @@ async def events(url: str, data: Path) -> tuple[list[Event], list[Event]]:
     return found[0], found[1]
 
 
+def let_in(product: Product, links: list[str], mia: str | None) -> None:
+    """The links and the session of before are good."""
+    for link in links:
+        with Guest(product, "Zoe", {"invitation": link}) as guest:
+            assert guest.person["name"] == "Zoe"
+    with Guest(product, "", {}) as guest:
+        guest.http.cookies.set(f"aa_{product.port}", mia)
+        answer = guest.http.get("/api/session").json()
+        assert answer["person"]["name"] == "Mia"
+
+
 def test_everything_is_there_again_on_an_empty_machine(tmp_path: Path, postgres: Server) -> None:
     """Events, answers, archived runs, keys, links, sessions, certificates."""
     old, new = tmp_path / "old", tmp_path / "new"
@@ -108,13 +119,7 @@ def test_everything_is_there_again_on_an_empty_machine(tmp_path: Path, postgres:
         assert (new / name).read_bytes() == (old / name).read_bytes()
     with kept(new, *flags[1]) as product:
         assert list(differences(said, answers(product, product.token))) == []
-        for link in links:
-            with Guest(product, "Zoe", {"invitation": link}) as guest:
-                assert guest.person["name"] == "Zoe"
-        with Guest(product, "", {}) as guest:
-            guest.http.cookies.set(f"aa_{product.port}", cookie)
-            answer = guest.http.get("/api/session").json()
-            assert answer["person"]["name"] == "Mia"
+        let_in(product, links, cookie)
     assert command("verify", "--data", new).returncode == 0
     assert "editor: " in command("verify", "--data", new).stdout
 

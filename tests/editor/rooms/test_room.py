@@ -8,39 +8,15 @@ from typing import Any
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor.crdt import messages, replica
+from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
 from action_assistant.editor.crdt.replica import Replica
 from action_assistant.editor.rooms.member import WAITING_FRAMES
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.room import Room
-from action_assistant.errors import BadInput, Unavailable
+from action_assistant.errors import Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
-from editor.client import Client, settle
-
-STREAM = "graph/g"
-
-
-def updates(*changes: tuple[str, str | None]) -> list[bytes]:
-    """The updates of one author who writes or erases things, in order."""
-    client = Client("author")
-    for name, value in changes:
-        if value is None:
-            del client.map[name]
-        else:
-            client.map[name] = value
-    return [bytes(frame_update(frame)) for frame in client.out]
-
-
-def frame_update(frame: bytes) -> bytes:
-    message = messages.parse(frame)
-    assert isinstance(message, messages.Edit)
-    return message.update
-
-
-async def bodies(journal: Journal) -> list[bytes]:
-    return [event.body for event in await journal.read(STREAM)]
+from editor.client import STREAM, Client, bodies, settle, updates
 
 
 class Gate:
@@ -255,108 +231,6 @@ async def test_a_snapshot_that_cannot_be_applied_is_passed_over(journal: Journal
     loaded.replica.close()
 
 
-async def test_what_is_no_update_ends_its_sender_and_nobody_else(
-    journal: Journal, rooms: Rooms
-) -> None:
-    ada, eve = Client("ada"), Client("eve")
-    async with rooms.enter(STREAM) as room:
-        ada.join(room)
-        eve.join(room)
-        await settle(ada, eve)
-        eve.deliver(messages.change(b"\x01\x01\x01nonsense"))
-        eve.deliver(messages.change(updates(("later", "x"))[0]))
-        ada.map["a"] = "1"
-        await settle(ada)
-        assert eve.member is not None
-        assert await eve.member.ended() == messages.MALFORMED
-        assert ada.member is not None
-        assert not ada.member.closed
-    assert len(await bodies(journal)) == 1
-
-
-class PanicException(BaseException):
-    """Named as what the CRDT library raises when it panics; not every version does for the same bytes."""
-
-
-async def test_an_update_that_breaks_the_library_is_refused_and_harms_nobody(
-    journal: Journal, rooms: Rooms, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (poison,) = updates(("poison", "1"))
-    original = Replica._apply
-
-    def apply(self: Replica, *given: bytes) -> None:
-        with replica.applying():
-            if poison in given:
-                raise PanicException("index out of bounds")
-        original(self, *given)
-
-    monkeypatch.setattr(Replica, "_apply", apply)
-    ada, eve = Client("ada"), Client("eve")
-    async with rooms.enter(STREAM) as room:
-        ada.join(room)
-        eve.join(room)
-        ada.map["a"] = "1"
-        await settle(ada, eve)
-        before = await room.quiet()
-        ada.map["b"] = "2"
-        ada.speak()
-        eve.deliver(messages.change(poison))
-        ada.map["c"] = "3"
-        ada.speak()
-        await settle(ada)
-        assert eve.member is not None
-        assert await eve.member.ended() == messages.MALFORMED
-        assert (await room.quiet()) is not before  # read again from the log
-        with pytest.raises(BadInput):
-            await room.submit(poison, "server")
-        assert (await room.quiet()).doc.get("things", type=Map).to_py() == ada.things
-        assert len(ada.things) == 3
-        assert ada.durable == ada.sent
-    assert len(await bodies(journal)) == 3
-
-
-async def test_counts_that_bytes_cannot_hold_are_refused_before_the_library_allocates(
-    rooms: Rooms,
-) -> None:
-    async with rooms.enter(STREAM) as room:
-        with pytest.raises(BadInput, match="too many clients"):
-            await room.submit(bytes.fromhex("8be0cc71"), "eve")
-
-
-async def test_an_update_over_a_mebibyte_is_refused(journal: Journal, rooms: Rooms) -> None:
-    eve = Client("eve")
-    async with rooms.enter(STREAM) as room:
-        eve.join(room)
-        await settle(eve)
-        eve.map["a"] = "x" * (1 << 20)
-        eve.speak()
-        assert eve.member is not None
-        assert await eve.member.ended() == messages.TOO_BIG
-        await room.quiet()
-    assert await bodies(journal) == []
-
-
-async def test_a_viewer_sees_everything_and_changes_nothing(journal: Journal, rooms: Rooms) -> None:
-    ada, vic = Client("ada"), Client("vic")
-    async with rooms.enter(STREAM) as room:
-        ada.join(room)
-        vic.join(room, edits=False)
-        ada.map["a"] = "1"
-        await settle(ada, vic)
-        assert vic.things == {"a": "1"}
-        assert not vic.out  # was not asked what it has
-        vic.deliver(messages.answer(messages.NOTHING_NEW))
-        await settle(ada, vic)
-        assert vic.member is not None
-        assert not vic.member.closed
-        vic.map["a"] = "2"
-        vic.speak()
-        assert await vic.member.ended() == messages.FORBIDDEN
-        await settle(ada)
-        assert ada.things == {"a": "1"}
-    assert len(await bodies(journal)) == 1
-
-
 async def test_who_reads_too_slowly_is_let_go_and_nobody_waits(rooms: Rooms) -> None:
     ada, bob, slow = Client("ada"), Client("bob"), Client("slow")
     async with rooms.enter(STREAM) as room:
@@ -398,85 +272,6 @@ async def test_many_edits_between_two_commits_travel_as_one_message(
             bob.take(frame)
         assert bob.things == {"a": "39"}
         assert room.seq == 40
-
-
-async def test_opening_at_the_same_time_gives_one_room(rooms: Rooms) -> None:
-    async def visit() -> Room:
-        async with rooms.enter(STREAM) as room:
-            await asyncio.sleep(0)
-            return room
-
-    found = await asyncio.gather(*(visit() for _ in range(20)))
-    assert len(set(map(id, found))) == 1
-
-
-async def test_a_visitor_who_gives_up_takes_nobody_along(rooms: Rooms) -> None:
-    async def visit() -> int:
-        async with rooms.enter(STREAM) as room:
-            return room.seq
-
-    impatient = asyncio.create_task(visit())
-    patient = asyncio.create_task(visit())
-    await asyncio.sleep(0)
-    impatient.cancel()
-    assert await patient == 0
-
-
-async def test_an_empty_room_is_let_go_after_a_while_and_its_memory_freed(
-    journal: Journal,
-) -> None:
-    rooms = Rooms(journal, linger=0.05, window=0)
-    ada = Client("ada")
-    async with rooms.enter(STREAM) as room:
-        ada.join(room)
-        ada.map["a"] = "1"
-        await settle(ada)
-        ada.leave()
-    assert rooms.open_room(STREAM) is room
-    await asyncio.sleep(0.02)
-    async with rooms.enter(STREAM) as same:
-        assert same is room
-        await asyncio.sleep(0.1)
-    assert rooms.open_room(STREAM) is room  # joining in time has cancelled it
-    await asyncio.sleep(0.2)
-    assert rooms.open_room(STREAM) is None
-    assert (await journal.snapshot(STREAM)) is not None
-    async with rooms.enter(STREAM) as fresh:
-        assert fresh is not room
-        assert fresh.seq == 1
-    await rooms.close()
-
-
-async def test_when_the_server_ends_everyone_is_told_to_come_again(journal: Journal) -> None:
-    rooms = Rooms(journal)
-    ada = Client("ada")
-    async with rooms.enter(STREAM) as room:
-        ada.join(room)
-        await settle(ada)
-        ada.map["a"] = "1"
-        ada.speak()
-        member = ada.member
-        assert member is not None
-        await rooms.close()
-        assert await member.ended() == messages.RESTARTING
-    assert len(await bodies(journal)) == 1
-
-
-async def test_a_silent_socket_hears_something(
-    journal: Journal, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("action_assistant.editor.rooms.open_rooms._TICK", 0.02)
-    monkeypatch.setattr("action_assistant.editor.rooms.open_rooms._SILENCE", 0.05)
-    rooms = Rooms(journal)
-    ada = Client("ada")
-    async with rooms.enter(STREAM) as room:
-        ada.join(room)
-        await settle(ada)
-        assert ada.member is not None
-        async with asyncio.timeout(2):
-            assert await ada.member.take() == [messages.BEAT]
-        ada.leave()
-    await rooms.close()
 
 
 async def test_looking_shows_what_is_committed(rooms: Rooms, gate: Gate) -> None:

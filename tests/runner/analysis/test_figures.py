@@ -3,6 +3,7 @@
 import csv
 import io
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.durations import Took, at_rank, took_us
 from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.bounds import Lived, NetworkFaults, lived
@@ -72,6 +74,15 @@ def graph_of(told: Lived) -> Graph:
     return codec.read(getattr(requested, "umrf", "").encode()).graph
 
 
+def shown_spans(run: Run) -> Iterator[tuple[str, float, float]]:
+    """What the page shows of each visit that is over: of which action, least and most seconds."""
+    for name, shown in views.shown(run).actions.items():
+        for visit in shown.visits:
+            if visit.until is not None and visit.not_after is not None:
+                least = (visit.until - visit.start).total_seconds()
+                yield name, least, (visit.not_after - visit.not_before).total_seconds()
+
+
 @settings(
     max_examples=int(os.environ.get("BOUNDS_HISTORIES", "10")),
     deadline=None,
@@ -102,13 +113,8 @@ def test_the_truth_lies_inside_of_every_figure(
             assert (
                 not row["seconds"] or abs(float(row["seconds"]) - real[row["action"]] / 1e6) < 0.002
             )
-    for name, shown in views.shown(run).actions.items():
-        for visit in shown.visits:
-            if visit.until is None or visit.not_after is None or name not in real:
-                continue
-            least = (visit.until - visit.start).total_seconds()
-            most = (visit.not_after - visit.not_before).total_seconds()
-            assert holds(Took(least=least, most=most), real[name])
+    for name, least, most in shown_spans(run):
+        assert name not in real or holds(Took(least=least, most=most), real[name])
     if run.end is None:
         return
     found = figures(told)

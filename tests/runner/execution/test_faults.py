@@ -27,8 +27,7 @@ from runner.harness import (
     until,
     virtual,
 )
-from runner.registered_robots import Open
-from runner.robots.test_robots import NEVER, fleet
+from runner.registered_robots import NEVER, Open, fleet
 
 
 class Faulty(Open):

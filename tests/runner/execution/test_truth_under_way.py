@@ -8,8 +8,7 @@ from action_assistant.runner.emulator.messages import EngineTraits, Start
 from action_assistant.runner.links.port import Answer, Feedback, Order
 from action_assistant.umrf.files import codec
 from runner.harness import ANN, BEN, Harness, order, sequence, until, virtual
-from runner.registered_robots import Open
-from runner.robots.test_robots import NEVER, fleet
+from runner.registered_robots import NEVER, Open, fleet
 from runner.robots_in_network import OTHER, PATROL, RobotsInNetwork, asked, shown
 
 

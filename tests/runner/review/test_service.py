@@ -5,6 +5,7 @@ import io
 import json
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -174,13 +175,41 @@ def test_a_run_is_saved_as_what_is_expected_and_can_be_retired(
         assert client.delete("/api/expectations/reviewed goes well").status_code == 404
 
 
-def test_sums_marks_and_archives_are_the_same_after_restarts(
-    own_process: RunnerProcess,
-) -> None:
-    with own_process.client() as client:
+def kept_run(process: RunnerProcess) -> dict[str, Any]:
+    """A run with a note, summed up."""
+    with process.client() as client:
         run = over(client, started(client, order(sequence("kept"), graph="kept", script=BAD))["id"])
         client.patch(f"/api/runs/{run['id']}/marks", json={"note": "look here"})
         eventually(lambda: found(client, text="gripper"))
+    return run
+
+
+def moved_archive(process: RunnerProcess) -> Path:
+    """The only file of the archive, taken out of it."""
+    (file,) = (process.data / "archive").glob("runs/*/*.gz")
+    return file.rename(process.data / file.name)
+
+
+def comes_back(process: RunnerProcess, run: str, moved: Path) -> None:
+    """A run whose archive is gone says so, and is there again when the file is."""
+    process.start()
+    with process.client() as client:
+        gone = client.get(f"/api/runs/{run}")
+        assert (gone.status_code, gone.json()["title"]) == (
+            410,
+            "The run is in an archive that is not here",
+        )
+        assert client.get("/api/statistics", params={"graph": "kept"}).json()["judged"] == 1
+        assert main(["runs", "restore", str(moved), "--data", str(process.data)]) == 0
+        assert client.get(f"/api/runs/{run}").status_code == 200
+    assert main(["runs", "archive", "--check", "--data", str(process.data)]) == 0
+    assert main(["runs", "restore", str(process.data / "runner.db")]) == 1
+
+
+def test_sums_marks_and_archives_are_the_same_after_restarts(
+    own_process: RunnerProcess,
+) -> None:
+    run = kept_run(own_process)
     own_process.kill()
     own_process.start()
     with own_process.client() as client:
@@ -204,20 +233,8 @@ def test_sums_marks_and_archives_are_the_same_after_restarts(
         assert client.get(path, params={"format": "jsonl"}).text == export
         raw = client.get(f"/api/runs/{run['id']}/raw").json()
         assert (raw["hours"], raw["text"]) == ([], "A simulated engine sends no messages.")
-        (file,) = (own_process.data / "archive").glob("runs/*/*.gz")
-        moved = file.rename(own_process.data / file.name)
+        moved = moved_archive(own_process)
     own_process.end()
-    own_process.start()
-    with own_process.client() as client:
-        gone = client.get(f"/api/runs/{run['id']}")
-        assert (gone.status_code, gone.json()["title"]) == (
-            410,
-            "The run is in an archive that is not here",
-        )
-        assert client.get("/api/statistics", params={"graph": "kept"}).json()["judged"] == 1
-        assert main(["runs", "restore", str(moved), "--data", str(own_process.data)]) == 0
-        assert client.get(f"/api/runs/{run['id']}").status_code == 200
-    assert main(["runs", "archive", "--check", "--data", str(own_process.data)]) == 0
-    assert main(["runs", "restore", str(own_process.data / "runner.db")]) == 1
+    comes_back(own_process, run["id"], moved)
     own_process.end()
     assert main(["verify", "--data", str(own_process.data)]) == 0

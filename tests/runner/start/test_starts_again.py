@@ -19,8 +19,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph
 from runner.fake_network import now_ms
 from runner.harness import ANN, Harness, order, sequence, until, virtual
-from runner.registered_robots import Open
-from runner.robots.test_robots import change, fleet, group, verdicts
+from runner.registered_robots import Open, change, fleet, group, verdicts
 from runner.robots_in_network import PATHS, EmulatedEngine, RobotsInNetwork, script_from
 
 WORK = codec.write_action(Action(key="work", name="Work"))

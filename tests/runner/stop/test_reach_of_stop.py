@@ -26,8 +26,7 @@ from runner.harness import (
     until,
     virtual,
 )
-from runner.registered_robots import Open, RegisteredRobots
-from runner.robots.test_robots import NEVER, fleet, group
+from runner.registered_robots import NEVER, Open, RegisteredRobots, fleet, group
 from runner.robots_in_network import PATROL, RobotsInNetwork, asked, shown
 
 

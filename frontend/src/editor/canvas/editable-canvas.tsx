@@ -161,14 +161,12 @@ function useHands(
   };
 }
 
-export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, writing }: Props) {
-  const { presence } = useRoom();
-  const { flow, setOver } = canvas;
-  const frame = useRef<HTMLDivElement>(null);
-  const store = useStoreApi();
-  // A finger has one button: it moves the view or draws a marquee.
-  const coarse = useMediaQuery("(pointer: coarse)") ?? false;
-
+/** What is carried from a list can be dropped on the canvas, also into an arrow. */
+function useDroppedActions(
+  context: EditorContext,
+  { flow, setOver }: Props["canvas"],
+  frame: RefObject<HTMLDivElement | null>,
+): void {
   useEffect(
     () =>
       actionDrag.onDrop(({ payload: load, x, y }) => {
@@ -185,7 +183,7 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
         });
         context.select([key]);
       }),
-    [flow, context],
+    [flow, context, frame],
   );
   // What is carried over an arrow goes into it.
   useEffect(
@@ -196,7 +194,77 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
       }),
     [setOver],
   );
+}
 
+/** What is drawn, and how it answers to hands. */
+function Drawing({
+  context,
+  canvas,
+  me,
+  map,
+  hands,
+}: Pick<Props, "context" | "canvas" | "me" | "map"> & { hands: ReturnType<typeof useHands> }) {
+  // A finger has one button: it moves the view or draws a marquee.
+  const coarse = useMediaQuery("(pointer: coarse)") ?? false;
+  return (
+    <ReactFlow<CanvasNode, Arrow>
+      nodes={canvas.nodes}
+      edges={canvas.edges}
+      nodeTypes={nodeTypes}
+      edgeTypes={edgeTypes}
+      onNodesChange={canvas.onNodesChange}
+      onEdgesChange={canvas.onEdgesChange}
+      {...hands}
+      connectOnClick={false}
+      edgesReconnectable={context.mayEdit}
+      reconnectRadius={12}
+      nodesDraggable={context.mayEdit}
+      nodesConnectable={context.mayEdit}
+      snapToGrid={context.snap}
+      snapGrid={SNAP_GRID}
+      elevateNodesOnSelect={false}
+      selectionOnDrag={context.tool === "select"}
+      panOnDrag={context.tool === "pan" ? true : coarse ? false : OTHER_BUTTONS}
+      panOnScroll={false}
+      panOnScrollMode={PanOnScrollMode.Free}
+      selectionMode={SelectionMode.Partial}
+      connectionLineType={ConnectionLineType.Bezier}
+      connectionRadius={34}
+      zoomOnDoubleClick={false}
+      deleteKeyCode={null}
+      multiSelectionKeyCode={MORE_KEYS}
+      minZoom={ZOOM.least}
+      maxZoom={ZOOM.most}
+      onlyRenderVisibleElements={canvas.nodes.length > 150}
+      nodeDragThreshold={3}
+      proOptions={PLAIN}
+      aria-label="Canvas"
+    >
+      <ArrowTips />
+      <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
+      <Cursors me={me} />
+      <PeopleAtCards me={me} places={canvas.places} sizes={canvas.sizes} />
+      {map && (
+        <MiniMap<CanvasNode>
+          position="top-right"
+          pannable
+          zoomable
+          style={MAP_SIZE}
+          nodeBorderRadius={10}
+          nodeColor={mapColor}
+          ariaLabel="Map of the canvas"
+        />
+      )}
+    </ReactFlow>
+  );
+}
+
+export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, writing }: Props) {
+  const { presence } = useRoom();
+  const { flow } = canvas;
+  const frame = useRef<HTMLDivElement>(null);
+  const store = useStoreApi();
+  useDroppedActions(context, canvas, frame);
   const openAddAt = (screen: Position, from: Pending | null) => {
     const at = flow.screenToFlowPosition({ x: screen[0], y: screen[1] });
     context.openAdd({ screen, at: [Math.round(at.x), Math.round(at.y)], from });
@@ -249,55 +317,7 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
       }}
     >
       <NoteEditingContext value={desk}>
-        <ReactFlow<CanvasNode, Arrow>
-          nodes={canvas.nodes}
-          edges={canvas.edges}
-          nodeTypes={nodeTypes}
-          edgeTypes={edgeTypes}
-          onNodesChange={canvas.onNodesChange}
-          onEdgesChange={canvas.onEdgesChange}
-          {...hands}
-          connectOnClick={false}
-          edgesReconnectable={context.mayEdit}
-          reconnectRadius={12}
-          nodesDraggable={context.mayEdit}
-          nodesConnectable={context.mayEdit}
-          snapToGrid={context.snap}
-          snapGrid={SNAP_GRID}
-          elevateNodesOnSelect={false}
-          selectionOnDrag={context.tool === "select"}
-          panOnDrag={context.tool === "pan" ? true : coarse ? false : OTHER_BUTTONS}
-          panOnScroll={false}
-          panOnScrollMode={PanOnScrollMode.Free}
-          selectionMode={SelectionMode.Partial}
-          connectionLineType={ConnectionLineType.Bezier}
-          connectionRadius={34}
-          zoomOnDoubleClick={false}
-          deleteKeyCode={null}
-          multiSelectionKeyCode={MORE_KEYS}
-          minZoom={ZOOM.least}
-          maxZoom={ZOOM.most}
-          onlyRenderVisibleElements={canvas.nodes.length > 150}
-          nodeDragThreshold={3}
-          proOptions={PLAIN}
-          aria-label="Canvas"
-        >
-          <ArrowTips />
-          <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
-          <Cursors me={me} />
-          <PeopleAtCards me={me} places={canvas.places} sizes={canvas.sizes} />
-          {map && (
-            <MiniMap<CanvasNode>
-              position="top-right"
-              pannable
-              zoomable
-              style={MAP_SIZE}
-              nodeBorderRadius={10}
-              nodeColor={mapColor}
-              ariaLabel="Map of the canvas"
-            />
-          )}
-        </ReactFlow>
+        <Drawing context={context} canvas={canvas} me={me} map={map} hands={hands} />
       </NoteEditingContext>
       {connecting.pending && (
         <PendingHint

@@ -7,7 +7,9 @@ import {
   useStoreApi,
 } from "@xyflow/react";
 import {
+  type Dispatch,
   type MouseEvent as ReactMouseEvent,
+  type SetStateAction,
   useCallback,
   useEffect,
   useMemo,
@@ -95,32 +97,12 @@ export function selectionAfter(
   return same ? before : next;
 }
 
-export function useCanvasElements({
-  me,
-  graph,
-  selection,
-  select,
-  progress,
-  marks,
-}: CanvasElementsInput) {
-  const { doc, presence } = useRoom();
-  const people = usePeople();
-  const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
-  const store = useStoreApi();
-  const [sizes, setSizes] = useState<ReadonlyMap<Key, MeasuredSize>>(new Map());
-  const [drag, setDrag] = useState<Positions | null>(null);
-  const [resized, setResized] = useState<Note | null>(null);
-  const [over, setOver] = useState<string | null>(null);
-  const rest = useMemo(
-    () => new Map([...positionsOf(graph, sizes), ...notePlaces(graph)]),
-    [graph, sizes],
-  );
-  const places = useMemo(() => dragged(rest, people, drag), [rest, people, drag]);
-  const chosen = useRef(selection);
-  chosen.current = selection;
-
-  const drawn = useRef<Drawn>({ nodes: [], edges: [], around: null });
-  const others = useMemo(() => {
+/** What others have chosen, in their colours. */
+function useChosenByOthers(
+  me: string,
+  people: readonly Participant[],
+): ReadonlyMap<string, string> {
+  return useMemo(() => {
     const colors = distinctColors([me, ...people.map((person) => person.id)]);
     return new Map(
       people.flatMap((person) =>
@@ -128,15 +110,12 @@ export function useCanvasElements({
       ),
     );
   }, [me, people]);
-  // The arrow that would take in what is dragged looks as if it were chosen.
-  const selected = useMemo(
-    () => (over === null ? selection : new Set([...selection, over])),
-    [selection, over],
-  );
-  const options = useMemo(
-    () => ({ others, places, selected, progress, marks, measured: sizes, resized }),
-    [others, places, selected, progress, marks, sizes, resized],
-  );
+}
+
+/** Cards and arrows; what is drawn as before keeps its identity. */
+function useDrawn(graph: Graph, options: Parameters<typeof nodesOf>[1]) {
+  const { selected, progress, marks } = options;
+  const drawn = useRef<Drawn>({ nodes: [], edges: [], around: null });
   const nodes = useMemo(() => {
     const before = drawn.current.nodes;
     return keepEqual(before, nodesOf(graph, options, before));
@@ -154,16 +133,73 @@ export function useCanvasElements({
   useEffect(() => {
     drawn.current = { nodes, edges, around };
   }, [nodes, edges, around]);
+  return { nodes, edges };
+}
 
-  const now = useRef({ graph, rest, sizes });
-  now.current = { graph, rest, sizes };
+/** Keeps the selection in step with what React Flow says of it. */
+function useSelectionChanges(
+  selection: ReadonlySet<string>,
+  select: CanvasElementsInput["select"],
+): (changes: readonly (NodeChange | EdgeChange)[]) => void {
+  const chosen = useRef(selection);
+  chosen.current = selection;
+  return useCallback(
+    (changes) => {
+      const after = selectionAfter(chosen.current, changes);
+      if (after !== chosen.current) {
+        chosen.current = after;
+        select(after);
+      }
+    },
+    [select],
+  );
+}
+
+interface Placed {
+  readonly graph: Graph;
+  /** Where everything stands while nobody drags it. */
+  readonly rest: Positions;
+  readonly sizes: ReadonlyMap<Key, MeasuredSize>;
+}
+
+/** Where things stand after they were dragged; frames take along what lies in them. */
+function afterMoves(
+  before: Positions | null,
+  moves: readonly NodeChange<CanvasNode>[],
+  { graph, rest, sizes }: Placed,
+): Positions {
+  const next: Positions = new Map(before);
+  for (const move of moves) {
+    if (move.type !== "position" || !move.position) continue;
+    next.set(move.id, [round(move.position.x), round(move.position.y)]);
+  }
+  const own = new Map(
+    moves.flatMap((move): [string, Position][] => {
+      const at = move.type === "position" ? next.get(move.id) : undefined;
+      return move.type === "position" && at ? [[move.id, at]] : [];
+    }),
+  );
+  for (const [key, at] of withContents(graph, own, rest, sizes)) next.set(key, at);
+  return next;
+}
+
+/** Takes what React Flow says of cards: sizes, moves, selection. */
+function useNodeChanges(
+  placed: Placed,
+  setSizes: Dispatch<SetStateAction<ReadonlyMap<Key, MeasuredSize>>>,
+  setDrag: Dispatch<SetStateAction<Positions | null>>,
+  takeSelection: ReturnType<typeof useSelectionChanges>,
+) {
+  const store = useStoreApi();
+  const now = useRef(placed);
+  now.current = placed;
   // Drawing a marquee within a frame is about what lies in it.
   const isNoFrame = useCallback((change: NodeChange<CanvasNode>) => {
     if (change.type !== "select" || !change.selected) return true;
     const note = notesOf(now.current.graph).find(({ key }) => key === change.id);
     return note?.kind !== "frame";
   }, []);
-  const onNodesChange = useCallback(
+  return useCallback(
     (all: NodeChange<CanvasNode>[]) => {
       const changes = store.getState().userSelectionActive ? all.filter(isNoFrame) : all;
       const sized = changes.filter((change) => change.type === "dimensions");
@@ -176,43 +212,23 @@ export function useCanvasElements({
       }
       const moves = changes.filter((change) => change.type === "position" && change.dragging);
       if (moves.length > 0) {
-        const { graph, rest, sizes } = now.current;
-        setDrag((before) => {
-          const next: Positions = new Map(before);
-          for (const move of moves) {
-            if (move.type !== "position" || !move.position) continue;
-            next.set(move.id, [round(move.position.x), round(move.position.y)]);
-          }
-          const own = new Map(
-            moves.flatMap((move): [string, Position][] => {
-              const at = move.type === "position" ? next.get(move.id) : undefined;
-              return move.type === "position" && at ? [[move.id, at]] : [];
-            }),
-          );
-          for (const [key, at] of withContents(graph, own, rest, sizes)) next.set(key, at);
-          return next;
-        });
+        const { current } = now;
+        setDrag((before) => afterMoves(before, moves, current));
       }
-      const after = selectionAfter(chosen.current, changes);
-      if (after !== chosen.current) {
-        chosen.current = after;
-        select(after);
-      }
+      takeSelection(changes);
     },
-    [select, store, isNoFrame],
+    [store, isNoFrame, setSizes, setDrag, takeSelection],
   );
+}
 
-  const onEdgesChange = useCallback(
-    (changes: EdgeChange<Arrow>[]) => {
-      const after = selectionAfter(chosen.current, changes);
-      if (after !== chosen.current) {
-        chosen.current = after;
-        select(after);
-      }
-    },
-    [select],
-  );
-
+/** What happens while cards are dragged, and when they are dropped. */
+function useDragging(
+  { graph, rest, sizes }: Placed,
+  over: string | null,
+  setOver: (arrow: string | null) => void,
+  setDrag: (drag: Positions | null) => void,
+) {
+  const { doc, presence } = useRoom();
   const begun = useRef<Position | null>(null);
   const onDrag = (
     event: MouseEvent | TouchEvent | ReactMouseEvent,
@@ -245,20 +261,39 @@ export function useCanvasElements({
     setOver(null);
     presence.tell({ drag: undefined });
   };
+  return { onDrag, onDragStop };
+}
 
-  return {
-    flow,
-    nodes,
-    edges,
-    places,
-    sizes,
-    setResized,
-    setOver,
-    onNodesChange,
-    onEdgesChange,
-    onDrag,
-    onDragStop,
-  };
+export function useCanvasElements(given: CanvasElementsInput) {
+  const { me, graph, selection, select, progress, marks } = given;
+  const people = usePeople();
+  const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
+  const [sizes, setSizes] = useState<ReadonlyMap<Key, MeasuredSize>>(new Map());
+  const [drag, setDrag] = useState<Positions | null>(null);
+  const [resized, setResized] = useState<Note | null>(null);
+  const [over, setOver] = useState<string | null>(null);
+  const rest = useMemo(
+    () => new Map([...positionsOf(graph, sizes), ...notePlaces(graph)]),
+    [graph, sizes],
+  );
+  const places = useMemo(() => dragged(rest, people, drag), [rest, people, drag]);
+  const others = useChosenByOthers(me, people);
+  // The arrow that would take in what is dragged looks as if it were chosen.
+  const selected = useMemo(
+    () => (over === null ? selection : new Set([...selection, over])),
+    [selection, over],
+  );
+  const options = useMemo(
+    () => ({ others, places, selected, progress, marks, measured: sizes, resized }),
+    [others, places, selected, progress, marks, sizes, resized],
+  );
+  const drawn = useDrawn(graph, options);
+  const placed = { graph, rest, sizes };
+  const onEdgesChange = useSelectionChanges(selection, select);
+  const onNodesChange = useNodeChanges(placed, setSizes, setDrag, onEdgesChange);
+  const dragging = useDragging(placed, over, setOver, setDrag);
+  const hands = { onNodesChange, onEdgesChange, ...dragging };
+  return { flow, ...drawn, places, sizes, setResized, setOver, ...hands };
 }
 
 /** One action that nothing leads to or from can be dropped into an arrow. */

@@ -1,6 +1,15 @@
 /** The cursor of a replay: where it stands, whether it plays, and the run as it was known there. */
 import { useQueryClient } from "@tanstack/react-query";
-import { useCallback, useEffect, useMemo, useRef, useState } from "react";
+import {
+  type Dispatch,
+  type RefObject,
+  type SetStateAction,
+  useCallback,
+  useEffect,
+  useMemo,
+  useRef,
+  useState,
+} from "react";
 import { useReplayData } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { instant } from "../../ui/times";
@@ -29,6 +38,66 @@ export interface ReplayCursor {
 
 const AGAIN = 3_000; // ms between two requests for the replay of a run that goes on
 
+/** The replay of a run that goes on is asked for again and again while somebody looks at it. */
+function useAskedAgain(newest: Run, asked: boolean): void {
+  const client = useQueryClient();
+  const goes = newest.ended_at === null;
+  useEffect(() => {
+    if (!goes || !asked) return;
+    const key = ["runs", "film", newest.id];
+    const timer = setInterval(() => void client.invalidateQueries({ queryKey: key }), AGAIN);
+    return () => {
+      clearInterval(timer);
+      void client.invalidateQueries({ queryKey: key });
+    };
+  }, [goes, asked, client, newest.id]);
+}
+
+/** What plays the replay, with the run as it was when its replay began. */
+function usePlayer(
+  data: ReturnType<typeof useReplayData>["data"],
+  newest: Run,
+): ReplayPlayer | null {
+  const still = useRef(newest);
+  if (still.current.id !== newest.id || newest.umrf !== still.current.umrf) still.current = newest;
+  return useMemo(() => (data ? new ReplayPlayer(data, still.current) : null), [data]);
+}
+
+/** The run as it was known at the cursor. */
+function useRunAt(player: ReplayPlayer | null, at: number | null, newest: Run): Run {
+  return useMemo(
+    () => (at === null || player === null ? newest : player.at(at)),
+    [at, player, newest],
+  );
+}
+
+/** Moves the cursor while it plays, up to the edge. */
+function useRunningTime(
+  playing: boolean,
+  speed: number,
+  edge: RefObject<number>,
+  setAt: Dispatch<SetStateAction<number | null>>,
+  setPlaying: (playing: boolean) => void,
+): void {
+  useEffect(() => {
+    if (!playing) return;
+    let last = performance.now();
+    let frame = requestAnimationFrame(function tick(now) {
+      const passed = (now - last) * speed;
+      last = now;
+      setAt((before) => {
+        if (before === null) return before;
+        const next = before + passed;
+        if (next < edge.current) return next;
+        setPlaying(false);
+        return null;
+      });
+      frame = requestAnimationFrame(tick);
+    });
+    return () => cancelAnimationFrame(frame);
+  }, [playing, speed, edge, setAt, setPlaying]);
+}
+
 /** `newest`: the run as it is known now; `end`: the right edge of its time. */
 export function useReplay(
   runner: string | undefined,
@@ -43,23 +112,8 @@ export function useReplay(
   const [chapter, setChapter] = useState(0);
   const asked = at !== null || playing;
   const replay = useReplayData(runner, newest.id, chapter, asked);
-  const client = useQueryClient();
-  const goes = newest.ended_at === null;
-  useEffect(() => {
-    if (!goes || !asked) return;
-    const key = ["runs", "film", newest.id];
-    const timer = setInterval(() => void client.invalidateQueries({ queryKey: key }), AGAIN);
-    return () => {
-      clearInterval(timer);
-      void client.invalidateQueries({ queryKey: key });
-    };
-  }, [goes, asked, client, newest.id]);
-  const still = useRef(newest);
-  if (still.current.id !== newest.id || newest.umrf !== still.current.umrf) still.current = newest;
-  const player = useMemo(
-    () => (replay.data ? new ReplayPlayer(replay.data, still.current) : null),
-    [replay.data],
-  );
+  useAskedAgain(newest, asked);
+  const player = usePlayer(replay.data, newest);
   const chapters = replay.data?.chapters;
   useEffect(() => {
     if (at !== null && chapters) setChapter(chapterAt(chapters, at));
@@ -96,41 +150,10 @@ export function useReplay(
     },
     [at, player, chapters, seek, start],
   );
-  useEffect(() => {
-    if (!playing) return;
-    let last = performance.now();
-    let frame = requestAnimationFrame(function tick(now) {
-      const passed = (now - last) * speed;
-      last = now;
-      setAt((before) => {
-        if (before === null) return before;
-        const next = before + passed;
-        if (next < edge.current) return next;
-        setPlaying(false);
-        return null;
-      });
-      frame = requestAnimationFrame(tick);
-    });
-    return () => cancelAnimationFrame(frame);
-  }, [playing, speed]);
-
-  const run = useMemo(
-    () => (at === null || player === null ? newest : player.at(at)),
-    [at, player, newest],
-  );
-  return {
-    at,
-    start,
-    end,
-    playing,
-    speed,
-    waiting: asked && replay.isPending,
-    failed: asked ? replay.error : null,
-    run,
-    player,
-    seek,
-    play,
-    setSpeed,
-    step,
-  };
+  useRunningTime(playing, speed, edge, setAt, setPlaying);
+  const run = useRunAt(player, at, newest);
+  const waiting = asked && replay.isPending;
+  const failed = asked ? replay.error : null;
+  const commands = { seek, play, setSpeed, step };
+  return { at, start, end, playing, speed, waiting, failed, run, player, ...commands };
 }

@@ -82,6 +82,71 @@ function ExpectDialog({ runner, run, onClose }: Props & { onClose: () => void })
   );
 }
 
+/** The run as files. */
+function HandOver({ runner, run }: Props) {
+  const file = (format: "jsonl" | "csv" | "mcap") =>
+    runner === undefined ? undefined : exportUrl(runner, run.id, format);
+  return (
+    <>
+      <Menu.Label>Hand over</Menu.Label>
+      {(
+        [
+          ["jsonl", "Every event (JSON lines)"],
+          ["csv", "Intervals (CSV)"],
+          ["mcap", "For Foxglove (MCAP)"],
+        ] as const
+      ).map(([format, label]) => (
+        <Menu.Item
+          key={format}
+          component="a"
+          href={file(format)}
+          leftSection={<IconDownload size={15} aria-hidden />}
+        >
+          {label}
+        </Menu.Item>
+      ))}
+    </>
+  );
+}
+
+interface RepeatItemsProps {
+  disabled: boolean;
+  hasGraph: boolean;
+  onSimulate: (which: RepeatedVersion) => void;
+  onFault: () => void;
+}
+
+function RepeatItems({ disabled, hasGraph, onSimulate, onFault }: RepeatItemsProps) {
+  return (
+    <>
+      <Menu.Label>Repeat in the simulator</Menu.Label>
+      <Menu.Item
+        leftSection={<IconRepeat size={15} aria-hidden />}
+        disabled={disabled}
+        onClick={() => onSimulate("same")}
+      >
+        As it went
+      </Menu.Item>
+      {hasGraph && (
+        <Menu.Item
+          leftSection={<IconRepeat size={15} aria-hidden />}
+          disabled={disabled}
+          onClick={() => onSimulate("newest")}
+        >
+          As it went, with the newest version
+        </Menu.Item>
+      )}
+      <Menu.Item
+        leftSection={<IconBug size={15} aria-hidden />}
+        disabled={disabled}
+        onClick={onFault}
+      >
+        With one fault …
+      </Menu.Item>
+    </>
+  );
+}
+
 export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
   const [, go] = useLocation();
   const [dialog, setDialog] = useState<"fault" | "expect" | null>(null);
@@ -109,8 +174,6 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
   };
   const start = (seq: number) => onStart({ graph, name: run.graph_name, seq, engines });
   const startNewest = () => graphMoment(graph).then(({ seq }) => start(seq), complain);
-  const file = (format: "jsonl" | "csv" | "mcap") =>
-    runner === undefined ? undefined : exportUrl(runner, run.id, format);
   const close = () => setDialog(null);
   return (
     <>
@@ -145,30 +208,12 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
               </Menu.Item>
             </>
           )}
-          <Menu.Label>Repeat in the simulator</Menu.Label>
-          <Menu.Item
-            leftSection={<IconRepeat size={15} aria-hidden />}
+          <RepeatItems
             disabled={!over || !ran}
-            onClick={() => simulate("same")}
-          >
-            As it went
-          </Menu.Item>
-          {graph !== "" && (
-            <Menu.Item
-              leftSection={<IconRepeat size={15} aria-hidden />}
-              disabled={!over || !ran}
-              onClick={() => simulate("newest")}
-            >
-              As it went, with the newest version
-            </Menu.Item>
-          )}
-          <Menu.Item
-            leftSection={<IconBug size={15} aria-hidden />}
-            disabled={!over || !ran}
-            onClick={() => setDialog("fault")}
-          >
-            With one fault …
-          </Menu.Item>
+            hasGraph={graph !== ""}
+            onSimulate={simulate}
+            onFault={() => setDialog("fault")}
+          />
           <Menu.Label>Look closer</Menu.Label>
           <Menu.Item
             leftSection={<IconArrowsDiff size={15} aria-hidden />}
@@ -183,23 +228,7 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
           >
             Expect this course …
           </Menu.Item>
-          <Menu.Label>Hand over</Menu.Label>
-          {(
-            [
-              ["jsonl", "Every event (JSON lines)"],
-              ["csv", "Intervals (CSV)"],
-              ["mcap", "For Foxglove (MCAP)"],
-            ] as const
-          ).map(([format, label]) => (
-            <Menu.Item
-              key={format}
-              component="a"
-              href={file(format)}
-              leftSection={<IconDownload size={15} aria-hidden />}
-            >
-              {label}
-            </Menu.Item>
-          ))}
+          <HandOver runner={runner} run={run} />
         </Menu.Dropdown>
       </Menu>
       {dialog === "fault" && (

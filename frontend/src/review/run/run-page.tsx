@@ -11,6 +11,7 @@ import { type ReplayMark, useReplayData, useRunsOfSameStart } from "../../api/re
 import { type Run, useRun } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
 import { GraphView } from "../../canvas/graph-view";
+import type { Graph } from "../../graph/model";
 import { type Progress, progressByAid, runEndText, runLabel } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import { Timeline, type Track } from "../../status/timeline";
@@ -95,6 +96,142 @@ function useTracks(runner: string | undefined, run: Run): readonly Track[] {
   );
 }
 
+function crumbsOf(run: Run): Crumb[] {
+  return [
+    { label: "Runs", to: "/runs" },
+    {
+      label: run.graph_name,
+      ...(run.graph === null ? {} : { to: `/graphs/${run.graph}` }),
+    },
+    { label: `Run ${run.number}` },
+  ];
+}
+
+/** How the run goes, or went at the moment that is shown. */
+function RunStatus({ newest, run, past, unsure }: RunStatusProps) {
+  const { now: live } = useLive();
+  const { tone, word } = runLabel(run);
+  const since = `unknown since ${clock(live.since)}`;
+  const seen = unsure && !past;
+  return (
+    <>
+      <StateLabel
+        pill
+        tone={seen ? "unknown" : tone}
+        word={seen ? since : run.ended_at === null ? word : runEndText(run)}
+      />
+      {past && <span className={style.simulated}>as it was then</span>}
+      {newest.simulated && <span className={style.simulated}>simulated</span>}
+    </>
+  );
+}
+
+interface RunStatusProps {
+  newest: Run;
+  /** As it was at the moment that is shown. */
+  run: Run;
+  past: boolean;
+  unsure: boolean;
+}
+
+interface AboutRunProps {
+  runner: string | undefined;
+  newest: Run;
+  replay: ReplayCursor;
+  label: string;
+  marks: readonly ReplayMark[];
+  selected: string | null;
+  onSelect: (aid: string | null) => void;
+}
+
+/** What was said, with which values, by whom: beside the canvas. */
+function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: AboutRunProps) {
+  return (
+    <aside className={style.side} aria-label="About the run">
+      <Tabs defaultValue="events" keepMounted={false} className={style.tabs ?? ""}>
+        <Tabs.List>
+          <Tabs.Tab value="events">Events</Tabs.Tab>
+          <Tabs.Tab value="parameters">Parameters</Tabs.Tab>
+          <Tabs.Tab value="facts">Facts</Tabs.Tab>
+          <Tabs.Tab value="raw">Raw</Tabs.Tab>
+        </Tabs.List>
+        <Tabs.Panel value="events" className={style.panel ?? ""}>
+          <RunEvents
+            run={newest}
+            version={label}
+            selected={selected}
+            onPick={onSelect}
+            marks={marks}
+            at={replay.at}
+            onSeek={replay.seek}
+          />
+        </Tabs.Panel>
+        <Tabs.Panel value="parameters" className={style.panel ?? ""}>
+          <RunParameters run={replay.run} selected={selected} onPick={onSelect} />
+        </Tabs.Panel>
+        <Tabs.Panel value="facts" className={style.panel ?? ""}>
+          <RunNotes runner={runner} run={newest.id} />
+          <RunFacts runner={runner} run={newest} version={label} by={authorName(newest.author)} />
+        </Tabs.Panel>
+        <Tabs.Panel value="raw" className={style.panel ?? ""}>
+          <RawEvents runner={runner} run={newest} />
+        </Tabs.Panel>
+      </Tabs>
+    </aside>
+  );
+}
+
+/** The engines of a run, and of those that began together with it. */
+function enginesOf(run: Run, mates: readonly Track[]): string[] {
+  if (run.simulated) return ["simulator"];
+  return [run.engine, ...mates.map(({ run: mate }) => mate.engine)].sort();
+}
+
+interface RunTimelineProps {
+  newest: Run;
+  graph: Graph;
+  replay: ReplayCursor;
+  replayData: Parameters<typeof timelineSignsOf>[0];
+  until: number;
+  unsure: boolean;
+  selected: string | null;
+  onPick: (aid: string | null) => void;
+  /** The runs that began together with this one. */
+  mates: readonly Track[];
+}
+
+/** Every visit, and the controls of the replay. */
+function RunTimeline(props: RunTimelineProps) {
+  const { newest, graph, replay, replayData, until, unsure, selected, onPick, mates } = props;
+  const robot = mates.length > 0 ? newest.engine : "";
+  const lanes = useMemo(() => lanesOf(newest, graph, robot), [newest, graph, robot]);
+  const signs = useMemo(() => timelineSignsOf(replayData), [replayData]);
+  const gaps = useMemo(() => silentTimesOf(replayData, newest, until), [replayData, newest, until]);
+  return (
+    <section className={style.strip} aria-label="Timeline">
+      <PlayerControls replay={replay} goes={newest.ended_at === null} />
+      {replay.failed !== null && (
+        <p className={style.failed} role="alert">
+          The replay cannot be loaded: {errorText(replay.failed)}
+        </p>
+      )}
+      <Timeline
+        run={newest}
+        lanes={lanes}
+        until={until}
+        unsure={unsure}
+        selected={selected}
+        onPick={onPick}
+        cursor={replay.at}
+        onSeek={replay.seek}
+        signs={signs}
+        gaps={gaps}
+        others={mates}
+      />
+    </section>
+  );
+}
+
 function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const { now: live, runner } = useLive();
   const place = usePlace(newest);
@@ -113,50 +250,20 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
     [run, unsure, past, replay.at],
   );
   const mates = useTracks(runner, newest);
-  const robot = mates.length > 0 ? newest.engine : "";
-  const lanes = useMemo(() => lanesOf(newest, graph, robot), [newest, graph, robot]);
-  const engines = useMemo(
-    () =>
-      newest.simulated
-        ? ["simulator"]
-        : [newest.engine, ...mates.map(({ run: mate }) => mate.engine)].sort(),
-    [newest, mates],
-  );
+  const engines = useMemo(() => enginesOf(newest, mates), [newest, mates]);
   const [again, setAgain] = useState<RepeatActions | null>(null);
   const picked = useMemo(() => new Set(selected === null ? [] : [selected]), [selected]);
   const replayData = useReplayData(runner, newest.id, 0, true).data;
-  const signs = useMemo(() => timelineSignsOf(replayData), [replayData]);
-  const gaps = useMemo(() => silentTimesOf(replayData, newest, until), [replayData, newest, until]);
   const label = useVersionLabel(newest);
   const show = (at: number, aid: string | null) => {
     replay.seek(at);
     if (aid !== null) setSelected(aid);
   };
-  const { tone, word } = runLabel(run);
-  const since = `unknown since ${clock(live.since)}`;
-  const seen = unsure && !past;
   return (
     <>
       {bar({
-        crumbs: [
-          { label: "Runs", to: "/runs" },
-          {
-            label: newest.graph_name,
-            ...(newest.graph === null ? {} : { to: `/graphs/${newest.graph}` }),
-          },
-          { label: `Run ${newest.number}` },
-        ],
-        status: (
-          <>
-            <StateLabel
-              pill
-              tone={seen ? "unknown" : tone}
-              word={seen ? since : run.ended_at === null ? word : runEndText(run)}
-            />
-            {past && <span className={style.simulated}>as it was then</span>}
-            {newest.simulated && <span className={style.simulated}>simulated</span>}
-          </>
-        ),
+        crumbs: crumbsOf(newest),
+        status: <RunStatus newest={newest} run={run} past={past} unsure={unsure} />,
         actions: (
           <>
             <PinRun runner={runner} run={newest.id} />
@@ -182,63 +289,26 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
             />
           </ReactFlowProvider>
         </section>
-        <section className={style.strip} aria-label="Timeline">
-          <PlayerControls replay={replay} goes={goes} />
-          {replay.failed !== null && (
-            <p className={style.failed} role="alert">
-              The replay cannot be loaded: {errorText(replay.failed)}
-            </p>
-          )}
-          <Timeline
-            run={newest}
-            lanes={lanes}
-            until={until}
-            unsure={unsure}
-            selected={selected}
-            onPick={setSelected}
-            cursor={replay.at}
-            onSeek={replay.seek}
-            signs={signs}
-            gaps={gaps}
-            others={mates}
-          />
-        </section>
-        <aside className={style.side} aria-label="About the run">
-          <Tabs defaultValue="events" keepMounted={false} className={style.tabs ?? ""}>
-            <Tabs.List>
-              <Tabs.Tab value="events">Events</Tabs.Tab>
-              <Tabs.Tab value="parameters">Parameters</Tabs.Tab>
-              <Tabs.Tab value="facts">Facts</Tabs.Tab>
-              <Tabs.Tab value="raw">Raw</Tabs.Tab>
-            </Tabs.List>
-            <Tabs.Panel value="events" className={style.panel ?? ""}>
-              <RunEvents
-                run={newest}
-                version={label}
-                selected={selected}
-                onPick={setSelected}
-                marks={replayData?.marks ?? NO_MARKS}
-                at={replay.at}
-                onSeek={replay.seek}
-              />
-            </Tabs.Panel>
-            <Tabs.Panel value="parameters" className={style.panel ?? ""}>
-              <RunParameters run={run} selected={selected} onPick={setSelected} />
-            </Tabs.Panel>
-            <Tabs.Panel value="facts" className={style.panel ?? ""}>
-              <RunNotes runner={runner} run={newest.id} />
-              <RunFacts
-                runner={runner}
-                run={newest}
-                version={label}
-                by={authorName(newest.author)}
-              />
-            </Tabs.Panel>
-            <Tabs.Panel value="raw" className={style.panel ?? ""}>
-              <RawEvents runner={runner} run={newest} />
-            </Tabs.Panel>
-          </Tabs>
-        </aside>
+        <RunTimeline
+          newest={newest}
+          graph={graph}
+          replay={replay}
+          replayData={replayData}
+          until={until}
+          unsure={unsure}
+          selected={selected}
+          onPick={setSelected}
+          mates={mates}
+        />
+        <AboutRun
+          runner={runner}
+          newest={newest}
+          replay={replay}
+          label={label}
+          marks={replayData?.marks ?? NO_MARKS}
+          selected={selected}
+          onSelect={setSelected}
+        />
       </main>
       {again !== null && start(again, () => setAgain(null))}
     </>

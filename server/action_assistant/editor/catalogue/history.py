@@ -107,25 +107,37 @@ def _entries(
                     continue
                 else:
                     entry = replace(entry, seq=seq, from_seq=seq)
-            case h.CREATED:
-                entry = replace(entry, kind="created", seq=1)
             case h.IMPORTED if last is not None:
                 last = replace(last, kind="imported")
                 continue
-            case h.PUBLISHED:
-                version = versions[row.seq]
-                entry = replace(entry, kind="published", seq=version.seq, version=version)
-            case h.DELETED:
-                entry = replace(entry, kind="deleted")
-            case h.RECOVERED:
-                entry = replace(entry, kind="recovered")
             case _:
-                continue
+                told = _of_the_whole(row, entry, versions)
+                if told is None:
+                    continue
+                entry = told
         if last is not None:
             yield last
         last = entry
     if last is not None:
         yield last
+
+
+def _of_the_whole(
+    row: Row[Any], entry: HistoryEntry, versions: Mapping[int, VersionView]
+) -> HistoryEntry | None:
+    """The entry of an event about the graph as a whole; None for those that nobody is told."""
+    match row.kind:
+        case h.CREATED:
+            return replace(entry, kind="created", seq=1)
+        case h.PUBLISHED:
+            version = versions[row.seq]
+            return replace(entry, kind="published", seq=version.seq, version=version)
+        case h.DELETED:
+            return replace(entry, kind="deleted")
+        case h.RECOVERED:
+            return replace(entry, kind="recovered")
+        case _:
+            return None
 
 
 def _same_go(last: HistoryEntry, entry: HistoryEntry) -> bool:

@@ -12,6 +12,7 @@ from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import ForeignClient, Panicked, Replica, TooMuchWaits
 from action_assistant.editor.crdt.trial import TooSlow, TriedOutline, tried
+from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
 from action_assistant.editor.rooms.member import Member
 from action_assistant.errors import BadInput, Refused, TooLarge
 from action_assistant.web.auth.caller import acting_for
@@ -126,6 +127,30 @@ def _answer(error: Objection) -> tuple[int, Refused, str | None]:
             return messages.FORBIDDEN, BadInput("Not allowed."), None
         case NotNow():
             return messages.TOO_SLOW, error.cause, "the server is busy, come again"
+
+
+async def tried_first(offer: Offer, replica: Replica, tried: RunInWorker) -> UpdateOutline | None:
+    """Its outline; None where it has to be read again, since in a document with depth also what
+    lies beside something deep counts. Raises Malformed, Panicked, TooSlow, NotNow, QuotaExceeded."""
+    read = None if len(offer.update) > LARGE else outline(offer.update)
+    released = [] if read is None else replica.freed_by(read)
+    freed = sum(map(len, released))
+    small = read is not None and freed <= LARGE
+    if small and not replica.opening.is_doubtful_with(len(offer.update) + freed):
+        return read
+    state = replica.doc.get_update()
+    waiting = replica.waiting if read is None else released
+    found = await tried_for(offer.author, tried, state, offer.update, waiting)
+    replica.opening.opened(found.opening, len(state))
+    replica.opening.refuse(found)
+    return None if replica.nesting.spans else found
+
+
+def fail(item: Item, reason: Refused) -> None:
+    """Tell whoever waits for it that it will not be done."""
+    if isinstance(item, Ask | Compare) or item.done is None or item.done.done():
+        return
+    item.done.set_exception(reason)
 
 
 async def tried_for(

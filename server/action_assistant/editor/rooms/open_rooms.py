@@ -76,7 +76,7 @@ class Rooms:
     @property
     def divergences(self) -> int:
         """How often a page showed something else than its room, since this process began."""
-        return self._divergences + sum(room.divergences for room in self.open_rooms())
+        return self._divergences + sum(room.comparisons.divergences for room in self.open_rooms())
 
     def expel(self, stream: str) -> None:
         """Send everyone away from a graph that is no more."""
@@ -134,7 +134,7 @@ class Rooms:
     def _forget(self, room: Room) -> None:
         if self._rooms.get(room.stream) is room:
             del self._rooms[room.stream]
-            self._divergences += room.divergences
+            self._divergences += room.comparisons.divergences
 
     def _unload(self, stream: str) -> None:
         self._timers.pop(stream, None)

@@ -13,7 +13,7 @@ from typing import Final, TypeVar
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.loading import Loaded, load
-from action_assistant.editor.crdt.messages import Malformed, PresenceEntry
+from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import (
     ForeignClient,
     Panicked,
@@ -23,9 +23,7 @@ from action_assistant.editor.crdt.replica import (
     UpdateEffect,
 )
 from action_assistant.editor.crdt.trial import TooSlow
-from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
-from action_assistant.editor.documents.contents import shown
-from action_assistant.editor.documents.fingerprint import Fingerprint
+from action_assistant.editor.crdt.update_scan import UpdateOutline
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
 from action_assistant.editor.rooms.batch import (
     LARGE,
@@ -39,13 +37,16 @@ from action_assistant.editor.rooms.batch import (
     Taken,
     batch_of,
     before_doubt,
+    fail,
     merged,
     refuse,
-    tried_for,
+    tried_first,
 )
 from action_assistant.editor.rooms.batch_window import BatchWindow
+from action_assistant.editor.rooms.comparisons import Comparisons
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.presence import PresenceNews, RoomPresence
+from action_assistant.editor.rooms.presence_spread import PresenceSpread
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
@@ -58,6 +59,7 @@ T = TypeVar("T")
 
 SNAPSHOT_EVERY: Final = 1000  # events
 SNAPSHOT_BYTES: Final = 16 << 20  # of events
+_DAMAGED: Final = "This graph can only be read: change {} of its history is damaged."
 _CLOSING: Final = "This graph is being closed; try again."
 
 
@@ -90,11 +92,8 @@ class Room:
         self._tried = tried
         self._unkept = 0  # bytes of updates since the last snapshot
         self._naming = False
-        self._said: dict[int, tuple[PresenceEntry, Member]] = {}  # in this window, about themselves
-        self.divergences = 0
-        self._fingerprint: tuple[int, Fingerprint] | None = None
-        self._compares: list[Compare] = []
-        self._comparing: asyncio.Task[None] | None = None
+        self._spread: Final = PresenceSpread(self.members, window)
+        self.comparisons: Final = Comparisons(self, run_in_worker)
         self._waiting: list[Item] = []
         self._in_hand: list[Item] = []
         self._ended = False
@@ -110,7 +109,7 @@ class Room:
         self.members.add(member)
         if self.damaged is not None:
             member.edits = False
-            member.post_read_only(self._why_not())
+            member.post_read_only(_DAMAGED.format(self.damaged.seq))
         if member.edits:
             # Not from a batch that is being committed: an older state only asks for more.
             member.post(messages.question(self._replica.doc.get_state()))
@@ -119,7 +118,7 @@ class Room:
     def leave(self, member: Member) -> None:
         """A socket is gone, and what it said about itself with it."""
         self.members.discard(member)
-        self._tell_presence(self.attendance.leave(member.seat), member)
+        self._spread.tell(self.attendance.leave(member.seat), member)
 
     def hear(self, member: Member, message: messages.Message) -> None:
         """Something that a socket says. Never blocks; the answer comes through the member."""
@@ -136,26 +135,9 @@ class Room:
             case messages.CompareMessage():
                 self._enter(Compare(member, message))
             case messages.Presence(entries):
-                self._tell_presence(self.attendance.hear(member.seat, entries), member)
+                self._spread.tell(self.attendance.hear(member.seat, entries), member)
             case messages.WhoIsThere():
                 member.post_presence(PresenceNews(self.attendance.everyone()))
-
-    def _tell_presence(self, entries: Sequence[PresenceEntry], speaker: Member) -> None:
-        """Tell the others at the end of this window; of each client only the last word."""
-        if entries and not self._said:
-            self._window.when_open(self._spread)
-        for entry in entries:
-            self._said[entry.client] = entry, speaker
-
-    def _spread(self) -> None:
-        said, self._said = self._said, {}
-        speakers = {speaker for _, speaker in said.values()}
-        everything = PresenceNews(entry for entry, _ in said.values())
-        for member in self.members:
-            if member not in speakers:
-                member.post_presence(everything)
-            elif others := [entry for entry, speaker in said.values() if speaker is not member]:
-                member.post_presence(PresenceNews(others))
 
     # --- the door -------------------------------------------------------------------------------
 
@@ -165,7 +147,7 @@ class Room:
         Raises BadInput, Unavailable. Returns after the commit, also when nothing changed.
         """
         if self.damaged is not None:
-            raise Conflict(self._why_not())
+            raise Conflict(_DAMAGED.format(self.damaged.seq))
         if self._ended:
             raise Unavailable(_CLOSING)
         done: asyncio.Future[int] = asyncio.get_running_loop().create_future()
@@ -205,12 +187,6 @@ class Room:
         await self._quiet.wait()
         self._task.cancel()
         await asyncio.wait([self._task])
-
-    def _why_not(self) -> str:
-        damaged = self.damaged
-        if damaged is None:
-            return ""
-        return f"This graph can only be read: change {damaged.seq} of its history is damaged."
 
     def _enter(self, item: Item) -> None:
         if self._ended:
@@ -258,7 +234,7 @@ class Room:
         for ask in taken.asks:
             self._answer(ask)
         for compare in taken.compares:
-            self._compare(compare)
+            self.comparisons.ask(compare)
         for look in taken.looks:
             self._show(look)
         if self.seq - self._kept >= SNAPSHOT_EVERY or self._unkept >= SNAPSHOT_BYTES:
@@ -311,31 +287,13 @@ class Room:
         try:
             read = None
             if member is None or (member.edits and not member.refused):
-                read = await self._tried_first(offer)
+                read = await tried_first(offer, self._replica, self._tried)
         except (Malformed, TooSlow, Panicked, NotNow, QuotaExceeded) as error:
             log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
             refuse(offer, error)
             return taken
         self._take_in(offer, taken, read)
         return taken
-
-    async def _tried_first(self, offer: Offer) -> UpdateOutline | None:
-        """Its outline; None where it has to be read again, since in a document with depth also what
-        lies beside something deep counts. Raises Malformed, Panicked, TooSlow, NotNow,
-        QuotaExceeded."""
-        read = None if len(offer.update) > LARGE else outline(offer.update)
-        released = [] if read is None else self._replica.freed_by(read)
-        freed = sum(map(len, released))
-        opening = self._replica.opening
-        small = read is not None and freed <= LARGE
-        if small and not opening.is_doubtful_with(len(offer.update) + freed):
-            return read
-        state = self._replica.doc.get_update()
-        waiting = self._replica.waiting if read is None else released
-        tried = await tried_for(offer.author, self._tried, state, offer.update, waiting)
-        self._replica.opening.opened(tried.opening, len(state))
-        self._replica.opening.refuse(tried)
-        return None if self._replica.nesting.spans else tried
 
     def _take_in(self, offer: Offer, taken: Taken, read: UpdateOutline | None = None) -> None:
         """Apply one edit, or refuse it."""
@@ -419,48 +377,6 @@ class Room:
         ask.member.synced = True
         ask.member.post_ack(self.seq)
 
-    def _compare(self, compare: Compare) -> None:
-        """Tell a client what it should show, if nothing has changed since it looked."""
-        said = compare.shown
-        if said.seq != self.seq:
-            return
-        self._compares.append(compare)
-        if self._comparing is None:
-            self._comparing = asyncio.create_task(self._compare_all())
-
-    async def _compare_all(self) -> None:
-        """What a document shows is looked at aside: that takes a second for a large one."""
-        try:
-            while self._compares:
-                found = await self._shown()
-                asked, self._compares = self._compares, []
-                for compare in asked:
-                    if compare.shown.seq == found[0]:
-                        self._say_whether_same(compare, found[1])
-        except Refused as error:
-            log.warning("%s: nothing was compared: %s", self.stream, error.detail)
-            self._compares = []
-        finally:
-            self._comparing = None
-
-    async def _shown(self) -> tuple[int, Fingerprint]:
-        """What is shown, and at which seq. Nothing is on its way meanwhile that was not there."""
-        replica = await self.quiet()
-        seq = self.seq
-        if self._fingerprint is None or self._fingerprint[0] != seq:
-            state = replica.doc.get_update()
-            self._fingerprint = seq, await self._run_in_worker(shown, state)
-        return self._fingerprint
-
-    def _say_whether_same(self, compare: Compare, found: Fingerprint) -> None:
-        said = compare.shown
-        if (said.entries, said.total) != (found.entries, found.total):
-            self.divergences += 1
-            log.error(
-                "%s: %s shows something else at %d", self.stream, compare.member.person.id, said.seq
-            )
-        compare.member.post(messages.compared(said.seq, found.entries, found.total))
-
     def _show(self, look: Look) -> None:
         if look.done.done():  # nobody waits any more
             return
@@ -491,15 +407,9 @@ class Room:
         """Nobody is told anything that is not stored; everyone may come again."""
         self._ended = True
         for item in [*self._in_hand, *self._waiting]:
-            if (
-                not isinstance(item, Ask | Compare)
-                and item.done is not None
-                and not item.done.done()
-            ):
-                item.done.set_exception(reason)
+            fail(item, reason)
         self._waiting = []
-        if self._comparing is not None:
-            self._comparing.cancel()
+        self.comparisons.cancel()
         self._quiet.set()
         for member in self.members:
             member.close(messages.RESTARTING)

@@ -12,6 +12,7 @@ import msgspec
 from sqlalchemy import Executable
 from sqlalchemy.dialects.sqlite import insert as upsert
 
+from action_assistant.errors import Conflict
 from action_assistant.journal.events import Event
 from action_assistant.runner.runs.durations import of_visit
 from action_assistant.runner.runs.events import Author
@@ -236,3 +237,24 @@ def fold(event: Event) -> Sequence[Executable]:
             return (expectation.delete().where(expectation.c.name == gone.name),)
         case _:
             return ()
+
+
+def check_alike(found: Run, course: tuple[ExpectedStep, ...]) -> None:
+    """A run that the simulator cannot repeat is no expectation: it would fail by itself. Raises
+    Conflict."""
+    simulated: dict[str, list[str]] = {}
+    for step in course:
+        if step.what == "result":
+            own = step.graph == found.graph_name
+            name = step.node if own else f"{step.graph}/{step.node}"
+            simulated.setdefault(name, []).append(step.how.removeprefix("on_"))
+    for name, action in found.actions.items():
+        seen = [visit.result for visit in action.visits if visit.result not in {None, "stopped"}]
+        again_ = [each for each in simulated.get(name, []) if each != "stopped"]
+        if len(seen) == len(action.visits) and seen != again_:
+            raise Conflict(
+                f"The simulator does not repeat this run: {name} ended {', '.join(again_) or 'never'} "
+                f"there, and {', '.join(map(str, seen)) or 'never'} in the run. Its arrows may "
+                "depend on something that was not recorded.",
+                where={"path": "/run", "action": name},
+            )

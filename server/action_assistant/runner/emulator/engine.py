@@ -7,7 +7,6 @@ refusals that only its log knows (docs/umrf-and-the-engine.md 4, and recordings 
 """
 
 import random
-from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 from heapq import heappop, heappush
@@ -15,8 +14,8 @@ from itertools import count
 from math import inf
 from typing import Final, TypeAlias, assert_never
 
+from action_assistant.runner.emulator.inbox import Inbox
 from action_assistant.runner.emulator.messages import (
-    TOPICS,
     EmulatedIndex,
     EngineTraits,
     FeedbackMessage,
@@ -33,17 +32,17 @@ from action_assistant.runner.emulator.messages import (
     Stop,
     active,
     asked_for,
+    engine_inside,
     graph_plan_of,
     refusal,
     unknown,
 )
 from action_assistant.runner.emulator.view import PublishedGraphs
 from action_assistant.umrf.facts import PINNED, EngineFacts
-from action_assistant.umrf.semantics import Engine, Execution, GraphRefused, Script, Trace
+from action_assistant.umrf.semantics import Execution, GraphRefused, Script, Trace
 
 _NEXT_MS: Final = 0.2  # between two messages that wait
 _TOLD_MS: Final = 10.0  # from the end of a stop to the line that says so
-_GETS: Final = 10  # requests that wait, by the depth of a service
 _TAIL_MS: Final = 1_500.0  # an idle engine that was told to quit takes so long
 _FORWARD: Final = "   fwd [in modifyGraph]: forwarding\n"
 _BUSY: Final = frozenset({"RUNNING", "PAUSED", "STOPPING", "CLEARING"})
@@ -77,22 +76,14 @@ class EmulatedEngine:
         self.gone = ""  # why its process has ended
         self._facts = facts
         self._index = index
-        self._engine = Engine(
-            facts=facts,
-            script=script,
-            library={name: plan.graph for name, plan in index.graphs.items()},
-            actor=first,
-            signatures=index.actions if index.actions and quirks.checks_actions else None,
-            loading_ms=quirks.loading_ms,
-        )
+        self._engine = engine_inside(index, quirks, facts, script, first)
         self._now = self._tick = born_ms
         self._out: list[Said] = []
         self._tasks: list[tuple[float, int, Callable[[], None]]] = []
         self._order = count()
         self._view = PublishedGraphs(self._engine, index, quirks, random.Random(seed), epoch_ms)
         self._drains = False
-        self._waiting: dict[str, deque[Message]] = {topic: deque() for topic in TOPICS}
-        self._gets: deque[int] = deque(maxlen=_GETS)
+        self._inbox = Inbox(quirks.depth)
         self._works = False  # a turn of its thread is planned
         self._under_way: list[Callable[[], None]] = []
         self._lingers = 0
@@ -135,17 +126,14 @@ class EmulatedEngine:
     def _arrive(self, message: Message) -> None:
         if self._deaf or self.gone:
             return
-        waiting = self._waiting[message.topic]
-        if self.quirks.depth and len(waiting) >= self.quirks.depth:
-            waiting.popleft()
-        waiting.append(message)
+        self._inbox.put(message)
         self._plan_work(self.quirks.reaction_ms)
 
     def ask(self, ticket: int, at_ms: float) -> None:
         """A get has arrived; its answer carries the ticket, if one ever comes."""
         self._pass(at_ms)
         if not self._deaf and not self.gone:
-            self._gets.append(ticket)
+            self._inbox.put_get(ticket)
             self._plan_work(self.quirks.reaction_ms)
 
     def advance(self, to_ms: float) -> list[Said]:
@@ -170,9 +158,7 @@ class EmulatedEngine:
         """It is told to end (SIGINT): deaf and mute from now on, it drives its graphs to their end."""
         self._pass(at_ms)
         self._deaf = True
-        for waiting in self._waiting.values():
-            waiting.clear()
-        self._gets.clear()
+        self._inbox.clear()
         self._view.drained()
         self._leave_if_idle()
 
@@ -225,13 +211,13 @@ class EmulatedEngine:
         self._works = False
         if self._blocked or self._deaf:
             return
-        waiting = next((each for each in self._waiting.values() if each), None)
-        if waiting:
-            self._obey(waiting.popleft())
-        elif self._gets:
-            self._answer(self._gets.popleft())
-        else:
-            return
+        match self._inbox.taken():
+            case None:
+                return
+            case int() as ticket:
+                self._answer(ticket)
+            case message:
+                self._obey(message)
         self._plan_work(_NEXT_MS)
 
     def _hold(self, then: Callable[[], None]) -> None:

@@ -7,8 +7,10 @@ from typing import Any, ClassVar, Final, TypeAlias
 import msgspec
 
 from action_assistant.umrf import check as checks
+from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Key, Signature
+from action_assistant.umrf.semantics import Engine, Script
 from action_assistant.umrf.semantics.printing import printed_action
 from action_assistant.umrf.signatures import signature_of
 
@@ -222,6 +224,20 @@ def index_of(actions: Iterable[str], graphs: Iterable[str]) -> EmulatedIndex:
             continue
         plans.setdefault(plan.graph.name, plan)
     return EmulatedIndex(tuple(texts), found, plans)
+
+
+def engine_inside(
+    index: EmulatedIndex, quirks: EngineTraits, facts: EngineFacts, script: Script, actor: str
+) -> Engine:
+    """What runs the graphs, without the node around it."""
+    return Engine(
+        facts=facts,
+        script=script,
+        library={name: plan.graph for name, plan in index.graphs.items()},
+        actor=actor,
+        signatures=index.actions if index.actions and quirks.checks_actions else None,
+        loading_ms=quirks.loading_ms,
+    )
 
 
 def asked_for(message: Start, index: EmulatedIndex, held: Container[str]) -> GraphPlan:

@@ -78,17 +78,8 @@ async def modify(
             "stop it and start the new version."
         )
     asked = decoded(body, ModifyRequest)
-    start = StartRequest(
-        version=asked.version,
-        digest=asked.digest,
-        umrf=asked.umrf,
-        engine=SIMULATOR if run.simulated else run.engine,
-        request_id=run.request_id,
-        graph=run.graph,
-        override=asked.override,
-    )
     facts = SIMULATED if engine is None else engine.facts
-    ready = await run_in_worker(prepared, start, facts, run.id)
+    ready = await run_in_worker(prepared, _as_start(asked, run), facts, run.id)
     if engine is not None:
         await _require_matched(engine, ready.umrf, run_in_worker)
     _require_moving(opened.run)  # somebody may have stopped it meanwhile
@@ -107,6 +98,19 @@ async def modify(
     except EngineRefused as why:
         raise Conflict(f"The engine refuses the change: {why}") from why
     return opened.run
+
+
+def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
+    """What would start the other version, which is looked at in the same way."""
+    return StartRequest(
+        version=asked.version,
+        digest=asked.digest,
+        umrf=asked.umrf,
+        engine=SIMULATOR if run.simulated else run.engine,
+        request_id=run.request_id,
+        graph=run.graph,
+        override=asked.override,
+    )
 
 
 async def _require_matched(engine: KnownEngine, umrf: str, run_in_worker: RunInWorker) -> None:

@@ -1,16 +1,14 @@
 """The review service: sums up ended runs, keeps marks, compares, exports, checks expectations."""
 
 import logging
-from collections import Counter
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
 from typing import Any, Concatenate, Final, Literal, ParamSpec, Protocol, TypeAlias, TypeVar
 
-import anyio
 import msgspec
-from sqlalchemy import Row, Select, func, select
+from sqlalchemy import Row, Select, select
 
-from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf, Refused, TooLarge
+from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf
 from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
 from action_assistant.runner.analysis.cause_texts import words
@@ -22,14 +20,14 @@ from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.archive_store import Archived, ArchiveStore
 from action_assistant.runner.archives.raw_messages import RawMessages, RawPut, raw_of, stream_of_raw
 from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.review.ongoing_runs import OngoingRuns
+from action_assistant.runner.review.sum_up_loop import SumUpLoop
 from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.runs.history import RunHistory
-from action_assistant.runner.runs.recorder import RunRecorder, stream_of
+from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.workers import Crashed
-from action_assistant.schema.runner_tables import expectation, review, run, run_label
+from action_assistant.schema.runner_tables import expectation, review, run_label
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
@@ -40,13 +38,10 @@ log: Final = logging.getLogger(__name__)
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_TRIES: Final = 3
 _LAST: Final = 1_000  # runs in one statistics
 _CAUSES: Final = 10  # in one answer
-_AT_ONCE: Final = 200  # runs summed up between two looks
 _ROWS: Final = 400  # parameters of one query
 _PAGE: Final = 500  # events exported at once
-_CLOCK: Final = 3_600_000_000  # microseconds by which a clock may be set back
 
 Format: TypeAlias = Literal["jsonl", "csv", "mcap"]
 
@@ -98,32 +93,6 @@ class ReviewQueries(Protocol):
         ...
 
 
-class OngoingRun(Protocol):
-    """A run that goes on."""
-
-    run: Run
-    recorder: RunRecorder
-
-
-class OngoingRuns(Protocol):
-    """What goes on, as far as looking back needs it: open runs, and how others are read."""
-
-    history: RunHistory
-
-    @property
-    def open(self) -> Mapping[str, OngoingRun]:
-        """The runs that are not over."""
-        ...
-
-    def next_number(self) -> int:
-        """The number of a run that is taken in."""
-        ...
-
-    def watch(self, watcher: Callable[[OngoingRun], None]) -> None:
-        """Be told, at once, of every run that has changed."""
-        ...
-
-
 class ReviewService:
     """Looks back on runs. Nothing here commands a robot. What only reads is asked of a worker that
     has a desk of its own (`stored.Asked`), over the same file and with nothing that goes on."""
@@ -142,70 +111,16 @@ class ReviewService:
         self._ledger = ledger
         self._run_in_worker = run_in_worker
         self._clock_us = clock_us
-        self._ended = anyio.Event()
-        self._summed_up: int | None = None  # all runs that had ended by then are summed up
-        self._tried: Counter[str] = Counter()  # runs whose sums took a worker's life
-        control.watch(self._saw)
-
-    def _saw(self, opened: OngoingRun) -> None:
-        if opened.run.end is not None:
-            if not opened.recorder.recorded:
-                self._summed_up = None  # it may be stored long after it ended
-            self._ended.set()
+        self._sums = SumUpLoop(ledger, control, clock_us, self._summed)
 
     async def run(self) -> None:
         """Sum up runs that have ended, those of earlier processes too, until cancelled."""
-        while True:
-            ended, self._ended = self._ended, anyio.Event()
-            try:
-                left = await self._sum_up_some()
-            except Refused as refused:
-                log.warning("runs cannot be summed up now: %s", refused.detail)
-                await anyio.sleep(5)
-                continue
-            if left:
-                continue
-            if ended.is_set():  # its last events may still be on their way to the journal
-                await anyio.sleep(0.2)
-                continue
-            await self._ended.wait()
+        await self._sums.run()
 
-    async def _sum_up_some(self) -> bool:
-        """Sum up the newest runs that are over and are not yet. Whether any was."""
-        before, since = self._clock_us(), self._summed_up
-        figures = func.coalesce(func.json_extract(run.c.summary, "$.figures"), 0)
-        done = select(review.c.run).where(
-            review.c.run == run.c.id, review.c.summed, figures == annotations.FIGURES
-        )
-        query = (
-            select(run.c.id)
-            .where(run.c.archived_at.is_(None), run.c.ended_at > (since or 0), ~done.exists())
-            .order_by(run.c.number.desc())
-            .limit(_AT_ONCE)
-        )
-        rows = await self._ledger.query(query)
-        for row in rows:
-            await self._sum_up(row.id)
-        if not rows:
-            self._summed_up = before - _CLOCK
-        return bool(rows)
-
-    async def _sum_up(self, run_id: str) -> None:
-        try:
-            if self._asked is None:
-                summed = await self.summed(run_id, self._clock_us())
-            else:
-                summed = await self._asked.value(ReviewService.summed, run_id, self._clock_us())
-        except Refused as refused:
-            self._tried[run_id] += 1
-            if self._tried[run_id] < _TRIES or not isinstance(refused, Crashed | TooLarge):
-                raise  # it will be, later
-            log.error("run %s is left out of sums: %s", run_id, refused.detail)
-            summed = annotations.SummedUp(self._clock_us(), {})
-        except Exception:  # whatever a run of long ago holds, those that go on are not ended by it
-            log.exception("run %s cannot be read; it is left out of sums", run_id)
-            summed = annotations.SummedUp(self._clock_us(), {}, figures=annotations.FIGURES)
-        await self._ledger.append(annotations.stream_about(run_id), [annotations.draft(summed)])
+    async def _summed(self, run_id: str) -> annotations.SummedUp:
+        if self._asked is None:
+            return await self.summed(run_id, self._clock_us())
+        return await self._asked.value(ReviewService.summed, run_id, self._clock_us())
 
     async def summed(self, run_id: str, now: int) -> annotations.SummedUp:
         """The sum of a run that is over. Raises NotFound."""
@@ -388,8 +303,7 @@ class ReviewService:
                 begin = examples.numbered(first, self._control.next_number())
                 await self._ledger.append(stream, [begin, *rest], expected=0)
             taken.append(first.run)
-        self._summed_up = None  # they ended long ago
-        self._ended.set()
+        self._sums.begin_again()  # they ended long ago
         return taken
 
     # --- expectations -------------------------------------------------------------------------
@@ -423,7 +337,7 @@ class ReviewService:
         recorded = expected_runs.recorded(found)
         script = {"behaviours": recorded.behaviours}
         course = expected_runs.course(codec.read(umrf.encode()).graph, script_from(script))
-        _check_alike(found, course)
+        expected_runs.check_alike(found, course)
         return expected_runs.Expected(
             at=now,
             name=name,
@@ -452,26 +366,6 @@ class ReviewService:
         retired = expected_runs.Retired(self._clock_us(), name, author)
         draft = Draft(retired.kind, author.id, msgspec.json.encode(retired))
         await self._ledger.append(expected_runs.STREAM, [draft])
-
-
-def _check_alike(found: Run, course: tuple[expected_runs.ExpectedStep, ...]) -> None:
-    """A run that the simulator cannot repeat is no expectation: it would fail by itself."""
-    simulated: dict[str, list[str]] = {}
-    for step in course:
-        if step.what == "result":
-            own = step.graph == found.graph_name
-            name = step.node if own else f"{step.graph}/{step.node}"
-            simulated.setdefault(name, []).append(step.how.removeprefix("on_"))
-    for name, action in found.actions.items():
-        seen = [visit.result for visit in action.visits if visit.result not in {None, "stopped"}]
-        again_ = [each for each in simulated.get(name, []) if each != "stopped"]
-        if len(seen) == len(action.visits) and seen != again_:
-            raise Conflict(
-                f"The simulator does not repeat this run: {name} ended {', '.join(again_) or 'never'} "
-                f"there, and {', '.join(map(str, seen)) or 'never'} in the run. Its arrows may "
-                "depend on something that was not recorded.",
-                where={"path": "/run", "action": name},
-            )
 
 
 def _shown(saved: expected_runs.Expected) -> Expectation:

@@ -19,7 +19,8 @@ from action_assistant.journal.events import Draft, StreamSnapshot
 from action_assistant.journal.reader import FileJournalReader
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives.archive_store import ArchiveStore
-from action_assistant.runner.review.service import OngoingRun, ReviewService
+from action_assistant.runner.review.ongoing_runs import OngoingRun
+from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.runs.history import Ledger, RunHistory
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run

@@ -104,31 +104,12 @@ def follow(run: Run, event: RunEvent) -> Run:
             )
         case Observed():
             return observe(run, event.seen)
-        case PauseRequested():
-            held = _held(run)
-            return held if run.desired == "stopped" else replace(held, desired="paused")
-        case ResumeRequested():
-            return run if run.desired == "stopped" else replace(run, desired="running")
+        case PauseRequested() | ResumeRequested() | StopRequested():
+            return _desired(run, event)
         case ModifyRequested():
-            actions = {
-                name: replace(run.actions.get(name, ActionRun()), aid=aid)
-                for name, aid in event.actions.items()
-            }
-            return replace(
-                run,
-                version=event.version,
-                digest=event.digest,
-                actions=run.actions | actions,
-                reshaped=True,
-            )
+            return _modified(run, event)
         case ModifyRefused():
             return _unmodified(run, event)
-        case StopRequested():
-            if run.desired == "stopped":
-                return run
-            return replace(
-                run, desired="stopped", stop_requested_at=event.at, stopped_by=event.author
-            )
         case StopSent():
             return replace(run, stops_sent=run.stops_sent + (0 if event.failed else 1))
         case Proof():
@@ -138,8 +119,7 @@ def follow(run: Run, event: RunEvent) -> Run:
         case Answered():
             return replace(run, unknown_since=None, lost="")
         case AlarmRaised():
-            alarm = Alarm(event.code, event.at, event.text)
-            return replace(_meddled(run, event.code), alarms=(*run.alarms, alarm)[-KEPT:])
+            return _alarmed(run, event)
         case MovesAgain():
             return _reopen(run, event)
         case EngineSaid():
@@ -156,9 +136,33 @@ def follow(run: Run, event: RunEvent) -> Run:
             assert_never(event)
 
 
+def _desired(run: Run, event: PauseRequested | ResumeRequested | StopRequested) -> Run:
+    """What people want of it: nothing takes a stop back."""
+    is_stopped = run.desired == "stopped"
+    match event:
+        case PauseRequested():
+            held = _held(run)
+            return held if is_stopped else replace(held, desired="paused")
+        case ResumeRequested():
+            return run if is_stopped else replace(run, desired="running")
+        case StopRequested() if is_stopped:
+            return run
+        case StopRequested():
+            return replace(
+                run, desired="stopped", stop_requested_at=event.at, stopped_by=event.author
+            )
+        case _:
+            assert_never(event)
+
+
 def _held(run: Run) -> Run:
     actions = {name: paused(action) for name, action in run.actions.items()}
     return replace(run, actions=actions)
+
+
+def _alarmed(run: Run, event: AlarmRaised) -> Run:
+    alarm = Alarm(event.code, event.at, event.text)
+    return replace(_meddled(run, event.code), alarms=(*run.alarms, alarm)[-KEPT:])
 
 
 def _meddled(run: Run, alarm: str) -> Run:
@@ -220,6 +224,20 @@ def _thin(run: Run, shown: Snapshot) -> Snapshot:
                 said[node] = messages
     inputs = {name: values for name, values in shown.inputs.items() if name in news}
     return replace(shown, nodes=news, messages=said, inputs=inputs, same=True)
+
+
+def _modified(run: Run, event: ModifyRequested) -> Run:
+    actions = {
+        name: replace(run.actions.get(name, ActionRun()), aid=aid)
+        for name, aid in event.actions.items()
+    }
+    return replace(
+        run,
+        version=event.version,
+        digest=event.digest,
+        actions=run.actions | actions,
+        reshaped=True,
+    )
 
 
 def _unmodified(run: Run, event: ModifyRefused) -> Run:

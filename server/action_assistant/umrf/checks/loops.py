@@ -104,11 +104,17 @@ def loops(
                     above = work[-1][0]
                     low[above] = min(low[above], low[key])
                 if low[key] == index[key]:
-                    component = [stack.pop()]
-                    while component[-1] != key:
-                        component.append(stack.pop())
-                    component.reverse()
+                    component = _taken_from(stack, key)
                     on_stack.difference_update(component)
                     if len(component) > 1 or key in ways(key):
                         found.append(component)
     return found
+
+
+def _taken_from(stack: list[Key], lowest: Key) -> list[Key]:
+    """Takes off everything down to that key, which comes first."""
+    taken = [stack.pop()]
+    while taken[-1] != lowest:
+        taken.append(stack.pop())
+    taken.reverse()
+    return taken

@@ -38,27 +38,28 @@ def _check_remap(
 ) -> None:
     if not relation.remap or relation.child == EXIT:
         return
-    if relation.parent == ENTRY:
-        own: _Slots = {}
-    else:
-        own = outputs[relation.parent]
     targets = inputs[relation.child]
-    sources = {remap.source for remap in relation.remap}
-    unknown = sources - set(own)
-    parent, child = subject.name(relation.parent), subject.name(relation.child)
+    own = {} if relation.parent == ENTRY else outputs[relation.parent]
+    unknown = {remap.source for remap in relation.remap} - set(own)
     if unknown and relation.parent != ENTRY:
         message = (
-            f"{parent} has no output {joined(unknown)} to rename: when it ends, the engine aborts "
-            "with every running graph."
+            f"{subject.name(relation.parent)} has no output {joined(unknown)} to rename: when it "
+            "ends, the engine aborts with every running graph."
         )
         subject.report("H2", "error", message, relation=relation, member="/remap")
         return
     useless = {remap.target for remap in relation.remap} - set(targets)
     if useless:
+        child = subject.name(relation.child)
         message = f"{child} has no input {joined(useless)}; what is renamed to it is lost."
         subject.report("remap-target", "warning", message, relation=relation, member="/remap")
-    if relation.parent == ENTRY:
-        return
+    if relation.parent != ENTRY:
+        _check_order(subject, relation, own, targets)
+
+
+def _check_order(subject: Subject, relation: Relation, own: _Slots, targets: _Slots) -> None:
+    """Renaming changes the order in which the engine looks for outputs."""
+    parent, child = subject.name(relation.parent), subject.name(relation.child)
     meant = {name: name for name in own} | {r.source: r.target for r in relation.remap}
     try:
         found = renamed(own, relation.remap, targets)

@@ -141,11 +141,7 @@ class _Way:
         here = bisect_left(course.times, at)
         usual = here < len(course.times) and course.times[here] == at
         if usual:
-            usually = course.roots[here]
-            if root not in (-1, usually) and usually not in self.apart:
-                raise Tied
-            if root < 0 and usually not in self.apart:
-                root = usually
+            root = self._root(course.roots[here], root)
         elif root < 0:
             return None
         states: dict[int, State] = {}
@@ -178,6 +174,14 @@ class _Way:
             self._since = 0
             return self._forget(after)
         return None
+
+    def _root(self, usually: int, root: int) -> int:
+        """What ends at a moment at which something usually does. Raises Tied if both do."""
+        if usually in self.apart:
+            return root
+        if root not in (-1, usually):
+            raise Tied
+        return usually
 
     def _state(self, place: int, before: int) -> State:
         own = self.apart.get(place)

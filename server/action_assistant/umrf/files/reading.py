@@ -204,8 +204,7 @@ class _Reader:
     def _read_action(self, item: dict[str, Json], path: str, used: set[str]) -> None:
         extra: Extra = []
         index = len(self.actions)
-        place = pointer("actions", index)
-        self._came_from(place, path)
+        self._came_from(pointer("actions", index), path)
         position, key, rest = action_attributes(item)
         if rest is not None:
             extra.append(("gui_attributes", rest))
@@ -232,16 +231,7 @@ class _Reader:
         )
         twins.append(index)
         self._read_run_state(item, key, path)
-        for field, lists, kind in (
-            ("parents", self.listed, self._parent),
-            ("children", self.listing, self._child),
-        ):
-            items: list[_Item] = []
-            if isinstance(value := item.get(field, []), list):
-                items = self._items(index, value, f"{path}/{field}", f"{place}/{field}", kind)
-            else:
-                extra.append((field, dump(value)))
-            lists.append(items)
+        self._read_relations(item, path, index, extra)
         extra.extend((field, dump(item[field])) for field in item if field not in _ACTION_FIELDS)
         self.actions.append(msgspec.structs.replace(action, extra=tuple(extra)))
 
@@ -257,6 +247,19 @@ class _Reader:
             )
 
     # Relations
+
+    def _read_relations(self, item: dict[str, Json], path: str, index: int, extra: Extra) -> None:
+        place = pointer("actions", index)
+        for field, lists, kind in (
+            ("parents", self.listed, self._parent),
+            ("children", self.listing, self._child),
+        ):
+            items: list[_Item] = []
+            if isinstance(value := item.get(field, []), list):
+                items = self._items(index, value, f"{path}/{field}", f"{place}/{field}", kind)
+            else:
+                extra.append((field, dump(value)))
+            lists.append(items)
 
     def _items(
         self, owner: int, items: list[Json], path: str, place: str, kind: _Kind

@@ -69,24 +69,13 @@ def application(
     """The whole application. Routes may read less or more than `body_limit` bytes. `page` and
     `runner_port` are the editor's: it serves the page, whose Content-Security-Policy names the
     runner. `mount` is the path at which a proxy shows this process."""
-    decisions: dict[tuple[str, str], Deed] = {}
-    api = _OpenApiText(decisions)
-    inner = Litestar(
-        [
-            *route_handlers,
-            *_health(ready, measures),
-            _proving(keys),
-            *([misrouted(runner_port)] if runner_port is not None else []),
-        ],
-        guards=[_undecided],
-        exception_handlers=problem_handlers(),
-        lifespan=list(lifespan),
-        openapi_config=_openapi(title, api),
-        request_max_body_size=body_limit,
-        logging_config=None,
-    )
-    decisions.update(_decisions(inner))
-    api.make = lambda: inner.openapi_schema.to_schema()
+    handlers = [
+        *route_handlers,
+        *_health(ready, measures),
+        _proving(keys),
+        *([misrouted(runner_port)] if runner_port is not None else []),
+    ]
+    inner = _routed(handlers, title, lifespan, body_limit)
 
     def root_of(scope: HTTPScope) -> str:
         state: dict[str, Any] = scope.get("state", {})
@@ -106,6 +95,29 @@ def application(
         revoked=revoked,
     )
     return _NamedRoute(Mounted(outer, mount), inner)
+
+
+def _routed(
+    handlers: list[ControllerRouterHandler],
+    title: str,
+    lifespan: Sequence[Lifespan],
+    body_limit: int,
+) -> Litestar:
+    """Routes, how they refuse, and the document that describes them."""
+    decisions: dict[tuple[str, str], Deed] = {}
+    api = _OpenApiText(decisions)
+    inner = Litestar(
+        handlers,
+        guards=[_undecided],
+        exception_handlers=problem_handlers(),
+        lifespan=list(lifespan),
+        openapi_config=_openapi(title, api),
+        request_max_body_size=body_limit,
+        logging_config=None,
+    )
+    decisions.update(_decisions(inner))
+    api.make = lambda: inner.openapi_schema.to_schema()
+    return inner
 
 
 def _host(scope: HTTPScope) -> str:

@@ -70,8 +70,19 @@ def serve(
         raise
     forwarded = Forwarded(endings, proxies)
     connections = Connections(raise_limit(), forwarded.is_proxy)
+    app = ActivityTracker(forwarded, connections)
+    config = _configured(app, identity)
+    logging.getLogger("uvicorn.error").addFilter(_in_one_line)
+    server = _Server(config, endings, connections)
+    _end_with_parent(server)
+    server.run(sockets=sockets)
+    if not server.started:
+        raise CannotStart("The process could not be set up; the log above says why.")
+
+
+def _configured(app: ASGIApp, identity: "TlsIdentity | None") -> uvicorn.Config:
     config = uvicorn.Config(
-        ActivityTracker(forwarded, connections),
+        app,
         http=_Http,
         h11_max_incomplete_event_size=HEAD_LIMIT,
         lifespan="on",
@@ -90,12 +101,7 @@ def serve(
     )
     if identity is not None:
         identity.keep(config)
-    logging.getLogger("uvicorn.error").addFilter(_in_one_line)
-    server = _Server(config, endings, connections)
-    _end_with_parent(server)
-    server.run(sockets=sockets)
-    if not server.started:
-        raise CannotStart("The process could not be set up; the log above says why.")
+    return config
 
 
 class TlsIdentity:

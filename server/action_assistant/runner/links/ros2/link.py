@@ -5,7 +5,6 @@ an answer of the one server on a robot's path says what the engine holds, and on
 server stood there before and after.
 """
 
-import re
 import time
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -56,7 +55,6 @@ _SETTLE_S: Final = 1.0  # a publisher may know a subscription before that one kn
 _AGAIN_S: Final = 5.0  # until joining a domain is tried again
 
 _COMMANDS: Final = ("start", "stop", "pause", "resume", "modify")
-_GRAPH: Final = re.compile(r"[Gg]raph:? '?([^\s']+)")
 
 Join: TypeAlias = Callable[[int, Topics], Awaitable[Domain]]
 
@@ -353,9 +351,8 @@ class Ros2Link:
                     )
             case LogLine():
                 if self._said(sound.logger):
-                    text = sound.text.strip()
                     self._subscribers.tell(
-                        EngineLog(at=self._clock_us(), text=text, graph=_graph_in(text))
+                        EngineLog(at=self._clock_us(), text=sound.text.strip(), graph=sound.graph)
                     )
             case _:
                 assert_never(sound)
@@ -395,8 +392,3 @@ def _sent_or_not() -> Iterator[None]:
         yield
     except RuntimeError as error:
         raise NotSent(f"the middleware refuses it: {error}") from error
-
-
-def _graph_in(text: str) -> str | None:
-    found = _GRAPH.search(text)
-    return found[1] if found else None

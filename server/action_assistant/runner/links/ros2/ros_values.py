@@ -3,12 +3,15 @@
 `Domain` over rclpy tells its links these, and so does the air of virtual time in which tests fly.
 """
 
-from typing import TypeAlias
+import re
+from typing import Final, TypeAlias
 
 import msgspec
 
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Command, Feedback
+
+_GRAPH: Final = re.compile(r"[Gg]raph:? '?([^\s']+)")
 
 
 class Endpoint(msgspec.Struct, frozen=True):
@@ -37,6 +40,12 @@ class LogLine(msgspec.Struct, frozen=True):
 
     logger: str
     text: str
+
+    @property
+    def graph(self) -> str | None:
+        """The name of the graph that it is about, if it says one."""
+        found = _GRAPH.search(self.text.strip())
+        return found[1] if found else None
 
 
 RosValue: TypeAlias = Feedback | OverheardCommand | LogLine

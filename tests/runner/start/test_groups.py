@@ -1,0 +1,83 @@
+"""Several robots start one version together, or none of them does."""
+
+import anyio
+import pytest
+
+from action_assistant.errors import Conflict
+from action_assistant.runner.links.port import (
+    Order,
+)
+from action_assistant.runner.runs import queries
+from runner.harness import ANN, BEN, Harness, sequence, until, virtual
+from runner.registered_robots import NEVER, Open, fleet, group
+
+
+@virtual
+async def test_a_group_starts_together_and_is_stopped_together() -> None:
+    david, eve = Open(NEVER), Open(NEVER)
+    harness = Harness()
+    async with fleet(harness, David=david, Eve=eve) as control:
+        started = await control.start_group(group(sequence(), "Eve", "David"), ANN)
+        assert [run.engine for run in started.runs] == ["David", "Eve"]
+        assert {run.group for run in started.runs} == {started.group}
+        again = await control.start_group(group(sequence(), "Eve", "David"), ANN)
+        assert (again.group, again.fresh) == (started.group, False)
+        assert (len(david.starts), len(eve.starts)) == (1, 1)
+        stopped = await control.stop(started.group, BEN)
+        assert sorted(stopped) == sorted(run.id for run in started.runs)
+        await until(lambda: not control.open)
+    for run in started.runs:
+        told = harness.ledger.history(run.id)
+        assert (told.state, told.group) == ("stopped", started.group)
+
+
+@virtual
+async def test_a_start_that_is_under_way_says_so_until_its_runs_are_there() -> None:
+    harness = Harness()
+    async with fleet(harness, David=Open(NEVER), Eve=Open(NEVER)) as control:
+        asked = group(sequence(), "David", "Eve")
+        harness.ledger.slow = 1.0
+
+        async def found() -> list[str]:
+            rows = await control.history.rows(queries.of_start(asked.request_id))
+            return sorted([(await control.find(row.id)).engine for row in rows])
+
+        async with anyio.create_task_group() as tasks:
+            assert not control.under_way(asked.request_id)
+            tasks.start_soon(control.start_group, asked, ANN)
+            await anyio.sleep(0.5)
+            assert (control.under_way(asked.request_id), await found()) == (True, [])
+        assert (control.under_way(asked.request_id), await found()) == (False, ["David", "Eve"])
+        control.stop_all(BEN)
+        await until(lambda: not control.open)
+
+
+@virtual
+async def test_nothing_of_a_group_starts_when_one_robot_is_not_fit() -> None:
+    david, eve = Open(), Open()
+    async with fleet(Harness(), David=david, Eve=eve) as control:
+        eve.silent = True
+        with pytest.raises(Conflict, match="Eve does not answer"):
+            await control.start_group(group(sequence(), "David", "Eve"), ANN)
+    assert (david.starts, eve.starts) == ([], [])
+
+
+@virtual
+async def test_a_group_that_starts_in_part_says_which_robot_was_left_out() -> None:
+    harness, eve = Harness(), Open(NEVER)
+
+    class Breaks(Open):
+        async def start(self, order: Order) -> None:
+            """The disk is full right after it."""
+            harness.ledger.down = True
+            await super().start(order)
+
+    david = Breaks(NEVER)
+    async with fleet(harness, David=david, Eve=eve) as control:
+        started = await control.start_group(group(sequence(), "David", "Eve"), ANN)
+        assert [run.engine for run in started.runs] == ["David"]
+        assert "could not be recorded" in started.failed["Eve"]
+        assert eve.starts == []
+        harness.ledger.down = False
+        control.stop_all(ANN)
+        await until(lambda: not control.open)

@@ -1,0 +1,80 @@
+"""A run that cannot be stopped ends with the process of its engine, and with no other."""
+
+import subprocess
+from collections.abc import Iterator
+from typing import Any
+
+import anyio
+import msgspec
+import pytest
+
+from action_assistant.runner.links.engine_process import EngineProcess, has_ended, process
+from runner.harness import (
+    ANN,
+    Harness,
+    Robot,
+    engine,
+    order,
+    sequence,
+    until,
+    virtual,
+)
+from runner.robots_in_network import STUBBORN
+
+
+@pytest.fixture
+def child() -> Iterator[subprocess.Popen[bytes]]:
+    """A process of this computer."""
+    with subprocess.Popen(["sleep", "600"]) as started:
+        yield started
+        started.kill()
+
+
+def test_a_process_of_this_computer_is_seen_to_end_and_no_other(
+    child: subprocess.Popen[bytes],
+) -> None:
+    known = process(child.pid)
+    assert known is not None
+    assert not has_ended(known)
+    assert has_ended(msgspec.structs.replace(known, started=known.started - 1))  # number reused
+    assert not has_ended(msgspec.structs.replace(known, boot="another"))
+    assert not has_ended(msgspec.structs.replace(known, namespace="pid:[1]"))
+    child.kill()
+    while not has_ended(known):  # also before anybody has waited for it
+        pass
+    child.wait()
+    assert has_ended(known)
+    assert process(child.pid) is None
+
+
+@virtual
+async def test_a_run_ends_with_the_process_of_its_engine(child: subprocess.Popen[bytes]) -> None:
+    robot = WithProcess(engine(STUBBORN), process(child.pid))
+    harness = Harness({"David": robot})
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(robot.engine.run)
+        async with harness.runner() as control:
+            run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+            await control.stop(run, ANN)
+            await until(lambda: bool(control.open[run].run.unconfirmed))
+            child.kill()
+            child.wait()
+            await until(lambda: run not in control.open)
+            told = await control.find(run)
+            assert (told.state, told.proof_at) == ("error", None)
+            assert told.at_rest is not None
+            assert told.at_rest.by is None
+        tasks.cancel_scope.cancel()
+
+
+class WithProcess(Robot):
+    """A robot whose engine is a process of this computer."""
+
+    def __init__(self, inside: Any, known: EngineProcess | None) -> None:
+        super().__init__(inside)
+        self.known = known
+
+    @property
+    def standing(self) -> Any:
+        """As ever, with the process."""
+        return msgspec.structs.replace(super().standing, process=self.known)
