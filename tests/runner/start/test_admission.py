@@ -5,10 +5,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
+from action_assistant.errors import BadInput, Conflict, NotUmrf
 from action_assistant.runner.runs.events import Override
-from action_assistant.runner.start.admission import admit, prepared, read_request
-from action_assistant.runner.start.start_checks import read_group
+from action_assistant.runner.start.admission import admit, read_request
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.files import codec
@@ -113,28 +112,3 @@ def test_the_text_is_read_as_sent_not_as_some_json_library_would_write_it() -> N
     body = b'{"version":"v","digest":"%b","engine":"simulator","request_id":"r","umrf":%b}'
     asked = read_request(body % (digest(graph).encode(), text.strip().encode()))
     assert bytes(asked.umrf) == text.strip().encode()
-
-
-def test_what_a_start_says_beside_the_graph_is_looked_at_with_its_place() -> None:
-    blank = order(one_sided(), override=Override(codes=(), reason="  "))
-    with pytest.raises(BadInput, match="Say why") as refused:
-        admit(blank, PINNED)
-    assert refused.value.where == {"path": "/override/reason"}
-    odd = msgspec.structs.replace(order(sequence()), script=msgspec.Raw(b'{"behaviours":1}'))
-    with pytest.raises(BadInput, match="The script: ") as refused:
-        admit(odd, SIMULATED)
-    assert refused.value.where == {"path": "/script"}
-
-
-def test_a_graph_that_is_started_has_a_bound() -> None:
-    with pytest.raises(TooLarge, match="at most 5,000 actions"):
-        prepared(order(sequence(actions=5_001)), SIMULATED, "r1")
-
-
-def test_a_robot_is_named_once_in_a_start_on_several() -> None:
-    body = b'{"version":"v","digest":"d","umrf":{},"request_id":"r","engines":["A","A"]}'
-    with pytest.raises(BadInput, match="named twice"):
-        read_group(body)
-    with pytest.raises(BadInput) as refused:
-        read_group(b"{")
-    assert refused.value.where is None

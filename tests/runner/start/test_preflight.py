@@ -1,98 +1,112 @@
-"""Items of the pre-flight that stand in the way of a start, or warn."""
-
-from typing import Any
+"""The look before a start: what stands in the way is shown and refused alike."""
 
 import msgspec
 import pytest
 
-from action_assistant.errors import Conflict
-from action_assistant.runner.links.port import Answer, Standing
-from action_assistant.runner.robots.engine import EngineIndex
-from action_assistant.runner.start.admission import Admitted
-from action_assistant.runner.start.preflight import (
-    EngineSight,
-    Item,
-    of_graph,
-    of_refusal,
-    of_robot,
-    summed,
+from action_assistant.errors import Conflict, Refused
+from action_assistant.runner.links.port import (
+    Order,
+    Registration,
 )
-from action_assistant.umrf.check import STRUCTURAL
-from action_assistant.umrf.facts import PINNED
-from action_assistant.umrf.model import Problem, Where
-from action_assistant.umrf.semantics import Script
-from runner.harness import sequence
+from action_assistant.runner.robots.robot_events import StopWasProven
+from action_assistant.runner.runs.events import Override
+from action_assistant.umrf.files import codec
+from runner.harness import ANN, BEN, Harness, order, sequence, until, virtual
+from runner.registered_robots import NEVER, Open, fleet, given, group, verdicts
 
 
-def problem(code: str, severity: Any) -> Problem:
-    return Problem(code=code, severity=severity, where=Where(), message="It is so.")
-
-
-def admitted(*problems: Problem) -> Admitted:
-    return Admitted(
-        graph=sequence(),
-        graph_id="g1",
-        script=Script({}),
-        script_text="",
-        digest="d",
-        problems=problems,
-    )
-
-
-def proof(**standing: Any) -> Item:
-    """What is said about whether a stop could be proven."""
-    fields = {"state": "answering", "generation": "current", "servers": 1} | standing
-    sight = EngineSight(
-        name="David",
-        facts=PINNED,
-        standing=Standing(**fields),
-        answer=Answer(asked_at=0, at=0, incarnation="life", graphs=()),
-        index=EngineIndex(),
-        took_ms=1.0,
-    )
-    (found,) = [each for each in of_robot(sight, sequence()) if each.code == "proof"]
-    return found
+@virtual
+async def test_a_sound_robot_passes_every_item_and_the_look_sends_nothing() -> None:
+    david = Open()
+    async with fleet(Harness(), David=david) as control:
+        asked = group(sequence(), "David", digest="")
+        (look,) = await control.look(asked)
+        assert set(verdicts(look).values()) == {"passed"}
+        assert (look.override, look.never) == ((), False)
+        assert look.digest == order(sequence()).digest
+    assert david.starts == []
 
 
 @pytest.mark.parametrize(
-    ("standing", "verdict", "overridable", "words"),
-    [
-        ({}, "passed", False, "one engine answers"),
-        ({"generation": "older"}, "blocked", False, "would not understand a Stop"),
-        ({"listeners": {"start": 1, "stop": 0}}, "blocked", False, "Nobody listens to stop"),
-        ({"listeners": {"start": 0, "stop": 0}}, "blocked", False, "start and stop messages"),
-        ({"servers": 2}, "blocked", True, "2 engines answer"),
-        ({"servers": 0}, "blocked", True, "nobody who serves"),
-        ({"generation": "unknown"}, "warned", False, "is not known"),
-    ],
+    ("code", "overridable"),
+    [("answers", False), ("proof", True), ("actions", True), ("others", True), ("actors", True)],
 )
-def test_a_start_needs_an_engine_whose_stop_could_be_proven(
-    standing: dict[str, Any], verdict: str, overridable: bool, words: str
-) -> None:
-    found = proof(**standing)
-    assert (found.verdict, found.overridable) == (verdict, overridable)
-    assert words in found.text
+def test_what_stands_in_the_way_is_shown_and_refused_alike(code: str, *, overridable: bool) -> None:
+    @virtual
+    async def asked() -> None:
+        david, graph = Open(), sequence()
+        async with fleet(Harness(), David=david) as control:
+            match code:
+                case "answers":
+                    david.silent = True
+                case "proof":
+                    david.servers = 2
+                case "actions":
+                    graph = given(graph, "colour")
+                case "others":
+                    david.others = 1
+                case _:
+                    actor = msgspec.structs.replace(graph.actions[0], actor="Eve")
+                    graph = msgspec.structs.replace(graph, actions=(actor, *graph.actions[1:]))
+            (look,) = await control.look(group(graph, "David"))
+            assert [item for item, verdict in verdicts(look).items() if verdict == "blocked"] == [
+                code
+            ]
+            assert look.never is not overridable
+            with pytest.raises(Refused) as refused:
+                await control.start(order(graph, engine="David"), ANN)
+            assert (refused.value.where or {})["item"] == code
+            assert david.starts == []
+            if overridable:
+                override = Override(look.override, "I stand beside it")
+                again = order(graph, engine="David", override=override)
+                started = await control.start(again, ANN)
+                assert started.run.override == override
+                assert len(david.starts) == 1
+
+    asked()
 
 
-def test_problems_of_a_graph_warn_and_overridden_ones_stay_named() -> None:
-    assert of_graph(admitted()).verdict == "passed"
-    possible = problem("loop", "warning")
-    warned = of_graph(admitted(possible))
-    assert (warned.verdict, warned.problems) == ("warned", (possible,))
-    certain = problem("one-sided", "error")
-    over = of_graph(admitted(certain, possible))
-    assert over.verdict == "warned"
-    assert over.problems == (certain, possible)
-    assert "overridden" in over.text
+@virtual
+async def test_a_graph_of_somebody_else_is_in_the_way_until_it_is_stopped() -> None:
+    david = Open(NEVER)
+    async with fleet(Harness(), David=david) as control:
+        await david.engine.start(Order(run="theirs", graph=sequence("cleaning"), umrf=""))
+        (look,) = await control.look(group(sequence(), "David"))
+        assert verdicts(look)["quiet"] == "blocked"
+        (same,) = await control.look(group(sequence("cleaning"), "David"))
+        assert same.never
+        assert control.robots.silence(BEN, lambda _: ()) == ["David: cleaning"]
+        await until(lambda: not control.robots.foreign_stops.going("David"))
+        assert not await david.moving("cleaning")
+        told = [event for _, event in await control.robots.robot_log.newest("David", 9)]
+        assert isinstance(told[-1], StopWasProven)
+        (look,) = await control.look(group(sequence(), "David"))
+        assert verdicts(look)["quiet"] == "passed"
 
 
-def test_a_refusal_is_overridable_if_it_names_problems_of_which_none_is_structural() -> None:
-    structural = min(STRUCTURAL)
-    for codes, overridable in (((), False), (("x",), True), (("x", structural), False)):
-        where = {"problems": msgspec.to_builtins([problem(code, "error") for code in codes])}
-        item = of_refusal("graph", Conflict("No.", where=where if codes else None))
-        assert (item.verdict, item.overridable) == ("blocked", overridable)
-        assert set(item.codes) == set(codes)
-        look = summed("David", [item])
-        assert look.never != overridable
-        assert look.override == (item.codes if overridable else ())
+@virtual
+async def test_a_graph_of_its_own_index_is_never_started_under_the_same_name() -> None:
+    david = Open()
+    david.known_graphs = (codec.write(sequence("patrol")),)
+    async with fleet(Harness(), David=david) as control:
+        (look,) = await control.look(group(sequence("patrol"), "David"))
+        assert look.never
+        with pytest.raises(Conflict, match="its own index"):
+            await control.start(order(sequence("patrol"), engine="David"), ANN)
+
+
+@virtual
+async def test_the_simulator_that_plays_a_robot_refuses_what_the_robot_would() -> None:
+    graph = sequence(actions=2)
+    first, second = graph.actions
+    both = tuple(
+        msgspec.structs.replace(action, actor=actor)
+        for action, actor in ((first, "David"), (second, "Eve"))
+    )
+    graph = msgspec.structs.replace(graph, actions=both)
+    async with fleet(Harness(), David=Open()) as control:
+        with pytest.raises(Conflict, match="synchronise"):
+            await control.start(order(graph, like="David"), ANN)
+        await control.register(Registration(name="David", profile={"synchronises": True}), ANN)
+        assert (await control.start(order(graph, like="David"), ANN)).run.like == "David"

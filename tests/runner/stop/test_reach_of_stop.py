@@ -11,21 +11,9 @@ from action_assistant.runner.emulator.messages import Start
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Link, NotSent, Order, Registration
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.robots.robot_events import StopUnproven, StopWasProven
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
-from runner.harness import (
-    ANN,
-    BEN,
-    Harness,
-    at_once,
-    clock_us,
-    engine,
-    order,
-    sequence,
-    until,
-    virtual,
-)
+from runner.harness import ANN, BEN, Harness, at_once, clock_us, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, RegisteredRobots, fleet, group
 from runner.robots_in_network import PATROL, RobotsInNetwork, asked, shown
 
@@ -118,29 +106,6 @@ async def test_a_stop_of_it_that_is_pressed_again_goes_on_for_another_minute() -
         david.loss = 0.0
         await until(lambda: not control.robots.foreign_stops.going("David"))
         assert not await david.moving("cleaning")
-
-
-@virtual
-async def test_no_answer_proves_that_it_stopped_where_several_engines_answer_or_another_life() -> (
-    None
-):
-    david = Open(NEVER)
-    async with fleet(Harness(), David=david) as control:
-        robots = control.robots
-        await _cleaning(david, "theirs")
-        await anyio.sleep(15)
-        david.servers = 2
-        control.stop_robot("David", BEN)
-        await until(
-            lambda: "2 engines" in (robots.foreign_stops.trouble("David", "cleaning") or "")
-        )
-        assert robots.foreign_stops.going("David")
-        david.engine, david.servers = engine(NEVER), 1
-        await until(lambda: not robots.foreign_stops.going("David"))
-        told = [event for _, event in await robots.robot_log.newest("David", 20)]
-        (given_up,) = [event for event in told if isinstance(event, StopUnproven)]
-        assert "restarted" in given_up.why
-        assert not [event for event in told if isinstance(event, StopWasProven)]
 
 
 # --- robots that are registered anew ----------------------------------------------------------
