@@ -20,7 +20,6 @@ from action_assistant.settings import EVERYWHERE, Reachability, more_hosts
 from action_assistant.share_links import invitations_as_text, is_ours
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
-from action_assistant.web.network.certificate import Certificate
 from action_assistant.web.server.sockets import bound
 
 _PATIENCE: Final = 30.0  # seconds until a start that does not answer is called failed
@@ -209,6 +208,9 @@ def _certified(plan: ServePlan) -> ssl.SSLContext | None:
     """With --tls, how to trust ourselves; the certificate is there before the processes are."""
     if not plan.tls:
         return None
+    # Most do without, and it takes as long to load as much of the rest.
+    from action_assistant.web.network.certificate import Certificate
+
     addresses = addresses_of(
         host=plan.host, page_port=plan.port, hosts=more_hosts(), share=plan.share, secure=True
     )

@@ -135,12 +135,12 @@ def _identity(
     chosen: settings.EditorSettings | settings.RunnerSettings, page_port: int
 ) -> "TlsIdentity | None":
     """The certificate of a process, with --tls."""
+    if not chosen.tls:
+        return None
     from action_assistant.web.network.addresses import addresses_of
     from action_assistant.web.network.certificate import Certificate
     from action_assistant.web.server.listen import TlsIdentity
 
-    if not chosen.tls:
-        return None
     addresses = addresses_of(
         host=chosen.host, page_port=page_port, hosts=chosen.hosts, share=chosen.share, secure=True
     )

@@ -1,4 +1,8 @@
-"""The runner process: its journal, its service, its routes."""
+"""The runner process: its journal, its service, its routes.
+
+What a Stop needs is imported here and by what is imported here, never at its first use: a Stop may be
+the first thing that is asked of a runner.
+"""
 
 import sys
 from collections.abc import AsyncIterator

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextvars import ContextVar
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import h11
 import uvicorn
@@ -21,10 +21,12 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from action_assistant.errors import BadInput, CannotStart
 from action_assistant.public_url import Network
 from action_assistant.web.auth.access import KNOWN
-from action_assistant.web.network.certificate import Certificate
 from action_assistant.web.network.connections import Connections, raise_limit
 from action_assistant.web.server.proxy import ASKED, Forwarded
 from action_assistant.web.server.sockets import bound
+
+if TYPE_CHECKING:  # slow to load, and most servers do without
+    from action_assistant.web.network.certificate import Certificate
 
 log: Final = logging.getLogger(__name__)
 
@@ -107,7 +109,7 @@ def _configured(app: ASGIApp, identity: "TlsIdentity | None") -> uvicorn.Config:
 class TlsIdentity:
     """Who we are under TLS: a certificate, renewed in time and when our names have changed."""
 
-    def __init__(self, certificate: Certificate, names: Callable[[], Sequence[str]]) -> None:
+    def __init__(self, certificate: "Certificate", names: Callable[[], Sequence[str]]) -> None:
         self.certificate: Final = certificate
         self.names: Final = names
         self._loaded = 0  # when the certificate that is in use was written
