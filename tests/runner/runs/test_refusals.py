@@ -18,8 +18,7 @@ from action_assistant.umrf.model import Graph, Parameter, Signature
 from action_assistant.umrf.semantics import script_from
 from runner.fake_network import Node, now, now_ms
 from runner.harness import ANN, BEN, Harness, ended, engine, order, sequence, until, virtual
-from runner.registered_robots import Open
-from runner.robots.test_robots import NEVER, fleet
+from runner.registered_robots import NEVER, Open, fleet
 from runner.robots_in_network import PATHS, RobotsInNetwork
 
 CODES = ("quiet", "others", "actions", "actors", "H7", "unknown-action", "signature")

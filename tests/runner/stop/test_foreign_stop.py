@@ -5,8 +5,7 @@ import anyio
 from action_assistant.runner.links.port import Order
 from action_assistant.runner.robots.robot_events import StopUnproven, StopWasProven
 from runner.harness import BEN, Harness, engine, sequence, until, virtual
-from runner.registered_robots import Open
-from runner.robots.test_robots import NEVER, fleet
+from runner.registered_robots import NEVER, Open, fleet
 
 
 @virtual
