@@ -18,7 +18,6 @@ from action_assistant.runner.analysis.comparison import RunComparison
 from action_assistant.runner.analysis.replay import RunReplay
 from action_assistant.runner.analysis.statistics import Statistics
 from action_assistant.runner.api.caller import LARGE, author_of, body_of
-from action_assistant.runner.api.openapi import FitOperation
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.raw_messages import RawMessages
 from action_assistant.runner.archives.retention import Retention, Swept
@@ -32,8 +31,10 @@ from action_assistant.runner.review.service import (
 )
 from action_assistant.runner.review.worker_queries import WorkerQueries, json_of
 from action_assistant.runner.start.admission import decoded
+from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.network.connection_limits import ConcurrencyLimit
+from action_assistant.web.server.openapi import FileBytes, answer, reads
 
 _Asking = Request[Any, Any, Any]
 _TYPES: Final[dict[str, str]] = {
@@ -103,7 +104,11 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
     async def found_causes(run: str) -> Response[list[CauseShown]]:
         return json_of(await services.asked.text(ReviewService.causes, run), list[CauseShown])
 
-    @get("/api/runs/{run:str}/umrf", summary="The graph of a run as it was sent")
+    @get(
+        "/api/runs/{run:str}/umrf",
+        summary="The graph of a run as it was sent",
+        responses={200: answer(UmrfGraph)},
+    )
     async def umrf(run: str) -> Response[bytes]:
         return json_of(await services.asked.value(ReviewService.umrf, run), bytes)
 
@@ -126,7 +131,7 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/script",
         status_code=200,
         summary="What a run did, as a script for another version of its graph",
-        operation_class=FitOperation,
+        opt=reads(Fit),
         guards=[Needs("see")],
         request_max_body_size=LARGE,
     )
@@ -137,7 +142,11 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
             text = await services.asked.text(ReviewService.script, run, fault, bytes(asked.umrf))
         return json_of(text, expected_runs.Recorded)
 
-    @get("/api/runs/{run:str}/export", summary="A run as a file: jsonl, csv or mcap")
+    @get(
+        "/api/runs/{run:str}/export",
+        summary="A run as a file: jsonl, csv or mcap",
+        responses={200: answer(FileBytes, media="application/octet-stream")},
+    )
     async def export(
         run: str, form: Annotated[Format, Parameter(query="format")]
     ) -> Response[bytes] | Stream:

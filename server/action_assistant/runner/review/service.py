@@ -31,6 +31,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.workers import Crashed
 from action_assistant.schema.runner_tables import expectation, review, run, run_label
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 from action_assistant.web.workers.lanes import RunInWorker
@@ -67,8 +68,8 @@ class Expectation(msgspec.Struct, frozen=True, kw_only=True):
     graph: str | None
     graph_name: str
     author: Author
-    umrf: msgspec.Raw
-    script: msgspec.Raw
+    umrf: UmrfGraph
+    script: JsonObject
     course: list[expected_runs.ExpectedStep]
 
 

@@ -16,7 +16,7 @@ from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.laps import Laps, laps
 from action_assistant.umrf.model import Graph, Problem
-from action_assistant.umrf.semantics import Script, script_from
+from action_assistant.umrf.semantics import SCRIPT, Script, script_from
 
 T = TypeVar("T")
 
@@ -42,7 +42,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     engine: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
     request_id: Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
     graph: str | None = None
-    script: msgspec.Raw = msgspec.Raw()
+    script: Annotated[msgspec.Raw, SCRIPT] = msgspec.field(default_factory=msgspec.Raw)
     override: Override | None = None
     like: str | None = None
 

@@ -1,7 +1,7 @@
 """The ASGI application of either process: Litestar inside, access control around it."""
 
 import logging
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -10,9 +10,6 @@ import msgspec
 from litestar import Litestar, MediaType, Request, Response, get
 from litestar.connection import ASGIConnection
 from litestar.handlers.base import BaseRouteHandler
-from litestar.openapi import OpenAPIConfig
-from litestar.openapi.plugins import JsonRenderPlugin
-from litestar.openapi.spec import Components, SecurityScheme
 from litestar.params import Parameter
 from litestar.routes import HTTPRoute
 from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive, Scope, Send
@@ -25,6 +22,7 @@ from action_assistant.web.auth.roles import Deed
 from action_assistant.web.http.page import Page
 from action_assistant.web.http.problems import problem_handlers
 from action_assistant.web.network.addresses import Addresses, host_name
+from action_assistant.web.server.openapi import OpenApiText, document, openapi_config
 from action_assistant.web.server.proxy import MOUNT, Mounted, misrouted
 
 log: Final = logging.getLogger(__name__)
@@ -68,7 +66,7 @@ def application(
     `runner_port` are the editor's: it serves the page, whose Content-Security-Policy names the
     runner. `mount` is the path at which a proxy shows this process."""
     decisions: dict[tuple[str, str], Deed] = {}
-    api = _OpenApiText(decisions)
+    openapi = OpenApiText()
     inner = Litestar(
         [
             *route_handlers,
@@ -79,12 +77,12 @@ def application(
         guards=[_undecided],
         exception_handlers=problem_handlers(),
         lifespan=list(lifespan),
-        openapi_config=_openapi(title, api),
+        openapi_config=openapi_config(title, openapi),
         request_max_body_size=body_limit,
         logging_config=None,
     )
     decisions.update(_decisions(inner))
-    api.prepare(inner.openapi_schema.to_schema())
+    openapi.text = msgspec.json.encode(document(inner, decisions, _answers_strangers))
 
     def root_of(scope: HTTPScope) -> str:
         state: dict[str, Any] = scope.get("state", {})
@@ -103,7 +101,7 @@ def application(
         policy=lambda host: _policy(addresses, host, page_port, runner_port),
         revoked=revoked,
     )
-    return _NamedRoute(Mounted(outer, mount), inner)
+    return _Described(Mounted(outer, mount), openapi.text)
 
 
 def _host(scope: HTTPScope) -> str:
@@ -151,12 +149,12 @@ async def _undecided(
         require(connection, "restore")
 
 
-class _NamedRoute:
-    """The application, with Litestar's own one in reach for those who make its OpenAPI text."""
+class _Described:
+    """The application, with its OpenAPI document in reach for those who generate types of it."""
 
-    def __init__(self, outer: ASGIApp, inner: Litestar) -> None:
+    def __init__(self, outer: ASGIApp, openapi: bytes) -> None:
         self._outer = outer
-        self.litestar = inner
+        self.openapi = openapi
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         await self._outer(scope, receive, send)
@@ -179,43 +177,6 @@ def _policy(addresses: Addresses, host: str, page_port: int, runner_port: int | 
 
 def _socket(url: str) -> str:
     return url.replace("http", "ws", 1)
-
-
-class _OpenApiText(JsonRenderPlugin):
-    """OpenAPI as JSON. Litestar leaves out an empty `security`, which is how a route says that it
-    is open to strangers; the others say in `x-needs` what one must be allowed to do."""
-
-    def __init__(self, decisions: Mapping[tuple[str, str], Deed]) -> None:
-        super().__init__(path="/openapi.json")
-        self._decisions = decisions
-        self._text = b""
-
-    def render(self, request: Request[Any, Any, Any], openapi_schema: dict[str, Any]) -> bytes:
-        """The text of the schema."""
-        return self._text or self.prepare(openapi_schema)
-
-    def prepare(self, openapi_schema: dict[str, Any]) -> bytes:
-        """Make the text, once and before anybody asks: that takes a tenth of a second."""
-        for path, item in openapi_schema["paths"].items():
-            for method, operation in item.items():
-                if _answers_strangers(path):
-                    operation["security"] = []
-                elif (path, method) in self._decisions:
-                    operation["x-needs"] = self._decisions[path, method]
-        self._text = msgspec.json.encode(openapi_schema)
-        return self._text
-
-
-def _openapi(title: str, api: _OpenApiText) -> OpenAPIConfig:
-    schemes: dict[str, Any] = {"token": SecurityScheme(type="http", scheme="bearer")}
-    return OpenAPIConfig(
-        title=title,
-        version=VERSION,
-        path="/schema",
-        render_plugins=[api],
-        components=Components(security_schemes=schemes),
-        security=[{"token": []}],
-    )
 
 
 _PASSED_ON: Final = ("x-forwarded-for", "forwarded", "via")
