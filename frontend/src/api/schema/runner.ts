@@ -293,7 +293,10 @@ export interface RunnerApi {
          * @description Another version of the graph of a run; `action` (a name of the run) may have a `fault`.
          */
         Fit: {
-            umrf: unknown;
+            /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+            umrf: {
+                [key: string]: unknown;
+            } | string;
             /** @default null */
             action?: string | null;
             /** @default null */
@@ -305,7 +308,10 @@ export interface RunnerApi {
          *     be looked at.
          */
         GroupRequest: {
-            umrf: unknown;
+            /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+            umrf: {
+                [key: string]: unknown;
+            } | string;
             /** @default  */
             version?: string;
             /** @default  */
@@ -478,7 +484,10 @@ export interface RunnerApi {
         ModifyRequest: {
             version: string;
             digest: string;
-            umrf: unknown;
+            /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+            umrf: {
+                [key: string]: unknown;
+            } | string;
             /** @default  */
             continue_from?: string;
             /** @default null */
@@ -1018,7 +1027,10 @@ export interface RunnerApi {
         StartRequest: {
             version: string;
             digest: string;
-            umrf: unknown;
+            /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+            umrf: {
+                [key: string]: unknown;
+            } | string;
             engine: string;
             request_id: string;
             /** @default null */

@@ -17,7 +17,7 @@ from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.analysis.comparison import RunComparison
 from action_assistant.runner.analysis.replay import RunReplay
 from action_assistant.runner.analysis.statistics import Statistics
-from action_assistant.runner.api.caller import LARGE, author_of, body_of
+from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.raw_messages import RawMessages
 from action_assistant.runner.archives.retention import Retention, Swept
@@ -30,6 +30,7 @@ from action_assistant.runner.review.service import (
     RunMarks,
 )
 from action_assistant.runner.review.worker_queries import WorkerQueries, json_of
+from action_assistant.runner.sent_graph import SentGraph
 from action_assistant.runner.start.admission import decoded
 from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.web.auth.access import Needs
@@ -54,7 +55,7 @@ class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Fit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Another version of the graph of a run; `action` (a name of the run) may have a `fault`."""
 
-    umrf: msgspec.Raw
+    umrf: SentGraph
     action: str | None = None
     fault: expected_runs.Fault | None = None
 
@@ -131,9 +132,9 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/script",
         status_code=200,
         summary="What a run did, as a script for another version of its graph",
-        opt=reads(Fit),
+        opt=reads(Fit) | COUNTED,
         guards=[Needs("see")],
-        request_max_body_size=LARGE,
+        request_max_body_size=GRAPH_BODY,
     )
     async def fit(run: str, request: _Asking) -> Response[expected_runs.Recorded]:
         async with body_of(request, services.body_limit) as body:

@@ -8,7 +8,7 @@ from litestar import Request, Response, delete, get, patch, post
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound
-from action_assistant.runner.api.caller import LARGE, author_of, body_of
+from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
 from action_assistant.runner.robots.recordings import Recording
@@ -220,9 +220,9 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
         "/api/preflight",
         status_code=200,
         summary="What stands between a graph and its start, engine by engine",
-        opt=reads(GroupRequest),
+        opt=reads(GroupRequest) | COUNTED,
         guards=[Needs("simulate")],
-        request_max_body_size=LARGE,
+        request_max_body_size=GRAPH_BODY,
     )
     async def look(request: _Asking) -> list[Preflight]:
         async with body_of(request, services.body_limit) as body:
@@ -231,10 +231,10 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/groups",
         summary="Start a version on several robots",
-        opt=reads(GroupRequest),
+        opt=reads(GroupRequest) | COUNTED,
         responses={200: answer(GroupShown, text="It had been started before")},
         guards=[Needs("operate")],
-        request_max_body_size=LARGE,
+        request_max_body_size=GRAPH_BODY,
     )
     async def start(request: _Asking) -> Response[GroupShown]:
         async with body_of(request, services.body_limit) as body:

@@ -16,7 +16,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import BadInput, NotFound, TooMany
 from action_assistant.runner.api import review as review
 from action_assistant.runner.api import robots
-from action_assistant.runner.api.caller import LARGE, author_of, body_of, start_of
+from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of, start_of
 from action_assistant.runner.api.live import (
     PageMessage,
     RunnerMessage,
@@ -66,10 +66,10 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs",
         summary="Start a version, at most once per request_id",
-        opt=reads(StartRequest, Script=Script),
+        opt=reads(StartRequest, Script=Script) | COUNTED,
         responses={200: answer(views.RunShown, text="It had been started before")},
         guards=[Needs("simulate")],
-        request_max_body_size=LARGE,
+        request_max_body_size=GRAPH_BODY,
     )
     async def start(request: _Asking) -> Response[views.RunShown]:
         async with body_of(request, services.body_limit) as body:
@@ -143,9 +143,9 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/modify",
         status_code=202,
         summary="Change a running graph, where its engine makes that safe",
-        opt=reads(ModifyRequest),
+        opt=reads(ModifyRequest) | COUNTED,
         guards=[Needs("simulate")],
-        request_max_body_size=LARGE,
+        request_max_body_size=GRAPH_BODY,
     )
     async def modify(run: str, request: _Asking) -> views.RunShown:
         await _require_hand_on(services, run, request)

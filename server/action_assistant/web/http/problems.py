@@ -15,6 +15,8 @@ from action_assistant.errors import Refused
 log: Final = logging.getLogger(__name__)
 
 PROBLEM_JSON: Final = "application/problem+json"
+#: A key of a route's `opt`: the bytes of a body that it takes, where more may come over the wire.
+BODY_LIMIT_TOLD: Final = "body_limit_told"
 #: What most places have; some refusals tell more.
 _PLACE: Final = msgspec.Meta(
     extra_json_schema={
@@ -108,9 +110,9 @@ def _told(
 def _limit(request: Request[Any, Any, Any]) -> str:
     """How long a body may be that this route takes."""
     handler = request.scope.get("route_handler")
-    most = (
-        handler.resolve_request_max_body_size() if isinstance(handler, HTTPRouteHandler) else None
-    )
+    if not isinstance(handler, HTTPRouteHandler):
+        return "some bytes"
+    most = handler.opt.get(BODY_LIMIT_TOLD, handler.resolve_request_max_body_size())
     if most is None:
         return "some bytes"
     return f"{most // 1_000_000} MB" if most >= 1_000_000 else f"{most // 1_000} kB"
