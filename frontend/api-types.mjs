@@ -8,16 +8,16 @@ const FOLDER = join(import.meta.dirname, "src/api/schema");
 /** The module of a process. Of its document only the schemas matter to the page, so that the types
  * change with what is sent, and not with a summary. */
 async function typesOf(side, name) {
-  const text = readFileSync(join(FOLDER, `${side}.openapi.json`), "utf8");
+  const document = readFileSync(join(FOLDER, `${side}.openapi.json`), "utf8");
   const nodes = await openapiTS(
-    { ...JSON.parse(text), paths: {} },
+    { ...JSON.parse(document), paths: {} },
     { defaultNonNullable: false, emptyObjectsUnknown: true },
   );
-  const types = astToString(nodes.filter((node) => node.name?.text === "components"))
-    .replace("export interface components {", `export interface ${name} {`)
-    .replaceAll('components["schemas"]', `${name}["schemas"]`)
-    .replace(/\n {4}(responses|parameters|requestBodies|headers|pathItems): [^;]*;/g, "");
-  return `/** What the ${side} takes and answers. Made by \`make types\`; changes are lost. */\n${types}`;
+  const text = astToString(nodes.filter((node) => node.name?.text === "components"));
+  const [, types] = /^ {4}schemas: \{\n(.*?)^ {4}\};/ms.exec(text);
+  const members = types.replaceAll('components["schemas"]', name).replace(/^ {4}/gm, "");
+  const about = `/** What the ${side} takes and answers. Made by \`make types\`; changes are lost. */`;
+  return `${about}\nexport interface ${name} {\n${members}}\n`;
 }
 
 for (const [side, name] of [

@@ -1,7 +1,7 @@
 """The routes of robots: the registry, their state, commands of others, checks before starts."""
 
 from datetime import datetime
-from typing import Any, Final, Protocol, assert_never
+from typing import Any, Final, Literal, Protocol, assert_never
 
 import msgspec
 from litestar import Request, Response, delete, get, patch, post
@@ -81,7 +81,7 @@ class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
 
     seq: int
     at: datetime
-    kind: str
+    kind: Literal["commanded", "became", "stop_asked", "stop_proven", "stop_unproven"]
     command: str = ""
     graph: str = ""
     sender: str = ""

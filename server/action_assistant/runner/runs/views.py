@@ -11,7 +11,7 @@ from sqlalchemy import Row
 from action_assistant.runner.links.parameter_texts import sent
 from action_assistant.runner.runs.durations import Took, of_run
 from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override
-from action_assistant.runner.runs.run import Desired, Run, State
+from action_assistant.runner.runs.run import Desired, Result, Run, State
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
 from action_assistant.umrf.json.embedded import UmrfGraph
 
@@ -86,7 +86,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     author: Author
     state: State
     desired: Desired
-    result: str | None
+    result: Result | None
     proof_at: datetime | None
     unknown_since: datetime | None
     unconfirmed: str | None
