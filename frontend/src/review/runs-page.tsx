@@ -42,7 +42,7 @@ export function overlaid(
 ): ListedRun[] {
   return stored.map((run) => {
     const now = live.get(run.id);
-    return now === undefined ? run : { ...run, ...now };
+    return now === undefined ? run : { ...run, ...now, archived: now.archived ?? run.archived };
   });
 }
 
