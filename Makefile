@@ -67,6 +67,11 @@ fix: .venv/.done frontend/node_modules/.done ## mend what the formatters and lin
 	@$(BIN)/ruff check --fix --quiet . ; $(BIN)/ruff format --quiet .
 	@$(NPM) run --silent fix
 
+.PHONY: types
+types: .venv/.done frontend/node_modules/.done ## the page's API types, from the OpenAPI of both processes
+	@PYTHONPATH=tests PYTHONWARNINGS=ignore $(BIN)/python -m support.openapi frontend/src/api/schema
+	@cd frontend && ../$(NODE) node api-types.mjs
+
 .PHONY: test
 test: setup ros ## every check and every test, also in a real browser
 	@# Most of these wait for processes and robots: together they take little longer than the longest.

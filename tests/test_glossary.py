@@ -12,9 +12,7 @@ from typing import Any
 
 import pytest
 
-from action_assistant.editor import app as editor
-from action_assistant.runner import app as runner
-from action_assistant.settings import EditorSettings, RunnerSettings
+from support.openapi import documents
 
 ROOT = Path(__file__).parents[1]
 GLOSSARY = ROOT / "docs" / "glossary.md"
@@ -67,12 +65,7 @@ def instead(text: str) -> list[str]:
 @pytest.fixture(scope="module")
 def schemas(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     """What the editor and the runner say of their routes, without starting either."""
-    data = tmp_path_factory.mktemp("data")
-    apps: list[Any] = [
-        editor.create_app(EditorSettings(data=data, database=f"sqlite:///{data / 'editor.db'}")),
-        runner.create_app(RunnerSettings(data=data)),
-    ]
-    return [app.litestar.openapi_schema.to_schema() for app in apps]
+    return list(documents(tmp_path_factory.mktemp("data")).values())
 
 
 def described(value: object) -> Iterator[str]:

@@ -42,7 +42,7 @@ async function ran(behaviours: Record<string, unknown[]>, of = graph): Promise<R
     engine: "simulator",
     request_id: `e2e-${Math.random()}`,
   };
-  const body = `${JSON.stringify({ ...head, script: { behaviours } }).slice(0, -1)},"umrf":${umrf}}`;
+  const body = JSON.stringify({ ...head, script: { behaviours }, umrf });
   const run = await product.ask<Run>("/api/runs", { method: "POST", body }, product.runnerUrl);
   const now = () => product.ask<Run>(`/api/runs/${run.id}`, {}, product.runnerUrl);
   await expect.poll(async () => (await now()).state, { timeout: 20_000 }).toMatch(/finished|error/);
@@ -98,7 +98,7 @@ test("what the page showed live is what the replay shows of that moment", async 
   const { id, digest, umrf } = await version(graph);
   const script = { behaviours: { "*": [{ after_s: 1.8 }] } };
   const head = { version: id, digest, graph, engine: "simulator", request_id: "e2e-live", script };
-  const body = `${JSON.stringify(head).slice(0, -1)},"umrf":${umrf}}`;
+  const body = JSON.stringify({ ...head, umrf });
   const { id: run } = await product.ask<Run>(
     "/api/runs",
     { method: "POST", body },

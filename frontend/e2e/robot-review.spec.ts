@@ -111,8 +111,7 @@ async function started(what: { graph: string } & Version, ...robots: string[]): 
   const codes = ["H2", "H3", "H5", "H7", "H8", "H12", "others", "actions"];
   const override = { codes, reason: "practice" };
   const request_id = `e2e-${Math.random()}`;
-  const head = JSON.stringify({ version, digest, graph, ...engine, request_id, override });
-  const body = `${head.slice(0, -1)},"umrf":${umrf}}`;
+  const body = JSON.stringify({ version, digest, graph, ...engine, request_id, override, umrf });
   const path = robots.length === 1 ? "/api/runs" : "/api/groups";
   const answer = await product.ask<Run & { runs?: Run[] }>(
     path,

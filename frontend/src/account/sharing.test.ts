@@ -26,6 +26,7 @@ test("links begin with the place where the owner has the page, unless others can
   const sharing: Sharing = {
     origins: ["http://10.0.0.2:8000", "http://lab.local:8000"],
     secure: false,
+    proxied: false,
     invitations: [],
   };
   const here = { page: "http://127.0.0.1:8000", hostname: "127.0.0.1" };

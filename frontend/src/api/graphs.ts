@@ -2,85 +2,22 @@
 import { type QueryClient, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
 import { fetchJson, fetchMoment, fetchText } from "./http";
+import type { EditorApi } from "./schema/editor";
 
-export interface Config {
-  mode: string;
-  version: string;
-  runner_url: string;
-}
-
-export interface GraphSummary {
-  id: string;
-  name: string;
-  description: string;
-  seq: number;
-  updated_at: string;
-  actions?: number;
-  problems?: { error: number; warning: number };
-  robots?: string[];
-  labels?: string[];
-  /** Who is in it now. */
-  people?: VersionAuthor[];
-}
-
+export type Config = EditorApi["Config"];
+/** `people`: who is in it now. */
+export type GraphSummary = EditorApi["GraphView"];
 /** One parameter of a known action; `text` is its JSON without a value. */
-interface KnownParameter {
-  path: string;
-  pvf_type: string | null;
-  required: boolean;
-  text: string;
-}
-
-/** An action that some graph uses. */
-export interface KnownActionAnswer {
-  name: string;
-  description: string;
-  type: string;
-  inputs: KnownParameter[];
-  outputs: KnownParameter[];
-  /** Ids of graphs. */
-  used_in: string[];
-}
-
-export interface VersionAuthor {
-  id: string;
-  name: string;
-}
-
-export interface Version {
-  id: string;
-  graph: string;
-  label: string;
-  digest: string;
-  seq: number;
-  author: VersionAuthor;
-  at: string;
-  umrf?: unknown;
-}
-
+export type KnownParameter = EditorApi["LibraryParameter"];
+/** An action that some graph uses. `used_in`: ids of graphs. */
+export type KnownActionAnswer = EditorApi["LibraryAction"];
+export type VersionAuthor = EditorApi["PersonRef"];
+export type Version = EditorApi["VersionView"];
 /** A place: a JSON pointer into a text, with line and column where that text is known. */
-export interface ProblemPlace {
-  path?: string;
-  aid?: string;
-  relation?: string;
-  line?: number;
-  column?: number;
-}
-
-export interface Problem {
-  code: string;
-  severity: "error" | "warning";
-  where: ProblemPlace;
-  message: string;
-  fix?: string | null;
-  /** The other places of the same thing, which is told once. */
-  also?: { path?: string; aid?: string; relation?: string }[];
-}
-
-export interface Problems {
-  seq: number;
-  problems: Problem[];
-}
+export type ProblemPlace = EditorApi["Where"];
+/** `also`: the other places of the same thing, which is told once. */
+export type Problem = EditorApi["Problem"];
+export type Problems = EditorApi["Problems"];
 
 export const queryKeys = {
   config: ["config"] as const,
@@ -153,25 +90,12 @@ export function createGraph(name: string): Promise<GraphSummary> {
   return fetchJson("/api/graphs", { method: "POST", body: { name } });
 }
 
-/** Something that was translated or left out, with its place in the file that was sent. */
-interface Remark {
-  message: string;
-  where: ProblemPlace;
-  /** How often; once when it is not there. */
-  times?: number;
-}
-
-/** What importing a file would make: nothing is stored. Places are those of the file. */
-export interface Preview {
-  dialect: string;
-  /** What was translated, and what has no place. */
-  notes: string[];
-  problems: Problem[];
-  name: string;
-  actions: number;
-  /** The notes with their places. */
-  remarks: Remark[];
-}
+/** Something that was translated or left out, with its place in the file that was sent; `times`: how
+ * often, once when it is not there. */
+export type Remark = EditorApi["Note"];
+/** What importing a file would make: nothing is stored. Places are those of the file. `notes`: what was
+ * translated, and what has no place; `remarks` are the same with their places. */
+export type Preview = EditorApi["Preview"];
 
 export function previewGraph(text: string): Promise<Preview> {
   return fetchJson("/api/graphs?preview=true", { method: "POST", body: text });
@@ -217,19 +141,9 @@ export function graphMoment(id: string): Promise<{ text: string; seq: number }> 
 }
 
 /** One key of the document; a value that is not there is `undefined`. */
-export interface KeyChange {
-  root: string;
-  key: string;
-  before?: unknown;
-  after?: unknown;
-}
-
+export type KeyChange = EditorApi["KeyChange"];
 /** What an edited text would change, and the errors that would come with it. */
-export interface TextChanges {
-  seq: number;
-  changes: KeyChange[];
-  problems: Problem[];
-}
+export type TextChanges = EditorApi["TextEdit"];
 
 /** What the text, edited from that of the moment `seq`, would change. Nothing is stored. */
 export function textChangesOf(id: string, seq: number, text: string): Promise<TextChanges> {

@@ -1,16 +1,11 @@
 /** Requests to editor and runner, and how they refuse. */
 
 import { serverPath } from "./page-url";
+import type { EditorApi } from "./schema/editor";
 import { sessionEnd } from "./session-end";
 
 /** RFC 9457 as both processes answer it. */
-export interface ProblemDetails {
-  type: string;
-  title: string;
-  status: number;
-  detail: string;
-  where?: { path?: string; line?: number; column?: number };
-}
+export type ProblemDetails = EditorApi["ProblemDetails"];
 
 /** The server answered, and the answer is no. */
 export class Refusal extends Error {

@@ -1,139 +1,27 @@
 /** What the runner tells of past runs: replays, marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
 import { fetchJson, fetchLines } from "./http";
-import { type ActionRun, type DurationBounds, getRun, type Run, type Visit } from "./runs";
+import { getRun, type Run } from "./runs";
+import type { RunnerApi } from "./schema/runner";
 
 /** What became of an action. From the visit number `first` on, its visits are now `visits`. */
-export interface ActionFrame {
-  state: string;
-  first: number;
-  visits?: Visit[];
-  messages?: ActionRun["messages"];
-  aid?: string;
-}
-
+export type ActionFrame = RunnerApi["ActionFrame"];
 /** One event: the fields of the run and the actions that it changed. */
-export interface Frame {
-  seq: number;
-  at: string;
-  kind: string;
-  by?: string;
-  text?: string;
-  head?: Partial<Run>;
-  actions?: Record<string, ActionFrame>;
-  alarms?: Run["alarms"];
-}
-
+export type Frame = Omit<RunnerApi["ReplayFrame"], "head"> & { head?: Partial<Run> };
 /** Something that happened around the actions: a wish, a message sent, a silence, a proof. */
-export interface ReplayMark {
-  seq: number;
-  at: string;
-  kind: string;
-  by?: string;
-  text?: string;
-  since?: string;
-}
-
+export type ReplayMark = RunnerApi["MarkShown"];
 /** A page of a run's replay: `base` after `after` events, then the frames of the next ones. */
-export interface Replay {
-  run: string;
-  after: number;
-  newest: number;
-  base: Run | null;
-  frames: Frame[];
-  chapters: { after: number; at: string }[];
-  marks: ReplayMark[];
-}
-
-export interface RunMarks {
-  pinned: boolean;
-  note: string;
-  labels: string[];
-}
-
+export type Replay = Omit<RunnerApi["RunReplay"], "frames"> & { frames: Frame[] };
+export type RunMarks = RunnerApi["RunMarks"];
 /** A run of the list, with what people noted about it and why it did not end well. */
-export type ListedRun = Run & Partial<RunMarks> & { cause?: string };
-
+export type ListedRun = RunnerApi["Listed"];
 /** What is proven to be behind the end of a run, and where that shows. */
-export interface Cause {
-  kind: string;
-  text: string;
-  at: string;
-  seq: number;
-  action: string | null;
-  aid: string | null;
-  quote: string;
-}
-
-export interface ComparedField {
-  field: string;
-  before: unknown;
-  after: unknown;
-}
-
-interface ComparedChange {
-  change: "added" | "removed" | "changed";
-  fields: ComparedField[];
-}
-
-export interface ComparedStep {
-  action: string;
-  aid: string | null;
-  visit: number;
-  a: Visit | null;
-  b: Visit | null;
-  relation: "same" | "result" | "only_a" | "only_b" | "unknown" | "end";
-  slower: "a" | "b" | null;
-}
-
-export interface Comparison {
-  a: Run;
-  b: Run;
-  same_graph: boolean;
-  same_engine: boolean;
-  graph: {
-    fields: ComparedField[];
-    actions: (ComparedChange & { aid: string; name: string })[];
-    relations: (ComparedChange & { parent: string; child: string })[];
-  };
-  steps: ComparedStep[];
-  left_out: number;
-  parting: { step: ComparedStep; text: string; messages_a: string[]; messages_b: string[] } | null;
-  text: string;
-}
-
-export interface ActionStatistics {
-  action: string;
-  aid: string | null;
-  runs: number;
-  visits: number;
-  results: Partial<Record<"true" | "false" | "error" | "stopped", number>>;
-  unknown: number;
-  inferred: number;
-  timed: number;
-  p50: number | null;
-  p90: number | null;
-  p99: number | null;
-  longest: number | null;
-  spans: Record<"p50" | "p90" | "p99" | "longest", DurationBounds | null>;
-}
-
-export interface Statistics {
-  runs: {
-    id: string;
-    number: number;
-    state: Run["state"];
-    result: Run["result"];
-    took: number | null;
-    span: DurationBounds | null;
-  }[];
-  judged: number;
-  succeeded: number;
-  unknown: number;
-  actions: ActionStatistics[];
-  never_taken: { parent: string; child: string; outcomes: string[] }[];
-  untold: number;
-}
+export type Cause = RunnerApi["CauseShown"];
+export type ComparedField = RunnerApi["Field"];
+export type ComparedStep = RunnerApi["ComparedVisit"];
+export type Comparison = RunnerApi["RunComparison"];
+export type ActionStatistics = RunnerApi["ActionStatistics"];
+export type Statistics = RunnerApi["Statistics"];
 
 /** Which runs a list shows; what is empty asks for all. */
 export interface RunFilter {
@@ -283,14 +171,14 @@ export function useStatistics(runner: string | undefined, graph: string) {
   });
 }
 
-export type InjectedFault = "error" | "false" | "hang" | "init_error";
+export type InjectedFault = NonNullable<RunnerApi["Fit"]["fault"]>;
 
 /** What a run did, as a script for the simulator; with `fault` one action fails at its last visit. */
 export function recordedScriptOf(
   runner: string,
   run: string,
   fault?: { action: string; fault: InjectedFault },
-): Promise<{ behaviours: unknown; doubts: { action: string; text: string }[] }> {
+): Promise<RunnerApi["Recorded"]> {
   const query = fault ? `?${new URLSearchParams({ ...fault })}` : "";
   return fetchJson(`${runner}${path(run)}/script${query}`);
 }
@@ -301,10 +189,8 @@ export function recordedScriptFor(
   run: string,
   umrf: string,
   fault?: { action: string; fault: InjectedFault },
-): Promise<{ behaviours: unknown; doubts: { action: string; text: string }[] }> {
-  const head = JSON.stringify({ ...fault });
-  const body = `${head.slice(0, -1)}${fault ? "," : ""}"umrf":${umrf}}`;
-  return fetchJson(`${runner}${path(run)}/script`, { method: "POST", body });
+): Promise<RunnerApi["Recorded"]> {
+  return fetchJson(`${runner}${path(run)}/script`, { method: "POST", body: { ...fault, umrf } });
 }
 
 /** Runs that one request has started together with this one. */
@@ -314,7 +200,7 @@ export function useRunsOfSameStart(runner: string | undefined, run: Run) {
     queryKey: ["runs", "mates", run.id],
     queryFn: async ({ signal }) => {
       const query = new URLSearchParams({ since: around(-10_000), until: around(10_000) });
-      const near = await fetchJson<Run[]>(`${runner}/api/runs?${query}`, { signal });
+      const near = await fetchJson<ListedRun[]>(`${runner}/api/runs?${query}`, { signal });
       const ids = near.filter((each) => each.group === run.group && each.id !== run.id);
       return Promise.all(ids.map((each) => getRun(runner ?? "", each.id, signal)));
     },
@@ -327,9 +213,7 @@ export function useRaw(runner: string | undefined, run: Run) {
   return useQuery({
     queryKey: ["runs", "raw", run.id],
     queryFn: ({ signal }) =>
-      fetchJson<{ text: string; hours: { name: string }[] }>(`${runner}/api/runs/${run.id}/raw`, {
-        signal,
-      }),
+      fetchJson<RunnerApi["RawMessages"]>(`${runner}/api/runs/${run.id}/raw`, { signal }),
     enabled: runner !== undefined && !run.simulated,
   });
 }

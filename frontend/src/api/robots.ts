@@ -1,112 +1,29 @@
 /** Robots as the runner tells them, and what it looks at before a start. */
 import { useQuery } from "@tanstack/react-query";
-import type { Problem } from "./graphs";
 import { fetchJson, fetchText } from "./http";
+import type { RunnerApi } from "./schema/runner";
 
 export const SIMULATOR = "simulator";
 
-export type EngineState = "answering" | "busy" | "gone" | "restarted" | "no_link";
-type Generation = "current" | "older" | "unknown";
-
-/** A graph that an engine holds, ended ones too. */
-export interface HeldGraph {
-  graph: string;
-  state: string;
-  active: boolean;
-  /** The run of this runner that it is. */
-  run: string | null;
-  /** Why a stop of it is not proven yet, "" at first; null when nobody wants that. */
-  stopping: string | null;
-}
-
-export interface Robot {
-  name: string;
-  simulated: boolean;
-  state: EngineState;
-  why: string;
-  since: string | null;
-  domain: number | null;
-  rmw: string;
-  get_service: string;
-  profile: Record<string, unknown>;
-  heard_at: string | null;
-  took_ms: number | null;
-  restarted_at: string | null;
-  generation: Generation;
-  /** How many answer on the path of its get: one makes answers a proof. */
-  servers: number;
-  /** Programs beside this one that publish starts. */
-  others: number;
-  actor: string;
-  /** Whether pausing is safe there. */
-  pauses: boolean;
-  holds: HeldGraph[];
-  /** How many it has indexed; null before its first answer. */
-  actions: number | null;
-  graphs: number | null;
-}
-
-export interface Registration {
-  name: string;
-  domain: number;
-  rmw: string;
-  get_service: string;
-  profile: Record<string, unknown>;
-}
-
+/** A robot, or the simulator. `servers`: how many answer on the path of its get, where one makes answers
+ * a proof; `others`: programs beside this one that publish starts. */
+export type Robot = RunnerApi["Robot"];
+export type EngineState = Robot["state"];
+export type Generation = Robot["generation"];
+/** A graph that an engine holds, ended ones too. `stopping`: why a stop of it is not proven yet, "" at
+ * first; null when nobody wants that. */
+export type HeldGraph = RunnerApi["HeldGraph"];
+export type Registration = Required<RunnerApi["Registration"]>;
 /** An engine in sight that nobody registered. An idle one does not say its name. */
-export interface FoundEngine {
-  domain: number;
-  rmw: string;
-  get_service: string;
-  servers: number;
-  actor: string;
-  generation: Generation;
-  problem: string;
-}
-
-export interface IndexedByRobot {
-  actions: { name: string; inputs: Record<string, string>; outputs: Record<string, string> }[];
-  graphs: string[];
-  /** Files of its index that cannot be read. */
-  unread: number;
-}
-
-/** A line of a robot's log. */
-export interface RobotLogLine {
-  seq: number;
-  at: string;
-  kind: "commanded" | "became" | "stop_asked" | "stop_proven" | "stop_unproven";
-  command: string;
-  graph: string;
-  sender: string;
-  state: string;
-  why: string;
-  run: string | null;
-  number: number | null;
-  /** Its graph can be fetched. */
-  has_graph: boolean;
-}
-
+export type FoundEngine = RunnerApi["Candidate"];
+export type IndexedByRobot = RunnerApi["RobotKnowledge"];
+/** A line of a robot's log. `has_graph`: its graph can be fetched. */
+export type RobotLogLine = RunnerApi["RobotLogLine"];
 /** One thing that was looked at before a start. */
-export interface PreflightItem {
-  code: string;
-  verdict: "passed" | "warned" | "blocked";
-  text: string;
-  codes: string[];
-  overridable: boolean;
-  problems: Problem[];
-}
-
-export interface Preflight {
-  engine: string;
-  digest: string;
-  items: PreflightItem[];
-  /** The codes that a person would have to answer for. */
-  override: string[];
-  /** Something stands in the way that cannot be overridden. */
-  never: boolean;
-}
+export type PreflightItem = RunnerApi["Item"];
+/** `override`: the codes that a person would have to answer for; `never`: something stands in the way
+ * that cannot be overridden. */
+export type Preflight = RunnerApi["Preflight"];
 
 const path = (runner: string | undefined, name: string) =>
   `${runner ?? ""}/api/robots/${encodeURIComponent(name)}`;
@@ -115,8 +32,7 @@ const path = (runner: string | undefined, name: string) =>
 export function useRosReach(runner: string | undefined) {
   return useQuery({
     queryKey: ["robots", "reach"],
-    queryFn: ({ signal }) =>
-      fetchJson<{ engines: Robot[]; no_reach: string }>(`${runner}/api/reach`, { signal }),
+    queryFn: ({ signal }) => fetchJson<RunnerApi["ReachStatus"]>(`${runner}/api/reach`, { signal }),
     enabled: runner !== undefined,
   });
 }
@@ -183,7 +99,5 @@ export function runPreflight(
   engines: readonly string[],
   signal: AbortSignal,
 ): Promise<Preflight[]> {
-  const head = JSON.stringify({ engines });
-  const body = `${head.slice(0, -1)},"umrf":${umrf}}`;
-  return fetchJson(`${runner}/api/preflight`, { method: "POST", body, signal });
+  return fetchJson(`${runner}/api/preflight`, { method: "POST", body: { engines, umrf }, signal });
 }

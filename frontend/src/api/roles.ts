@@ -1,8 +1,11 @@
 /** What each role may do, as the server's own table has it (`web/auth/roles.py`); a test compares them. */
 
+import type { EditorApi } from "./schema/editor";
+
+export type Role = EditorApi["Person"]["role"];
+
 /** From the least to the most; each may do what those before it may. */
-const ROLES = ["viewer", "editor", "operator", "owner"] as const;
-export type Role = (typeof ROLES)[number];
+export const ROLES = ["viewer", "editor", "operator", "owner"] as const satisfies readonly Role[];
 
 /** The least role that may do a thing. */
 const FROM = {

@@ -1,115 +1,31 @@
 /** Runs as the runner tells them. */
 import { useQuery } from "@tanstack/react-query";
 import { fetchJson } from "./http";
+import type { RunnerApi } from "./schema/runner";
 
-type RunState =
-  | "requested"
-  | "published"
-  | "running"
-  | "paused"
-  | "stopping"
-  | "unknown"
-  | "finished"
-  | "halted"
-  | "stopped"
-  | "error"
-  | "refused"
-  | "lost";
-
-type RunResult = "on_true" | "on_false" | "on_error" | "on_stopped" | "on_halted";
-
-type VisitResult = "true" | "false" | "error" | "stopped" | null;
-
+/** Who asked for something, and from where: `address` is missing for the runner's own computer. */
+export type Requester = RunnerApi["Author"];
 /** Seconds: at least `least`, at most `most`; null: nothing bounds it from above. */
-export interface DurationBounds {
-  least: number;
-  most: number | null;
-}
-
+export type DurationBounds = RunnerApi["Took"];
 /** One execution: it began between `not_before` and `from`, and ended between `until` and
  * `not_after` (null: it may go on still). Where `until` lies before `from`, no moment is known at
  * which it went on for certain. */
-export interface Visit {
-  from: string | null;
-  not_before: string | null;
-  not_after: string | null;
-  until: string | null;
-  result: VisitResult;
-  how: "observed" | "inferred";
-  /** Values that the engine reported, as JSON texts by flat name; null when nobody saw them. */
-  inputs?: Record<string, string> | null;
-}
-
-export interface ActionRun {
-  aid: string | null;
-  state: string;
-  visits: Visit[];
-  /** Earlier visits that are not listed. */
-  older: number;
-  messages: { at: string; text: string }[];
-}
-
-/** Who asked for something, and from where: `address` is missing for the runner's own computer. */
-export interface Requester {
-  id: string;
-  name: string;
-  by?: "browser" | "program";
-  address?: string;
-}
+export type Visit = RunnerApi["VisitShown"];
+export type VisitResult = Visit["result"];
+export type ActionRun = RunnerApi["ActionShown"];
+/** A run as far as it is told: lists leave out its actions, and what is live its graph. */
+export type Run = RunnerApi["RunSummary"] & {
+  [Part in Exclude<keyof RunnerApi["RunWhole"], keyof RunnerApi["RunSummary"]>]?:
+    | RunnerApi["RunWhole"][Part]
+    | undefined;
+};
+export type RunState = Run["state"];
+export type RunResult = NonNullable<Run["result"]>;
 
 /** Where somebody asked from, as words that follow the name; "" where it was not recorded. */
 export function requesterPlace(asker: Requester | null): string {
   if (asker?.by === undefined) return "";
   return ` · by ${asker.by}, from ${asker.address ?? "this computer"}`;
-}
-
-export interface Run {
-  id: string;
-  number: number;
-  graph: string | null;
-  graph_name: string;
-  version: string | null;
-  digest: string;
-  engine: string;
-  simulated: boolean;
-  state: RunState;
-  desired: "running" | "paused" | "stopped";
-  proof_at: string | null;
-  unknown_since: string | null;
-  /** Why no answer of its engine can show rest any more; null when one can. */
-  unconfirmed?: string | null;
-  /** Who has seen it at rest instead; `by` null: the runner, which saw the engine's process end. */
-  at_rest?: { by: Requester | null; at: string; how: string } | null;
-  /** It had ended, and its engine shows it moving; null at its next end. */
-  moves_again_at: string | null;
-  result: RunResult | null;
-  requested_at: string;
-  started_at: string | null;
-  ended_at: string | null;
-  /** From the start to when nothing of it moved any more, as far as that was seen. */
-  took?: DurationBounds | null;
-  author: Requester | null;
-  stopped_by: Requester | null;
-  /** Why it was refused, lost or ended so. */
-  detail: string;
-  alarms: { code: string; at: string; text: string }[];
-  /** Shared by runs that were started together. */
-  group: string | null;
-  /** Whether the journal has all of it. */
-  recorded: boolean;
-  /** The robot whose engine the simulator plays. */
-  like?: string | null;
-  actions?: Record<string, ActionRun>;
-  /** The newest lines of the engine's own log. */
-  log?: { at: string; text: string }[];
-  umrf?: unknown;
-  /** Since when its events stand in an archive, and in which file. */
-  archived?: { at: string; file: string } | null;
-  /** Values of actions as they were sent: action, parameter, JSON text as in `inputs`. */
-  sent?: Record<string, Record<string, string>>;
-  /** Problems that somebody started in spite of, and why. */
-  override?: { codes: string[]; reason: string } | null;
-  despite?: { code: string; text?: string; aid?: string | null }[];
 }
 
 /** Where it ran, in a few words. */
@@ -162,21 +78,18 @@ export interface StartOrder {
   engines: readonly string[];
   request: string;
   /** What actions do; only the simulator follows one. */
-  script?: unknown;
-  override?: { codes: readonly string[]; reason: string };
+  script?: RunnerApi["Script"];
+  override?: RunnerApi["Override"];
 }
 
-export interface Started {
-  runs: Run[];
-  /** Robots that nothing was sent to, and why. */
-  failed: Record<string, string>;
-}
+/** `failed`: robots that nothing was sent to, and why. */
+export type Started = Pick<RunnerApi["GroupShown"], "runs" | "failed">;
 
 /** Starts a version by value. The same `request` never starts twice. */
 export async function startRun(order: StartOrder): Promise<Started> {
   const [engine, ...others] = order.engines;
   const alone = others.length === 0;
-  const head = JSON.stringify({
+  const body = {
     version: order.version,
     digest: order.digest,
     graph: order.graph,
@@ -184,19 +97,18 @@ export async function startRun(order: StartOrder): Promise<Started> {
     request_id: order.request,
     ...(order.override === undefined ? {} : { override: order.override }),
     ...(order.script === undefined ? {} : { script: order.script }),
-  });
-  const body = `${head.slice(0, -1)},"umrf":${order.umrf}}`;
+    umrf: order.umrf,
+  };
   if (!alone) return fetchJson(`${order.runner}/api/groups`, { method: "POST", body });
-  const run = await fetchJson<Run>(`${order.runner}/api/runs`, { method: "POST", body });
+  const run = await fetchJson<RunnerApi["RunShown"]>(`${order.runner}/api/runs`, {
+    method: "POST",
+    body,
+  });
   return { runs: [run], failed: {} };
 }
 
 /** What the runner knows of a start. Without runs and not `under_way`: nothing so far. */
-export interface StartFound {
-  request_id: string;
-  under_way: boolean;
-  runs: Run[];
-}
+export type StartFound = RunnerApi["StartShown"];
 
 export function findStart(
   runner: string,
@@ -232,8 +144,7 @@ export function modifyRun(
   run: string,
   version: { id: string; digest: string; umrf: string },
 ): Promise<Run> {
-  const head = JSON.stringify({ version: version.id, digest: version.digest });
-  const body = `${head.slice(0, -1)},"umrf":${version.umrf}}`;
+  const body = { version: version.id, digest: version.digest, umrf: version.umrf };
   return fetchJson(`${runner}/api/runs/${encodeURIComponent(run)}/modify`, {
     method: "POST",
     body,

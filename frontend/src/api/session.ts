@@ -1,14 +1,10 @@
 /** Who this browser is: trades the token of the link for a cookie. */
 import { errorText, fetchJson, Refusal } from "./http";
-import type { Role } from "./roles";
+import type { EditorApi } from "./schema/editor";
 
 export { may, type Permission, ROLE_WORDS, type Role } from "./roles";
 
-export interface Person {
-  id: string;
-  name: string;
-  role: Role;
-}
+export type Person = EditorApi["Person"];
 
 const NAME_KEY = "aa.name";
 
@@ -42,16 +38,9 @@ export function rememberedName(): string {
   return localStorage.getItem(NAME_KEY) ?? "";
 }
 
-interface SessionAnswer {
-  person: Person;
-}
-
+type SessionAnswer = EditorApi["SignedIn"];
 /** What a link invites to, and by whom. */
-export interface InvitationPreview {
-  id: string;
-  role: Role;
-  by: string;
-}
+export type InvitationPreview = EditorApi["Invited"];
 
 /** Throws `Refusal` when the link is none of this server, or was revoked. */
 export function readInvitation(invitation: string): Promise<InvitationPreview> {

@@ -1,38 +1,17 @@
 /** Links that let people in, as owners see them. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import type { VersionAuthor } from "./graphs";
 import { errorText, fetchJson } from "./http";
 import { serverPath } from "./page-url";
 import type { Role } from "./roles";
+import type { EditorApi } from "./schema/editor";
 
-export interface Guest {
-  person: VersionAuthor;
-  at: string;
-}
-
-export interface Invitation {
-  id: string;
-  role: Role;
-  label: string;
-  made_at: string;
-  made_by: VersionAuthor;
-  guests: readonly Guest[];
-  /** After the origin of the page; absent once the link is revoked. */
-  path?: string;
-  revoked_at?: string;
-  revoked_by?: VersionAuthor;
-  /** Nobody comes in by it any more, though the log could not take that up yet. */
-  unrecorded?: boolean;
-}
-
-export interface Sharing {
-  /** Where others find the page, the likeliest first; empty when they cannot. */
-  origins: readonly string[];
-  secure: boolean;
-  /** The first of these is shown by a proxy, whose certificate that is. */
-  proxied?: boolean;
-  invitations: readonly Invitation[];
-}
+export type Guest = EditorApi["Guest"];
+/** `path` follows the origin of the page, and is absent once the link is revoked. `unrecorded`: nobody
+ * comes in by it any more, though the log could not take that up yet. */
+export type Invitation = EditorApi["Invitation"];
+/** `origins`: where others find the page, the likeliest first; empty when they cannot. `proxied`: the
+ * first of these is shown by a proxy, whose certificate that is. */
+export type Sharing = EditorApi["Sharing"];
 
 const KEY = ["invitations"] as const;
 const NOT_AT_THE_RUNNER =

@@ -9,6 +9,7 @@ const graph = (id: string, more: Partial<GraphSummary> = {}): GraphSummary => ({
   description: "",
   seq: 1,
   updated_at: `2026-01-0${id.length}T00:00:00Z`,
+  made_at: "2026-01-01T00:00:00Z",
   ...more,
 });
 

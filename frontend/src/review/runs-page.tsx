@@ -39,7 +39,7 @@ const PAGE = 100;
 function overlaid(stored: readonly ListedRun[], live: ReadonlyMap<string, Run>): ListedRun[] {
   return stored.map((run) => {
     const now = live.get(run.id);
-    return now === undefined ? run : { ...run, ...now };
+    return now === undefined ? run : { ...run, ...now, archived: now.archived ?? run.archived };
   });
 }
 

@@ -15,6 +15,9 @@ const run: Run = {
   desired: "running",
   proof_at: null,
   unknown_since: null,
+  unconfirmed: null,
+  at_rest: null,
+  took: null,
   moves_again_at: null,
   result: null,
   requested_at: "2026-01-01T00:00:00Z",
@@ -35,6 +38,7 @@ const visit = {
   until: null,
   result: null,
   how: "observed",
+  inputs: null,
 } as const;
 
 const going: ActionRun = { aid: "a", state: "RUNNING", visits: [visit], older: 0, messages: [] };

@@ -125,6 +125,77 @@ def test_a_malformed_start_is_told_where(
             assert found["where"]["path"] == path
 
 
+def as_text(content: bytes) -> bytes:
+    """The same body with its graph as a string, as the page sends it."""
+    fields = msgspec.json.decode(content, type=dict[str, msgspec.Raw])
+    text = msgspec.json.encode(bytes(fields["umrf"]).decode())
+    return msgspec.json.encode(fields | {"umrf": msgspec.Raw(text)})
+
+
+def test_a_graph_as_object_and_as_text_are_the_same_run(process: RunnerProcess) -> None:
+    graph = sequence(actions=2)
+    text = codec.write(graph).replace(
+        '"type": "sync",',
+        '"type": "sync", "input_parameters": {"x": {"pvf_type": "number", "pvf_value": 5.0}},',
+        1,
+    )
+    asked = [order(codec.read(text).graph, script=ENDLESS) for _ in range(2)]
+    assert b"5.0" in bytes(asked[0].umrf)
+    bodies = [body(asked[0]), as_text(body(asked[1]))]
+    with process.client() as client:
+        runs = [client.post("/api/runs", content=each).json() for each in bodies]
+        assert runs[0]["digest"] == runs[1]["digest"]
+        sent = [client.get(f"/api/runs/{run['id']}/umrf").content for run in runs]
+        assert sent[0].replace(runs[0]["id"].encode(), runs[1]["id"].encode()) == sent[1]
+        assert b'"pvf_value": 5.0' in sent[1]
+        again = client.post("/api/runs", content=as_text(bodies[0]))
+        assert (again.status_code, again.json()["id"]) == (200, runs[0]["id"])
+        umrf = bytes(asked[0].umrf)
+        change = b'{"version":"v2","digest":"%b","umrf":%b}' % (asked[0].digest.encode(), umrf)
+        look = b'{"engines":["simulator"],"umrf":%b}' % umrf
+        for path, content, status in [
+            (f"/api/runs/{runs[0]['id']}/modify", change, 202),
+            (f"/api/runs/{runs[0]['id']}/script", b'{"umrf":%b}' % umrf, 200),
+            ("/api/preflight", look, 200),
+        ]:
+            told = [client.post(path, content=each) for each in (content, as_text(content))]
+            assert [each.status_code for each in told] == [status, status], told[1].text
+            if status == 200:
+                assert told[0].content == told[1].content
+        client.post("/api/stop")
+
+
+@pytest.mark.parametrize(
+    ("umrf", "status", "where"),
+    [
+        ("{", 400, {"path": "/umrf", "line": 1, "column": 2}),
+        ("[]", 422, {"path": "/umrf", "line": 1, "column": 1}),
+        (" " * 2_000_001, 413, None),
+    ],
+)
+def test_a_text_that_is_no_graph_is_refused_with_its_place(
+    process: RunnerProcess, umrf: str, status: int, where: dict[str, Any] | None
+) -> None:
+    asked = json.loads(body(order(sequence()))) | {"umrf": umrf}
+    with process.client() as client:
+        found = problem(client.post("/api/runs", json=asked), status)
+        assert found.get("where") == where
+        if status == 413:
+            assert found["detail"] == "At most 2 MB are read."
+
+
+def test_escapes_of_a_text_do_not_make_a_body_too_large(process: RunnerProcess) -> None:
+    content = body(order(sequence(), script=FAST))
+    text = "\n" * 1_900_000
+    with process.client() as client:
+        fields = json.loads(content)
+        spaced = json.dumps(fields["umrf"]) + text
+        run = client.post("/api/runs", json=fields | {"umrf": spaced})
+        assert run.status_code == 201, run.text
+        as_object = content.replace(b'"umrf":{', b'"umrf":' + text.encode() + b" " * 150_000 + b"{")
+        assert problem(client.post("/api/runs", content=as_object), 413)
+
+
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b"\xff", b"[" * 100_000])
 def test_what_is_no_start_at_all_is_refused(process: RunnerProcess, content: bytes) -> None:
     with process.client() as client:

@@ -5,9 +5,10 @@ from typing import Any
 import msgspec
 import pytest
 
-from action_assistant.errors import BadInput, Conflict, NotUmrf
+from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
 from action_assistant.runner.runs.events import Override
-from action_assistant.runner.start.admission import admit, read_request
+from action_assistant.runner.sent_graph import MOST, counted
+from action_assistant.runner.start.admission import admit, prepared, read_request
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.files import codec
@@ -112,3 +113,73 @@ def test_the_text_is_read_as_sent_not_as_some_json_library_would_write_it() -> N
     body = b'{"version":"v","digest":"%b","engine":"simulator","request_id":"r","umrf":%b}'
     asked = read_request(body % (digest(graph).encode(), text.strip().encode()))
     assert bytes(asked.umrf) == text.strip().encode()
+
+
+def with_number(number: str) -> tuple[bytes, str]:
+    """A graph with a number that is spelled so, and its digest."""
+    text = codec.write(sequence())
+    parameter = '"input_parameters": {"speed": {"pvf_type": "number", "pvf_value": NUMBER}},'
+    text = text.replace('"type": "sync",', f'"type": "sync", {parameter}', 1)
+    text = text.replace("NUMBER", number)
+    return text.encode(), digest(codec.read(text).graph)
+
+
+def start_of(umrf: bytes, stamp: str) -> bytes:
+    body = b'{"version":"v","digest":"%b","engine":"simulator","request_id":"r","umrf":%b}'
+    return body % (stamp.encode(), umrf)
+
+
+@pytest.mark.parametrize("number", ["5.0", "5", "1e2", "0.30000000000000004"])
+def test_a_graph_as_object_and_as_text_are_the_same_start(number: str) -> None:
+    text, stamp = with_number(number)
+    as_object = read_request(start_of(text.strip(), stamp))
+    as_text = read_request(start_of(msgspec.json.encode(text.decode()), stamp))
+    first, second = (prepared(each, SIMULATED, "run1") for each in (as_object, as_text))
+    assert first == second
+    assert first.digest == stamp
+    assert f'"pvf_value": {number}' in second.umrf
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "column"),
+    [("", 1, 1), ("{", 1, 2), ('{\n "graph_name": nan}', 2, 16), ("5.0.0", 1, 4)],
+)
+def test_a_text_that_is_no_json_is_refused_with_its_place(
+    text: str, line: int, column: int
+) -> None:
+    asked = read_request(start_of(msgspec.json.encode(text), "0"))
+    with pytest.raises(BadInput) as refused:
+        admit(asked, SIMULATED)
+    assert type(refused.value) is BadInput
+    assert refused.value.where == {"path": "/umrf", "line": line, "column": column}
+
+
+@pytest.mark.parametrize(
+    "text", ['"a text in a text"', "[1]", "{}", '{"actions": [], "actions": []}']
+)
+def test_a_text_that_is_no_graph_is_refused_as_the_object_is(text: str) -> None:
+    told = []
+    for umrf in (text.encode(), msgspec.json.encode(text)):
+        if umrf.startswith(b'"a'):
+            continue  # as an object it would be a text, too
+        with pytest.raises(NotUmrf) as refused:
+            admit(read_request(start_of(umrf, "0")), SIMULATED)
+        told.append(refused.value.detail)
+    assert len(set(told)) == 1
+
+
+def test_a_text_with_half_a_character_is_refused() -> None:
+    for half in (b'"\\ud800"', b'"\\udc00x"'):
+        with pytest.raises(BadInput):
+            admit(read_request(start_of(half, "0")), SIMULATED)
+
+
+def test_escapes_do_not_count_against_the_limit() -> None:
+    text, stamp = with_number("5.0")
+    text += b"\n" * (MOST - len(text))
+    body = start_of(msgspec.json.encode(text.decode()), stamp)
+    assert counted(body) < MOST + 200 < len(body)
+    assert admit(read_request(body), SIMULATED).digest == stamp
+    too_long = msgspec.json.encode(text.decode() + "\n")
+    with pytest.raises(TooLarge):
+        admit(read_request(start_of(too_long, stamp)), SIMULATED)

@@ -3,6 +3,7 @@ import { newAid } from "../../graph/ids";
 import { errorText, isFinal } from "../http";
 import type { Robot } from "../robots";
 import { getRun, postStop, type Run } from "../runs";
+import type { RunnerApi } from "../schema/runner";
 import { sessionEnd } from "../session-end";
 import {
   blockedByBrowser,
@@ -36,18 +37,8 @@ export interface LiveState {
   stops: readonly StopRequest[];
 }
 
-type RunnerMessage =
-  | { type: "hello"; engines: Robot[]; runs: Run[] }
-  | { type: "engines"; engines: Robot[] }
-  | { type: "run"; run: Run }
-  | {
-      type: "beat";
-      at: string;
-      seen?: Record<string, string>;
-      heard?: Record<string, string>;
-    }
-  | { type: "stopping"; stop_id: string; runs: string[] }
-  | { type: "refused"; stop_id: string; detail: string };
+type RunnerMessage = RunnerApi["RunnerMessage"];
+type PageMessage = RunnerApi["PageMessage"];
 
 const SESSION_ENDED = 4401;
 const SILENCE = 3_500; // ms; the runner beats each second
@@ -149,7 +140,8 @@ export class LiveSocket {
 
   #sendStop(run: string, id: string): Promise<unknown> {
     if (this.#socket?.readyState === WebSocket.OPEN) {
-      this.#socket.send(JSON.stringify({ type: "stop", run, stop_id: id }));
+      const message: PageMessage = { type: "stop", run, stop_id: id };
+      this.#socket.send(JSON.stringify(message));
     }
     return postStop(this.#runner, run, id);
   }

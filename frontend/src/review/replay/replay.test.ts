@@ -13,6 +13,7 @@ const visit = (from: number, until: number | null, result: Visit["result"] = nul
   until: until === null ? null : at(until),
   result,
   how: "observed",
+  inputs: null,
 });
 
 const RUN: Run = {
@@ -29,12 +30,15 @@ const RUN: Run = {
   desired: "running",
   proof_at: null,
   unknown_since: null,
+  unconfirmed: null,
+  at_rest: null,
+  took: null,
   moves_again_at: null,
   result: "on_true",
   requested_at: at(0),
   started_at: at(1),
   ended_at: at(99),
-  author: null,
+  author: { id: "p", name: "Ada" },
   stopped_by: null,
   detail: "",
   alarms: [],

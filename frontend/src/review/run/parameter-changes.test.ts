@@ -12,7 +12,7 @@ function visit(inputs: Visit["inputs"]): Visit {
     until: at,
     result: "true",
     how: "observed",
-    ...(inputs === undefined ? {} : { inputs }),
+    inputs,
   };
 }
 

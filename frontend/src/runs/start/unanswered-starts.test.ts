@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { Run, StartFound } from "../../api/runs";
+import type { StartFound } from "../../api/runs";
 import { missing, unknownWords } from "./unanswered-start-notice";
 import { type SentStart, UnansweredStarts } from "./unanswered-starts";
 
@@ -65,7 +65,7 @@ test("of a group it is told which robots have a run and which are not known", ()
   const found = (engines: string[], under_way = false): StartFound => ({
     request_id: "q",
     under_way,
-    runs: engines.map((engine) => ({ engine }) as Run),
+    runs: engines.map((engine) => ({ engine }) as StartFound["runs"][number]),
   });
   expect(missing(sent, undefined)).toEqual(["David", "Eve"]);
   expect(unknownWords(sent, found(["Eve", "David"]), false)).toBeNull();

@@ -18,7 +18,7 @@ export interface StartInput {
   digest: string | null;
   /** What actions do in the simulator. */
   script?: Script;
-  override?: { codes: readonly string[]; reason: string };
+  override?: NonNullable<StartOrder["override"]>;
 }
 
 /** A moment as a version, and its graph exactly as the editor wrote it. */
@@ -104,7 +104,7 @@ async function surely(what: string, order: StartOrder): Promise<Started> {
 }
 
 function nameIn(version: Version): string {
-  const { graph_name: name } = version.umrf as { graph_name?: unknown };
+  const name = version.umrf?.graph_name;
   return typeof name === "string" && name !== "" ? name : "untitled";
 }
 

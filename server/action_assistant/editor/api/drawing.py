@@ -10,8 +10,11 @@ from action_assistant.editor.interchange.importing import Pieces
 from action_assistant.editor.interchange.rehearsal import Rehearsal, Rehearsing, rehearsed
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
+from action_assistant.umrf.json.embedded import JsonObject
+from action_assistant.umrf.semantics import Script
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.server.application import BODY_LIMIT
+from action_assistant.web.server.openapi import reads
 
 _SCRIPT: Final = 1_000_000  # bytes of a body that says what to play
 
@@ -26,6 +29,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         "nothing is stored",
         operation_id="readPieces",
         guards=[Needs("see")],
+        opt=reads(JsonObject),
         request_max_body_size=BODY_LIMIT,
     )
     async def read_pieces(request: Request[Any, Any, Any]) -> Pieces:
@@ -38,6 +42,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="What a graph would do by the engine's rules: its trace; nothing is recorded",
         operation_id="rehearse",
+        opt=reads(Rehearsing, Script=Script),
         guards=[Needs("see")],
         request_max_body_size=_SCRIPT,
     )

@@ -19,9 +19,11 @@ from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
+from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.version import VERSION
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.network.addresses import Addresses
+from action_assistant.web.server.openapi import answer
 
 _SILENCE: Final = 10.0  # seconds after which a listener is told that we are still here
 
@@ -50,7 +52,7 @@ class Example(msgspec.Struct, frozen=True):
     """A graph that comes with the program. Posting `umrf` makes it one of yours."""
 
     name: str
-    umrf: Any
+    umrf: UmrfGraph
 
 
 class Participant(msgspec.Struct, frozen=True):
@@ -104,6 +106,7 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         summary="What is stored, as server-sent events; `after` and Last-Event-ID are positions",
         operation_id="followEvents",
         media_type="text/event-stream",
+        responses={200: answer(StoredEvent, media="text/event-stream", text="An event each time")},
     )
     async def follow_events(
         request: Request[Any, Any, Any], after: int | None = None

@@ -18,9 +18,11 @@ from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.umrf.difference import Difference
+from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Problem
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.server.application import BODY_LIMIT
+from action_assistant.web.server.openapi import answer, reads
 
 Asking = Request[Any, Any, Any]
 Seq = Annotated[int, Parameter(ge=1)]
@@ -68,6 +70,11 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         "with `preview` only say what a file would become, and store nothing",
         operation_id="createGraph",
         guards=[Needs("edit")],
+        opt=reads(JsonObject),
+        responses={
+            200: answer(Preview, text="What the file would become"),
+            201: answer(MadeGraph, text="Made"),
+        },
         request_max_body_size=BODY_LIMIT,
     )
     async def create_graph(
@@ -131,6 +138,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/umrf",
         summary="A graph as UMRF, now or after its change `at`",
         operation_id="getUmrf",
+        responses={200: answer(UmrfGraph)},
     )
     async def get_umrf(graph_id: str, at: Seq | None = None) -> Response[bytes]:
         services = app_state.services
@@ -156,6 +164,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="What an edited text of a graph would change, key by key; stores nothing",
         operation_id="getRewriting",
         guards=[Needs("see")],
+        opt=reads(UmrfGraph),
         request_max_body_size=BODY_LIMIT,
     )
     async def get_rewriting(graph_id: str, seq: Seq, request: Asking) -> TextEdit:

@@ -16,6 +16,7 @@ from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.auth.session_files import OpenSession, SessionFiles
 from action_assistant.web.network.addresses import Addresses
+from action_assistant.web.server.openapi import answer
 
 
 class Sharing(msgspec.Struct, frozen=True):
@@ -117,6 +118,7 @@ def _one(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterH
         summary="A link as a QR code (SVG), for the page at `origin`",
         operation_id="getInvitationCode",
         guards=[Needs("share")],
+        responses={200: answer(str, media="image/svg+xml", text="The picture")},
     )
     async def code(invitation: str, origin: str) -> Response[bytes]:
         if not addresses.is_page(origin):

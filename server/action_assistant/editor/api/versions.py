@@ -9,6 +9,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.editor.catalogue.versions import VersionView
 from action_assistant.editor.services import EditorState
 from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.server.openapi import answer
 
 
 class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -36,6 +37,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="Publish a graph as it is, or as it was after its change `seq`",
         operation_id="publishVersion",
         guards=[Needs("edit")],
+        responses={200: answer(VersionView, text="It had been published before")},
     )
     async def publish_version(
         graph_id: str, request: Request[Any, Any, Any], data: Publishing | None = None

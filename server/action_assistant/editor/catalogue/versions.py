@@ -14,6 +14,7 @@ from action_assistant.errors import BadInput, NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.web.auth.keys import PersonRef
 
 LABEL_LIMIT: Final = 200  # characters
@@ -29,7 +30,7 @@ class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
     seq: int
     author: PersonRef
     at: datetime
-    umrf: Any = None
+    umrf: UmrfGraph | None = None
 
 
 class Versions:

@@ -1,6 +1,6 @@
 """Rehearsals: what a graph would do, played by the engine's rules, and recorded nowhere."""
 
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 
@@ -28,7 +28,7 @@ class Rehearsing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     a script of `simulate`, and what people do meanwhile."""
 
     seq: int | None = None
-    script: Any = None
+    script: Annotated[Any, semantics.SCRIPT] = None
     commands: tuple[Command, ...] = ()
     for_ms: float = HOUR_MS
 

@@ -56,7 +56,7 @@ class Recorded(msgspec.Struct, frozen=True):
 
 
 class ExpectedStep(msgspec.Struct, frozen=True):
-    """One step of a course: `what` happened to `node` (empty: the graph), and how."""
+    """One step of a course: what happened to an action (empty: to the graph), and how."""
 
     graph: str
     node: str

@@ -7,6 +7,7 @@ import msgspec
 from sqlalchemy import Row, Select, select, union_all
 
 from action_assistant.runner.runs.durations import Took, at_rank, took_us
+from action_assistant.runner.runs.run import Result, State
 from action_assistant.schema.runner_tables import action_sum, run
 from action_assistant.umrf.model import EXIT, PRECONDITIONS, Graph, Relation
 
@@ -19,8 +20,8 @@ class RunPoint(msgspec.Struct, frozen=True):
 
     id: str
     number: int
-    state: str
-    result: str | None
+    state: State
+    result: Result | None
     took: float | None
     span: Took | None
 

@@ -8,16 +8,21 @@ from typing import Any, Final
 import anyio
 from litestar import Request
 from litestar.connection import ASGIConnection
+from litestar.exceptions.http_exceptions import RequestEntityTooLarge
 
 from action_assistant.errors import Unavailable
 from action_assistant.runner.runs.events import Author
+from action_assistant.runner.sent_graph import MOST, counted
 from action_assistant.web.auth.access import person_of, session_of
+from action_assistant.web.http.problems import BODY_LIMIT_TOLD
 from action_assistant.web.network.connection_limits import ConcurrencyLimit
 
-#: Bytes of a body that carries a graph: 5,000 actions, the most that the editor takes, are 1.2 MB.
-LARGE: Final = 2_000_000
-#: Bytes of any other body.
+#: Bytes of a body without a graph.
 SMALL: Final = 100_000
+#: Bytes of one with a graph: twice `sent_graph.MOST`, since as a string its text may be escaped.
+GRAPH_BODY: Final = 2 * MOST
+#: For `opt=` of such a route: how much of it counts.
+COUNTED: Final[dict[str, object]] = {BODY_LIMIT_TOLD: MOST}
 _BODY_S: Final = 60.0
 
 
@@ -36,14 +41,16 @@ def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
 async def body_of(
     request: Request[Any, Any, Any], body_limit: ConcurrencyLimit
 ) -> AsyncIterator[bytes]:
-    """A body that may be large: of one person few are in memory at a time, and it has to come in
-    time. Raises TooLarge, Unavailable."""
+    """A body that carries a graph: of one person few are in memory at a time, and it has to come in
+    time. Raises TooLarge, Unavailable, Litestar's RequestEntityTooLarge."""
     async with body_limit.turn(person_of(request).id):
         try:
             with anyio.fail_after(_BODY_S):
                 body = await request.body()
         except TimeoutError as late:
             raise Unavailable(f"The body did not come within {_BODY_S:.0f} s.") from late
+        if len(body) > MOST and counted(body) > MOST:
+            raise RequestEntityTooLarge
         yield body
 
 

@@ -9,7 +9,7 @@ import math
 from collections import deque
 from collections.abc import Awaitable, Callable
 from datetime import datetime
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 from weakref import WeakKeyDictionary
 
 import anyio
@@ -89,6 +89,11 @@ class Beat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
     at: datetime
     seen: dict[str, datetime]
     heard: dict[str, datetime]
+
+
+#: What the runner says over the socket, and what a page may say.
+RunnerMessage: TypeAlias = Hello | RunMessage | EnginesMessage | Beat | Stopping | RefusedMessage
+PageMessage: TypeAlias = StopMessage
 
 
 class EncodedRun(msgspec.Struct, frozen=True):

@@ -17,8 +17,7 @@ from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.analysis.comparison import RunComparison
 from action_assistant.runner.analysis.replay import RunReplay
 from action_assistant.runner.analysis.statistics import Statistics
-from action_assistant.runner.api.caller import LARGE, author_of, body_of
-from action_assistant.runner.api.openapi import FitOperation
+from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.raw_messages import RawMessages
 from action_assistant.runner.archives.retention import Retention, Swept
@@ -31,9 +30,12 @@ from action_assistant.runner.review.service import (
     RunMarks,
 )
 from action_assistant.runner.review.worker_queries import WorkerQueries
+from action_assistant.runner.sent_graph import SentGraph
 from action_assistant.runner.start.admission import decoded
+from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.network.connection_limits import ConcurrencyLimit
+from action_assistant.web.server.openapi import FileBytes, answer, reads
 
 T = TypeVar("T")
 
@@ -60,7 +62,7 @@ class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Fit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Another version of the graph of a run; `action` (a name of the run) may have a `fault`."""
 
-    umrf: msgspec.Raw
+    umrf: SentGraph
     action: str | None = None
     fault: expected_runs.Fault | None = None
 
@@ -110,7 +112,11 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
     async def found_causes(run: str) -> Response[list[CauseShown]]:
         return json_of(await services.asked.text(ReviewService.causes, run), list[CauseShown])
 
-    @get("/api/runs/{run:str}/umrf", summary="The graph of a run as it was sent")
+    @get(
+        "/api/runs/{run:str}/umrf",
+        summary="The graph of a run as it was sent",
+        responses={200: answer(UmrfGraph)},
+    )
     async def umrf(run: str) -> Response[bytes]:
         return json_of(await services.asked.value(ReviewService.umrf, run), bytes)
 
@@ -133,9 +139,9 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/script",
         status_code=200,
         summary="What a run did, as a script for another version of its graph",
-        operation_class=FitOperation,
+        opt=reads(Fit) | COUNTED,
         guards=[Needs("see")],
-        request_max_body_size=LARGE,
+        request_max_body_size=GRAPH_BODY,
     )
     async def fit(run: str, request: _Asking) -> Response[expected_runs.Recorded]:
         async with body_of(request, services.body_limit) as body:
@@ -144,7 +150,11 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
             text = await services.asked.text(ReviewService.script, run, fault, bytes(asked.umrf))
         return json_of(text, expected_runs.Recorded)
 
-    @get("/api/runs/{run:str}/export", summary="A run as a file: jsonl, csv or mcap")
+    @get(
+        "/api/runs/{run:str}/export",
+        summary="A run as a file: jsonl, csv or mcap",
+        responses={200: answer(FileBytes, media="application/octet-stream")},
+    )
     async def export(
         run: str, form: Annotated[Format, Parameter(query="format")]
     ) -> Response[bytes] | Stream:

@@ -1,15 +1,14 @@
 """The routes of robots: the registry, their state, commands of others, checks before starts."""
 
 from datetime import datetime
-from typing import Any, Final, Protocol, assert_never
+from typing import Any, Final, Literal, Protocol, assert_never
 
 import msgspec
 from litestar import Request, Response, delete, get, patch, post
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound
-from action_assistant.runner.api.caller import LARGE, author_of, body_of
-from action_assistant.runner.api.openapi import GroupOperation, LookOperation
+from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
 from action_assistant.runner.robots.recordings import Recording
@@ -24,11 +23,13 @@ from action_assistant.runner.robots.robot_events import (
 )
 from action_assistant.runner.runs import views
 from action_assistant.runner.start.preflight import Preflight
-from action_assistant.runner.start.start_checks import read_group
+from action_assistant.runner.start.start_checks import GroupRequest, read_group
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.umrf.model import Signature
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.network.connection_limits import ConcurrencyLimit
+from action_assistant.web.server.openapi import FileBytes, answer, reads
 from action_assistant.web.workers.lanes import RunInWorker
 
 _EVENTS: Final = 200
@@ -80,7 +81,7 @@ class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
 
     seq: int
     at: datetime
-    kind: str
+    kind: Literal["commanded", "became", "stop_asked", "stop_proven", "stop_unproven"]
     command: str = ""
     graph: str = ""
     sender: str = ""
@@ -166,12 +167,20 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
         found = await services.control.robots.robot_log.newest(name, _EVENTS)
         return [_told(seq, event) for seq, event in reversed(found)]
 
-    @get("/api/robots/{name:str}/events/{seq:int}/umrf", summary="The graph of a command, as UMRF")
+    @get(
+        "/api/robots/{name:str}/events/{seq:int}/umrf",
+        summary="The graph of a command, as UMRF",
+        responses={200: answer(UmrfGraph)},
+    )
     async def commanded(name: str, seq: int) -> Response[bytes]:
         services.control.robots.registration(name)
         return await _umrf(services, await services.control.robots.robot_log.graph(name, seq))
 
-    @get("/api/robots/{name:str}/umrf", summary="A graph that a robot holds, as UMRF")
+    @get(
+        "/api/robots/{name:str}/umrf",
+        summary="A graph that a robot holds, as UMRF",
+        responses={200: answer(UmrfGraph)},
+    )
     async def held(name: str, graph: str) -> Response[bytes]:
         """Without its run state: a graph that carries one must not be sent again."""
         return await _umrf(services, services.control.robots.held(name, graph))
@@ -182,7 +191,11 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
         kept = services.control.robots.recordings
         return [] if kept is None else await kept.listed(name)
 
-    @get("/api/robots/{name:str}/recordings/{file:str}", summary="An hour, as JSON lines, gzipped")
+    @get(
+        "/api/robots/{name:str}/recordings/{file:str}",
+        summary="An hour, as JSON lines, gzipped",
+        responses={200: answer(FileBytes, media="application/gzip")},
+    )
     async def recording(name: str, file: str) -> Response[bytes]:
         services.control.robots.registration(name)
         kept = services.control.robots.recordings
@@ -207,9 +220,9 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
         "/api/preflight",
         status_code=200,
         summary="What stands between a graph and its start, engine by engine",
-        operation_class=LookOperation,
+        opt=reads(GroupRequest) | COUNTED,
         guards=[Needs("simulate")],
-        request_max_body_size=LARGE,
+        request_max_body_size=GRAPH_BODY,
     )
     async def look(request: _Asking) -> list[Preflight]:
         async with body_of(request, services.body_limit) as body:
@@ -218,9 +231,10 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/groups",
         summary="Start a version on several robots",
-        operation_class=GroupOperation,
+        opt=reads(GroupRequest) | COUNTED,
+        responses={200: answer(GroupShown, text="It had been started before")},
         guards=[Needs("operate")],
-        request_max_body_size=LARGE,
+        request_max_body_size=GRAPH_BODY,
     )
     async def start(request: _Asking) -> Response[GroupShown]:
         async with body_of(request, services.body_limit) as body:

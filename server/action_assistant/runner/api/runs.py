@@ -8,6 +8,7 @@ import anyio
 import msgspec
 from litestar import Request, Response, WebSocket, get, post, websocket
 from litestar.exceptions import HTTPException
+from litestar.openapi import ResponseSpec
 from litestar.params import Parameter
 from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
@@ -15,24 +16,26 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import BadInput, NotFound, TooMany
 from action_assistant.runner.api import review as review
 from action_assistant.runner.api import robots
-from action_assistant.runner.api.caller import LARGE, author_of, body_of, start_of
-from action_assistant.runner.api.live import Stopping, attend, work_out
-from action_assistant.runner.api.openapi import (
-    ModifyOperation,
-    RestOperation,
-    StartOperation,
-    StopOperation,
+from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of, start_of
+from action_assistant.runner.api.live import (
+    PageMessage,
+    RunnerMessage,
+    Stopping,
+    attend,
+    work_out,
 )
 from action_assistant.runner.api.review import json_of
 from action_assistant.runner.api.services import RunnerServices
-from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.interventions import ModifyRequest, RestRequest
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.review import listing
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.run import Run, State
-from action_assistant.runner.start.admission import decoded, read_request
+from action_assistant.runner.start.admission import StartRequest, decoded, read_request
+from action_assistant.umrf.semantics import Script
 from action_assistant.web.auth.access import Needs, person_of, refuse, require
+from action_assistant.web.server.openapi import answer, exchanges, reads
 
 _PAGE: Final = 500  # events read at once
 _STOP_BYTES: Final = 4_096  # of the body of a Stop; whatever comes after them is not read
@@ -63,9 +66,10 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs",
         summary="Start a version, at most once per request_id",
-        operation_class=StartOperation,
+        opt=reads(StartRequest, Script=Script) | COUNTED,
+        responses={200: answer(views.RunShown, text="It had been started before")},
         guards=[Needs("simulate")],
-        request_max_body_size=LARGE,
+        request_max_body_size=GRAPH_BODY,
     )
     async def start(request: _Asking) -> Response[views.RunShown]:
         async with body_of(request, services.body_limit) as body:
@@ -97,7 +101,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/stop",
         status_code=202,
         summary="Stop everything",
-        operation_class=StopOperation,
+        opt=reads(StopBody | None),
         guards=[Needs("stop")],
     )
     async def stop_all(request: _Asking) -> Stopping:
@@ -108,7 +112,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/stop",
         status_code=202,
         summary="Stop a run",
-        operation_class=StopOperation,
+        opt=reads(StopBody | None),
         guards=[Needs("stop")],
     )
     async def stop(run: str, request: _Asking) -> Stopping:
@@ -139,9 +143,9 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/modify",
         status_code=202,
         summary="Change a running graph, where its engine makes that safe",
-        operation_class=ModifyOperation,
+        opt=reads(ModifyRequest) | COUNTED,
         guards=[Needs("simulate")],
-        request_max_body_size=LARGE,
+        request_max_body_size=GRAPH_BODY,
     )
     async def modify(run: str, request: _Asking) -> views.RunShown:
         await _require_hand_on(services, run, request)
@@ -152,7 +156,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/at_rest",
         status_code=200,
         summary="Confirm that a run is at rest which no answer of its engine can prove so",
-        operation_class=RestOperation,
+        opt=reads(RestRequest),
         guards=[Needs("operate")],
     )
     async def at_rest(run: str, request: _Asking) -> views.RunShown:
@@ -223,7 +227,14 @@ def _reads(services: RunnerServices) -> list[ControllerRouterHandler]:
         )
         return json_of(msgspec.json.encode(whole), views.RunWhole)
 
-    @get("/api/runs/{run:str}/events", summary="A run's events as they are stored (SSE)")
+    @get(
+        "/api/runs/{run:str}/events",
+        summary="A run's events as they are stored (SSE)",
+        responses={
+            200: answer(listing.HistoryEvent, media="text/event-stream", text="An event each time"),
+            204: ResponseSpec(None, description="All of them are known, and no more will come"),
+        },
+    )
     async def events(run: str, request: _Asking) -> Stream | Response[None]:
         after = _last_event_id(request)
         opened = services.control.open.get(run)
@@ -242,7 +253,7 @@ def _reads(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 
 def _live(services: RunnerServices) -> ControllerRouterHandler:
-    @websocket("/api/live")
+    @websocket("/api/live", opt=exchanges(RunnerMessage=RunnerMessage, PageMessage=PageMessage))
     async def live(socket: WebSocket[Any, Any, Any]) -> None:
         address = socket.client.host if socket.client is not None else ""
         try:

@@ -16,6 +16,7 @@ from action_assistant.runner.links.port import (
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.sent_graph import SentGraph
 from action_assistant.runner.start.admission import StartRequest, decoded, prepared
 from action_assistant.runner.start.preflight import not_matched_in
 from action_assistant.umrf.facts import SIMULATED
@@ -30,7 +31,7 @@ class ModifyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
     version: str
     digest: str
-    umrf: msgspec.Raw
+    umrf: SentGraph
     continue_from: str = ""
     override: Override | None = None
 

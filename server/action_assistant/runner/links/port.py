@@ -216,7 +216,7 @@ class Registration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class Candidate(msgspec.Struct, frozen=True, kw_only=True):
-    """An engine that discovery shows. An idle one does not say its name: `actor` is "" until its
+    """An engine that discovery shows. One at rest does not say its name: `actor` is "" until its
     feedback was heard, and a person has to know the name."""
 
     domain: int

@@ -8,7 +8,7 @@ from typing import Any, Concatenate, Final, Literal, ParamSpec, Protocol, TypeAl
 import msgspec
 from sqlalchemy import Row, Select, select
 
-from action_assistant.errors import BadInput, Conflict, NotFound, NotUmrf
+from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
 from action_assistant.runner.analysis.cause_texts import words
@@ -27,8 +27,10 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.sent_graph import read_sent
 from action_assistant.schema.runner_tables import expectation, review, run_label
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 from action_assistant.web.workers.lanes import RunInWorker
@@ -62,8 +64,8 @@ class Expectation(msgspec.Struct, frozen=True, kw_only=True):
     graph: str | None
     graph_name: str
     author: Author
-    umrf: msgspec.Raw
-    script: msgspec.Raw
+    umrf: UmrfGraph
+    script: JsonObject
     course: list[expected_runs.ExpectedStep]
 
 
@@ -256,17 +258,14 @@ class ReviewService:
         self, run_id: str, fault: tuple[str, expected_runs.Fault] | None, umrf: bytes | None = None
     ) -> expected_runs.Recorded:
         """What the run did as a script, for its own graph or for another version of it. Raises
-        NotFound, BadInput, NotUmrf."""
+        NotFound, BadInput, NotUmrf, TooLarge."""
         found = await self.known(run_id)
         if fault is not None and fault[0] not in found.actions:
             raise BadInput(f"The run has no action {fault[0]!r}.", where={"path": "/fault"})
         script = expected_runs.recorded(found, fault)
         if umrf is None:
             return script
-        try:
-            reading = await self._run_in_worker(lambda: codec.read(umrf))
-        except codec.Unreadable as wrong:
-            raise NotUmrf(wrong.message, where={"path": f"/umrf{wrong.path}"}) from wrong
+        _, reading = await self._run_in_worker(lambda: read_sent(umrf))
         return expected_runs.fitted(script, found, reading.graph)
 
     # --- many runs ----------------------------------------------------------------------------

@@ -23,6 +23,7 @@ State: TypeAlias = Literal[
     "refused",
     "lost",
 ]
+Result: TypeAlias = Literal["on_true", "on_false", "on_error", "on_stopped", "on_halted"]
 Desired: TypeAlias = Literal["running", "paused", "stopped"]
 #: States in which a run is over.
 ENDED: Final[frozenset[State]] = frozenset(

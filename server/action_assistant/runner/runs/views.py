@@ -11,8 +11,9 @@ from sqlalchemy import Row
 from action_assistant.runner.links.parameter_texts import sent
 from action_assistant.runner.runs.durations import Took, of_run
 from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override
-from action_assistant.runner.runs.run import Desired, Run, State
+from action_assistant.runner.runs.run import Desired, Result, Run, State
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
+from action_assistant.umrf.json.embedded import UmrfGraph
 
 _LIVE: Final = 3_000  # visits in one live message, over all actions
 _WHOLE: Final = 20_000
@@ -21,10 +22,11 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
-    """One execution of an action. It began between `not_before` and `from`, and ended between `until`
+    """One visit of an action. It began between `not_before` and `from`, and ended between `until`
     (null: no end was seen) and `not_after` (null: it may go on still); where `until` lies before
-    `from`, no moment is known at which it went on for certain. `inputs`: values that the engine reported for it, by flat name, as JSON texts (a long
-    one is cut and ends with an ellipsis); null when nobody saw them."""
+    `from`, no moment is known at which it went on for certain. `inputs`: values that the engine
+    reported for it, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null
+    when nobody saw them."""
 
     start: datetime
     not_before: datetime
@@ -84,7 +86,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     author: Author
     state: State
     desired: Desired
-    result: str | None
+    result: Result | None
     proof_at: datetime | None
     unknown_since: datetime | None
     unconfirmed: str | None
@@ -132,7 +134,7 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
     """A run with the graph as it was sent. `sent`: the values of its actions, by full name and flat
     name, written as in `inputs` of visits."""
 
-    umrf: msgspec.Raw
+    umrf: UmrfGraph
     override: Override | None
     sent: dict[str, dict[str, str]]
     despite: list[Overridden]

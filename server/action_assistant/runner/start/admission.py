@@ -6,17 +6,18 @@ from typing import Annotated, Final, TypeVar
 
 import msgspec
 
-from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
+from action_assistant.errors import BadInput, Conflict, TooLarge
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.links.simulator import slowed
 from action_assistant.runner.runs.events import Override
+from action_assistant.runner.sent_graph import SentGraph, read_sent
 from action_assistant.umrf.check import STRUCTURAL, blocking, check
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.laps import Laps, laps
 from action_assistant.umrf.model import Graph, Problem
-from action_assistant.umrf.semantics import Script, script_from
+from action_assistant.umrf.semantics import SCRIPT, Script, script_from
 
 T = TypeVar("T")
 
@@ -38,11 +39,11 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
     version: str
     digest: str
-    umrf: msgspec.Raw
+    umrf: SentGraph
     engine: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
     request_id: Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
     graph: str | None = None
-    script: msgspec.Raw = msgspec.Raw()
+    script: Annotated[msgspec.Raw, SCRIPT] = msgspec.field(default_factory=msgspec.Raw)
     override: Override | None = None
     like: str | None = None
 
@@ -92,12 +93,8 @@ def decoded(body: bytes, kind: type[T]) -> T:
 def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> Admitted:
     """Check text, digest, names and problems. Raises BadInput, NotUmrf, Conflict. Before a graph is
     `approved` nobody needs to know its digest."""
-    text = bytes(asked.umrf)
-    try:
-        reading = codec.read(text)
-        stamp = codec.stamp_of(text)
-    except codec.Unreadable as wrong:
-        raise NotUmrf(wrong.message, where={"path": f"/umrf{wrong.path}"}) from wrong
+    text, reading = read_sent(bytes(asked.umrf))
+    stamp = codec.stamp_of(text)
     found = digest(reading.graph)
     if found != asked.digest and (approved or asked.digest):
         raise Conflict(

@@ -16,6 +16,7 @@ from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Overridden, Override
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.sent_graph import SentGraph
 from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
 from action_assistant.runner.start.preflight import EngineSight, Item, Preflight, Settled
@@ -35,7 +36,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     """One version for several robots at once. Without version, digest and `request_id` it can only
     be looked at."""
 
-    umrf: msgspec.Raw
+    umrf: SentGraph
     version: str = ""
     digest: str = ""
     engines: Annotated[tuple[_Name, ...], msgspec.Meta(min_length=1, max_length=_MOST)]

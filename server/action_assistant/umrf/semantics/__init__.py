@@ -3,7 +3,7 @@
 from action_assistant.umrf.semantics.engine import Engine, GraphNow
 from action_assistant.umrf.semantics.graphs import GraphRefused
 from action_assistant.umrf.semantics.parts import Execution
-from action_assistant.umrf.semantics.script import Behaviour, Script, script_from
+from action_assistant.umrf.semantics.script import SCRIPT, Behaviour, Script, script_from
 from action_assistant.umrf.semantics.simulate import CUT_OFF, simulate
 from action_assistant.umrf.semantics.trace import (
     Dispatch,
@@ -19,6 +19,7 @@ from action_assistant.umrf.semantics.trace import (
 
 __all__ = [
     "CUT_OFF",
+    "SCRIPT",
     "Behaviour",
     "Dispatch",
     "EdgeEval",

@@ -1,11 +1,14 @@
 """Scripts: what actions do in a simulation (docs/contracts.md 5.2)."""
 
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import msgspec
 
 OUTCOMES: Final = ("on_true", "on_false", "on_error")
+_OUTCOME: Final = msgspec.Meta(extra_json_schema={"enum": list(OUTCOMES)})
+#: Describes a field that `script_from` reads; the route names `Script` beside its body.
+SCRIPT: Final = msgspec.Meta(extra_json_schema={"$ref": "#/components/schemas/Script"})
 
 
 class Behaviour(msgspec.Struct, frozen=True, kw_only=True):
@@ -18,7 +21,7 @@ class Behaviour(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     after_s: float = 1.0
-    result: str = "on_true"
+    result: Annotated[str, _OUTCOME] = "on_true"
     stop_s: float = 0.05
     pauses: bool = True
     never: bool = False

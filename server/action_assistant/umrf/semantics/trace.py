@@ -26,7 +26,7 @@ class GraphStateEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_
 
 
 class EdgeEval(msgspec.Struct, frozen=True, tag_field="kind", tag="edge"):
-    """One relation was asked: `edge` is `parent => child`, `eval` is `result -> response`."""
+    """One relation was asked: `parent => child`, and what came of it: `result -> response`."""
 
     t_ms: float
     graph: str

@@ -2,7 +2,7 @@
 
 import logging
 from http import HTTPStatus
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import msgspec
 from litestar import Request, Response
@@ -15,6 +15,18 @@ from action_assistant.errors import Refused
 log: Final = logging.getLogger(__name__)
 
 PROBLEM_JSON: Final = "application/problem+json"
+#: A key of a route's `opt`: the bytes of a body that it takes, where more may come over the wire.
+BODY_LIMIT_TOLD: Final = "body_limit_told"
+#: What most places have; some refusals tell more.
+_PLACE: Final = msgspec.Meta(
+    extra_json_schema={
+        "properties": {
+            "path": {"type": "string", "description": "A JSON pointer into what was sent"},
+            "line": {"type": "integer"},
+            "column": {"type": "integer"},
+        }
+    }
+)
 
 
 class ProblemDetails(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -24,7 +36,7 @@ class ProblemDetails(msgspec.Struct, frozen=True, omit_defaults=True):
     title: str
     status: int
     detail: str
-    where: dict[str, Any] | None = None
+    where: Annotated[dict[str, Any], _PLACE] | None = None
 
 
 def problem_of(refused: Refused) -> bytes:
@@ -98,9 +110,9 @@ def _told(
 def _limit(request: Request[Any, Any, Any]) -> str:
     """How long a body may be that this route takes."""
     handler = request.scope.get("route_handler")
-    most = (
-        handler.resolve_request_max_body_size() if isinstance(handler, HTTPRouteHandler) else None
-    )
+    if not isinstance(handler, HTTPRouteHandler):
+        return "some bytes"
+    most = handler.opt.get(BODY_LIMIT_TOLD, handler.resolve_request_max_body_size())
     if most is None:
         return "some bytes"
     return f"{most // 1_000_000} MB" if most >= 1_000_000 else f"{most // 1_000} kB"

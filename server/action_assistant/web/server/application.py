@@ -1,20 +1,15 @@
 """The ASGI application of either process: Litestar inside, access control around it."""
 
 import logging
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-import anyio
 import msgspec
-from anyio import to_thread
-from litestar import Litestar, MediaType, Request, Response, Router, get
+from litestar import Litestar, MediaType, Request, Response, get
 from litestar.connection import ASGIConnection
 from litestar.handlers.base import BaseRouteHandler
-from litestar.openapi import OpenAPIConfig
-from litestar.openapi.plugins import JsonRenderPlugin
-from litestar.openapi.spec import Components, SecurityScheme
 from litestar.params import Parameter
 from litestar.routes import HTTPRoute
 from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive, Scope, Send
@@ -27,6 +22,7 @@ from action_assistant.web.auth.roles import Deed
 from action_assistant.web.http.page import Page
 from action_assistant.web.http.problems import problem_handlers
 from action_assistant.web.network.addresses import Addresses, host_name
+from action_assistant.web.server.openapi import OpenApiText, document, openapi_config
 from action_assistant.web.server.proxy import MOUNT, Mounted, misrouted
 
 log: Final = logging.getLogger(__name__)
@@ -75,7 +71,8 @@ def application(
         _proving(keys),
         *([misrouted(runner_port)] if runner_port is not None else []),
     ]
-    inner = _routed(handlers, title, lifespan, body_limit)
+    openapi = OpenApiText()
+    inner = _routed(handlers, title, lifespan, body_limit, openapi)
 
     def root_of(scope: HTTPScope) -> str:
         state: dict[str, Any] = scope.get("state", {})
@@ -94,7 +91,7 @@ def application(
         policy=lambda host: _policy(addresses, host, page_port, runner_port),
         revoked=revoked,
     )
-    return _NamedRoute(Mounted(outer, mount), inner)
+    return _Described(Mounted(outer, mount), openapi)
 
 
 def _routed(
@@ -102,21 +99,20 @@ def _routed(
     title: str,
     lifespan: Sequence[Lifespan],
     body_limit: int,
+    openapi: OpenApiText,
 ) -> Litestar:
     """Routes, how they refuse, and the document that describes them."""
-    decisions: dict[tuple[str, str], Deed] = {}
-    api = _OpenApiText(decisions)
     inner = Litestar(
         handlers,
         guards=[_undecided],
         exception_handlers=problem_handlers(),
         lifespan=list(lifespan),
-        openapi_config=_openapi(title, api),
+        openapi_config=openapi_config(title, openapi),
         request_max_body_size=body_limit,
         logging_config=None,
     )
-    decisions.update(_decisions(inner))
-    api.make = lambda: inner.openapi_schema.to_schema()
+    decisions = _decisions(inner)
+    openapi.make = lambda: document(inner, decisions, _answers_strangers)
     return inner
 
 
@@ -165,12 +161,16 @@ async def _undecided(
         require(connection, "restore")
 
 
-class _NamedRoute:
-    """The application, with Litestar's own one in reach for those who make its OpenAPI text."""
+class _Described:
+    """The application, with its OpenAPI document in reach for those who generate types of it."""
 
-    def __init__(self, outer: ASGIApp, inner: Litestar) -> None:
+    def __init__(self, outer: ASGIApp, openapi: OpenApiText) -> None:
         self._outer = outer
-        self.litestar = inner
+        self._openapi = openapi
+
+    def openapi(self) -> bytes:
+        """The document as JSON. It takes its time."""
+        return self._openapi.made()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         await self._outer(scope, receive, send)
@@ -193,68 +193,6 @@ def _policy(addresses: Addresses, host: str, page_port: int, runner_port: int | 
 
 def _socket(url: str) -> str:
     return url.replace("http", "ws", 1)
-
-
-class _OpenApiText(JsonRenderPlugin):
-    """OpenAPI as JSON. Litestar leaves out an empty `security`, which is how a route says that it
-    is open to strangers; the others say in `x-needs` what one must be allowed to do.
-
-    It takes a fifth of a second to make, so that is done when it is first asked for, and on a
-    thread: nothing else waits for it.
-    """
-
-    def __init__(self, decisions: Mapping[tuple[str, str], Deed]) -> None:
-        super().__init__(path="/openapi.json")
-        self.make: Callable[[], dict[str, Any]] = dict
-        self._decisions = decisions
-        self._text = b""
-        self._turn = anyio.Lock()
-
-    def router(self) -> Router:
-        """For Litestar's routes of it, which would make it while everybody waits."""
-
-        # Litestar copies what it is given, but no functions.
-        async def answer(request: Request[Any, Any, Any]) -> Response[bytes] | None:
-            if request.route_handler.media_type != self.media_type:
-                return None  # there is no such page
-            return Response(await self._known(), media_type=self.media_type)
-
-        return Router(
-            "/schema",
-            route_handlers=[],
-            before_request=answer,
-            include_in_schema=False,
-            dto=None,
-            return_dto=None,
-        )
-
-    async def _known(self) -> bytes:
-        async with self._turn:
-            if not self._text:
-                self._text = await to_thread.run_sync(self._made)
-        return self._text
-
-    def _made(self) -> bytes:
-        schema = self.make()
-        for path, item in schema["paths"].items():
-            for method, operation in item.items():
-                if _answers_strangers(path):
-                    operation["security"] = []
-                elif (path, method) in self._decisions:
-                    operation["x-needs"] = self._decisions[path, method]
-        return msgspec.json.encode(schema)
-
-
-def _openapi(title: str, api: _OpenApiText) -> OpenAPIConfig:
-    schemes: dict[str, Any] = {"token": SecurityScheme(type="http", scheme="bearer")}
-    return OpenAPIConfig(
-        title=title,
-        version=VERSION,
-        openapi_router=api.router(),
-        render_plugins=[api],
-        components=Components(security_schemes=schemes),
-        security=[{"token": []}],
-    )
 
 
 _PASSED_ON: Final = ("x-forwarded-for", "forwarded", "via")

@@ -1,0 +1,692 @@
+/** What the editor takes and answers. Made by `make types`; changes are lost. */
+export interface EditorApi {
+    /**
+     * ActionChange
+     * @description An action that came, went or changed. `name` is its full name, the newer one.
+     */
+    ActionChange: {
+        /** @enum {string} */
+        change: "added" | "changed" | "removed";
+        aid: string;
+        name: string;
+        fields: EditorApi["Field"][];
+    };
+    /**
+     * Behaviour
+     * @description One call of an action. Times are seconds.
+     *
+     *     `never`: does not end by itself. `ignores_stop`: goes on until its own end. `stop_error`: throws
+     *     in onStop, which the engine calls ERROR at once, whatever its code does. `pauses`: has an onPause.
+     *     `init_error`: throws when it is loaded. `no_library`: indexed, but its library is not there, so
+     *     that no graph with it can be built (said of its first call). `outputs`: values by flat name.
+     */
+    Behaviour: {
+        /** @default 1 */
+        after_s?: number;
+        /**
+         * @default on_true
+         * @enum {string}
+         */
+        result?: "on_true" | "on_false" | "on_error";
+        /** @default 0.05 */
+        stop_s?: number;
+        /** @default true */
+        pauses?: boolean;
+        /** @default false */
+        never?: boolean;
+        /** @default false */
+        ignores_stop?: boolean;
+        /** @default false */
+        stop_error?: boolean;
+        /** @default false */
+        init_error?: boolean;
+        /** @default false */
+        no_library?: boolean;
+        /** @default null */
+        outputs?: Record<string, unknown> | null;
+        /** @default null */
+        message?: string | null;
+    };
+    /**
+     * Command
+     * @description What a person does to the graph, and when.
+     */
+    Command: {
+        at_ms: number;
+        /** @enum {string} */
+        verb: "pause" | "resume" | "stop";
+    };
+    /**
+     * Config
+     * @description What a page has to know. `runner_url` has no slash at its end.
+     */
+    Config: {
+        mode: string;
+        version: string;
+        runner_url: string;
+    };
+    /**
+     * Counts
+     * @description How many problems of each severity.
+     */
+    Counts: {
+        error: number;
+        warning: number;
+    };
+    /**
+     * Describing
+     * @description What to call a graph from now on; what is left out stays.
+     */
+    Describing: {
+        /** @default null */
+        name?: string | null;
+        /** @default null */
+        description?: string | null;
+    };
+    /**
+     * Difference
+     * @description From `before` to `after`, both changes of the same graph's document.
+     */
+    Difference: {
+        before: number;
+        after: number;
+        fields: EditorApi["Field"][];
+        actions: EditorApi["ActionChange"][];
+        relations: EditorApi["RelationChange"][];
+    };
+    /**
+     * Dispatch
+     * @description A child was ready and the response was carried out.
+     */
+    Dispatch: {
+        /** @enum {string} */
+        kind: "dispatch";
+        t_ms: number;
+        graph: string;
+        node: string;
+        response: string;
+    };
+    /**
+     * EdgeEval
+     * @description One relation was asked: `parent => child`, and what came of it: `result -> response`.
+     */
+    EdgeEval: {
+        /** @enum {string} */
+        kind: "edge";
+        t_ms: number;
+        graph: string;
+        edge: string;
+        eval: string;
+    };
+    /**
+     * Example
+     * @description A graph that comes with the program. Posting `umrf` makes it one of yours.
+     */
+    Example: {
+        name: string;
+        /** @description A UMRF graph. */
+        umrf: {
+            [key: string]: unknown;
+        };
+    };
+    /**
+     * Field
+     * @description A field that says something else now. null where it said nothing.
+     */
+    Field: {
+        field: string;
+        before: unknown;
+        after: unknown;
+    };
+    /**
+     * GraphResultEvent
+     * @description The exit of a graph was satisfied with this result.
+     */
+    GraphResultEvent: {
+        /** @enum {string} */
+        kind: "graph_result";
+        t_ms: number;
+        graph: string;
+        value: string;
+    };
+    /**
+     * GraphStateEvent
+     * @description A graph changed its state.
+     */
+    GraphStateEvent: {
+        /** @enum {string} */
+        kind: "graph_state";
+        t_ms: number;
+        graph: string;
+        state: string;
+    };
+    /**
+     * GraphView
+     * @description A graph as lists and pages show it. `seq` counts the changes of its document.
+     *
+     *     `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
+     *     change it. `people`: who is in it now.
+     */
+    GraphView: {
+        id: string;
+        name: string;
+        description: string;
+        seq: number;
+        /** Format: date-time */
+        updated_at: string;
+        /** Format: date-time */
+        made_at: string;
+        actions?: number;
+        problems?: EditorApi["Counts"];
+        /** @default [] */
+        robots?: string[];
+        /** @default [] */
+        labels?: string[];
+        /** @default [] */
+        people?: EditorApi["PersonRef"][];
+        deleted_at?: string;
+        damaged?: number;
+    };
+    /**
+     * Guest
+     * @description Somebody who came in by an invitation, and when that was first.
+     */
+    Guest: {
+        person: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+    };
+    /**
+     * HazardEvent
+     * @description Here the real engine crashes, hangs or does something that nobody wants.
+     *
+     *     See docs/umrf-and-the-engine.md 3.
+     *
+     *     `effect`: `crash` ends the trace; after `hang` no command is answered; `goes on` warns; `cut off`
+     *     says that it was not simulated any further.
+     */
+    HazardEvent: {
+        /** @enum {string} */
+        kind: "hazard";
+        t_ms: number;
+        graph: string;
+        code: string;
+        effect: string;
+        node?: string;
+        /** @default  */
+        message?: string;
+    };
+    /**
+     * HistoryEntry
+     * @description Something that was done to a graph, between `at` and `until`.
+     *
+     *     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
+     *     was after that deed; edits begin at `from_seq`. `restored` is the change that was gone back to.
+     */
+    HistoryEntry: {
+        /** @enum {string} */
+        kind: "created" | "deleted" | "edited" | "imported" | "published" | "recovered" | "restored";
+        author: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+        /** Format: date-time */
+        until: string;
+        seq: number;
+        from_seq?: number;
+        restored?: number;
+        version?: EditorApi["VersionView"];
+    };
+    /**
+     * ImportReport
+     * @description What was found in an imported file: its dialect, what was translated, what is wrong.
+     *
+     *     `remarks` are the notes with their places; all places are in the file as it was sent.
+     */
+    ImportReport: {
+        dialect: string;
+        notes: string[];
+        problems: EditorApi["Problem"][];
+        remarks: EditorApi["Note"][];
+    };
+    /**
+     * Invitation
+     * @description A link as its maker sees it. `path` follows the origin of the page; it holds the secret, and
+     *     is left out once the link is revoked. `unrecorded`: that it is revoked is not in the log yet.
+     */
+    Invitation: {
+        id: string;
+        /** @enum {string} */
+        role: "editor" | "operator" | "owner" | "viewer";
+        label: string;
+        /** Format: date-time */
+        made_at: string;
+        made_by: EditorApi["PersonRef"];
+        guests: EditorApi["Guest"][];
+        path?: string;
+        revoked_at?: string;
+        revoked_by?: EditorApi["PersonRef"];
+        /** @default false */
+        unrecorded?: boolean;
+    };
+    /**
+     * InvitationQuestion
+     * @description A link that somebody wants to know more about before using it.
+     */
+    InvitationQuestion: {
+        invitation: string;
+    };
+    /**
+     * Invited
+     * @description What a link invites to, and who made it.
+     */
+    Invited: {
+        id: string;
+        /** @enum {string} */
+        role: "editor" | "operator" | "owner" | "viewer";
+        by: string;
+    };
+    /**
+     * Inviting
+     * @description A link to be made; `label` says whom it is for.
+     */
+    Inviting: {
+        /** @enum {string} */
+        role: "editor" | "operator" | "viewer";
+        /** @default  */
+        label?: string;
+    };
+    /**
+     * KeyChange
+     * @description One key of the document. A value that is left out: the key is not there.
+     */
+    KeyChange: {
+        root: string;
+        key: string;
+        /** @description Any JSON value */
+        before?: unknown;
+        /** @description Any JSON value */
+        after?: unknown;
+    };
+    /**
+     * LibraryAction
+     * @description An action of the library.
+     *
+     *     Parameters are those of all graphs together; of what they say differently, and of descriptions
+     *     and types, the graph changed last counts. `first_seen` is when the first of them was made.
+     */
+    LibraryAction: {
+        name: string;
+        description: string;
+        type: string;
+        inputs: EditorApi["LibraryParameter"][];
+        outputs: EditorApi["LibraryParameter"][];
+        used_in: string[];
+        /** Format: date-time */
+        first_seen: string;
+    };
+    /**
+     * LibraryParameter
+     * @description One parameter. `path` joins keys with `/` as in UMRF; no `pvf_type`: the file names none.
+     *
+     *     `text` is its JSON as a new use begins with it: without a value.
+     */
+    LibraryParameter: {
+        path: string;
+        pvf_type: string | null;
+        required: boolean;
+        text: string;
+    };
+    /**
+     * MadeGraph
+     * @description A new graph; `reading` is there when it was read from a file.
+     */
+    MadeGraph: {
+        id: string;
+        name: string;
+        description: string;
+        seq: number;
+        /** Format: date-time */
+        updated_at: string;
+        /** Format: date-time */
+        made_at: string;
+        actions?: number;
+        problems?: EditorApi["Counts"];
+        /** @default [] */
+        robots?: string[];
+        /** @default [] */
+        labels?: string[];
+        /** @default [] */
+        people?: EditorApi["PersonRef"][];
+        deleted_at?: string;
+        damaged?: number;
+        reading?: EditorApi["ImportReport"];
+    };
+    /**
+     * NodeResultEvent
+     * @description How a visit of an action ended; the real engine tells nobody.
+     */
+    NodeResultEvent: {
+        /** @enum {string} */
+        kind: "node_result";
+        t_ms: number;
+        graph: string;
+        node: string;
+        result: string;
+        message?: string;
+    };
+    /**
+     * NodeStateEvent
+     * @description An action changed its state. Times are milliseconds as the caller counts them.
+     */
+    NodeStateEvent: {
+        /** @enum {string} */
+        kind: "node_state";
+        t_ms: number;
+        graph: string;
+        node: string;
+        state: string;
+    };
+    /**
+     * NotReady
+     * @description A child waits for inputs or for required parents.
+     */
+    NotReady: {
+        /** @enum {string} */
+        kind: "not_ready";
+        t_ms: number;
+        graph: string;
+        node: string;
+        why: string;
+    };
+    /**
+     * Note
+     * @description What was done with something of a text that was read: translated, or left out.
+     *
+     *     `times` counts how often it was, `where` is the first place and `also` are the others (the first
+     *     thousand of them).
+     */
+    Note: {
+        message: string;
+        where: EditorApi["Where"];
+        /** @default 1 */
+        times?: number;
+        /** @default [] */
+        also?: EditorApi["Where"][];
+    };
+    /**
+     * OpenSession
+     * @description A browser that is signed in. `invitation` is the id of the link that it came by; without one it
+     *     came by the token.
+     */
+    OpenSession: {
+        id: string;
+        person: EditorApi["Person"];
+        /** Format: date-time */
+        since: string;
+        /** Format: date-time */
+        expires: string;
+        invitation?: string;
+    };
+    /**
+     * Participant
+     * @description Somebody who acted here.
+     */
+    Participant: {
+        id: string;
+        name: string;
+        color: string;
+    };
+    /**
+     * Person
+     * @description Somebody who acts now, and may do what the role allows.
+     */
+    Person: {
+        id: string;
+        name: string;
+        /** @enum {string} */
+        role: "editor" | "operator" | "owner" | "viewer";
+    };
+    /**
+     * PersonRef
+     * @description Somebody who acted. `id` is opaque and stable for a browser; `name` is theirs to choose.
+     */
+    PersonRef: {
+        id: string;
+        name: string;
+    };
+    /**
+     * Pieces
+     * @description A UMRF text as the keys that a document would hold. `notes`: what was translated; `remarks`
+     *     are the same with their places in the text.
+     */
+    Pieces: {
+        dialect: string;
+        notes: string[];
+        name: string;
+        actions: Record<string, unknown>;
+        relations: Record<string, unknown>;
+        positions: Record<string, unknown>;
+        remarks: EditorApi["Note"][];
+    };
+    /**
+     * Preview
+     * @description What a file would become. `problems`: those of the file, then those of the graph. `remarks`
+     *     are the notes with their places; all places are in the file as it was sent.
+     */
+    Preview: {
+        dialect: string;
+        notes: string[];
+        problems: EditorApi["Problem"][];
+        name: string;
+        actions: number;
+        remarks: EditorApi["Note"][];
+    };
+    /**
+     * Problem
+     * @description Something about a graph that a person should know. Checks return these, never raise. `also`: the
+     *     other places of the same thing, which is told once.
+     */
+    Problem: {
+        code: string;
+        /** @enum {string} */
+        severity: "error" | "warning";
+        where: EditorApi["Where"];
+        message: string;
+        fix?: string;
+        /** @default [] */
+        also?: EditorApi["Where"][];
+    };
+    /**
+     * ProblemDetails
+     * @description What a client is told about a refusal. `type` is stable; `detail` is for people.
+     */
+    ProblemDetails: {
+        type: string;
+        title: string;
+        status: number;
+        detail: string;
+        where?: {
+            /** @description A JSON pointer into what was sent */
+            path?: string;
+            line?: number;
+            column?: number;
+        };
+    };
+    /**
+     * Problems
+     * @description What is wrong with a graph after its change `seq`.
+     */
+    Problems: {
+        seq: number;
+        problems: EditorApi["Problem"][];
+    };
+    /**
+     * Publishing
+     * @description Which moment of the graph to publish, and under what label. Left out: as it is now.
+     */
+    Publishing: {
+        /** @default  */
+        label?: string;
+        /** @default null */
+        seq?: number | null;
+    };
+    /**
+     * Readiness
+     * @description Whether the process can do its work, and what stands in the way.
+     */
+    Readiness: {
+        ready: boolean;
+        problems: string[];
+    };
+    /**
+     * Rehearsal
+     * @description Everything that would happen, in order. `cut`: there is more than is told.
+     */
+    Rehearsal: {
+        seq: number;
+        trace: (EditorApi["NodeStateEvent"] | EditorApi["GraphStateEvent"] | EditorApi["EdgeEval"] | EditorApi["Dispatch"] | EditorApi["NotReady"] | EditorApi["GraphResultEvent"] | EditorApi["HazardEvent"] | EditorApi["NodeResultEvent"])[];
+        cut: boolean;
+    };
+    /**
+     * Rehearsing
+     * @description What to play: the graph after its change `seq` (left out: now), what its actions do as in
+     *     a script of `simulate`, and what people do meanwhile.
+     */
+    Rehearsing: {
+        /** @default null */
+        seq?: number | null;
+        /** @default null */
+        script?: EditorApi["Script"];
+        /** @default [] */
+        commands?: EditorApi["Command"][];
+        /** @default 3600000 */
+        for_ms?: number;
+    };
+    /**
+     * RelationChange
+     * @description An arrow that came, went or changed, between actions by full name, or `entry` and `exit`.
+     */
+    RelationChange: {
+        /** @enum {string} */
+        change: "added" | "changed" | "removed";
+        parent: string;
+        child: string;
+        fields: EditorApi["Field"][];
+    };
+    /**
+     * Restoring
+     * @description The change after which the graph was as it shall be again.
+     */
+    Restoring: {
+        seq: number;
+    };
+    /**
+     * Script
+     * @description Behaviours by key: one entry per call, the last repeats.
+     */
+    Script: {
+        /** @default {} */
+        behaviours?: {
+            [key: string]: EditorApi["Behaviour"][];
+        };
+    };
+    /**
+     * ServerProof
+     * @description That a server knows the token: an HMAC over a challenge and the address, `HOST:PORT`, at which
+     *     the connection was taken.
+     */
+    ServerProof: {
+        address: string;
+        proof: string;
+    };
+    /**
+     * Sharing
+     * @description How others reach this server, and the links to it.
+     *
+     *     `origins`: where the page is for them, the likeliest first; empty when the server listens on this
+     *     computer only. `secure`: whether what is sent is encrypted. `proxied`: the first of them is shown by
+     *     a proxy, whose certificate that is.
+     */
+    Sharing: {
+        origins: string[];
+        secure: boolean;
+        invitations: EditorApi["Invitation"][];
+        proxied: boolean;
+    };
+    /**
+     * SignIn
+     * @description What the page sends: the token or an invitation on first sight, a name when the person gives
+     *     one. An invitation is `ID.SECRET`, as its link has it.
+     */
+    SignIn: {
+        /** @default null */
+        token?: string | null;
+        /** @default null */
+        invitation?: string | null;
+        /** @default null */
+        name?: string | null;
+    };
+    /**
+     * SignedIn
+     * @description Who the page is speaking for. `named` is false until the person has given a name.
+     */
+    SignedIn: {
+        person: EditorApi["Person"];
+        named: boolean;
+    };
+    /**
+     * StoredEvent
+     * @description Something that was stored. `seq` counts in `stream`.
+     */
+    StoredEvent: {
+        position: number;
+        stream: string;
+        seq: number;
+        kind: string;
+        author: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+        graph?: string;
+    };
+    /**
+     * TextEdit
+     * @description What an edited text would change after `seq`, and the errors that the graph would then have
+     *     and does not have yet, with their places in that text.
+     */
+    TextEdit: {
+        seq: number;
+        changes: EditorApi["KeyChange"][];
+        problems: EditorApi["Problem"][];
+    };
+    /**
+     * VersionView
+     * @description A version. `umrf` is the graph as text to be kept as it is; lists leave it out.
+     */
+    VersionView: {
+        id: string;
+        graph: string;
+        label: string;
+        digest: string;
+        seq: number;
+        author: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+        umrf?: {
+            [key: string]: unknown;
+        };
+    };
+    /**
+     * Where
+     * @description The place of a problem. `path` is a JSON pointer into the text that was given, or, of a graph
+     *     that was not read from one, into its canonical text. `line` and `column` (characters, both from
+     *     1) are there where that text is known: where the value begins, with its key if it has one.
+     */
+    Where: {
+        /** @default  */
+        path?: string;
+        aid?: string;
+        relation?: string;
+        line?: number;
+        column?: number;
+    };
+}

@@ -1,0 +1,1164 @@
+/** What the runner takes and answers. Made by `make types`; changes are lost. */
+export interface RunnerApi {
+    /**
+     * ActionChange
+     * @description An action that came, went or changed. `name` is its full name, the newer one.
+     */
+    ActionChange: {
+        /** @enum {string} */
+        change: "added" | "changed" | "removed";
+        aid: string;
+        name: string;
+        fields: RunnerApi["Field"][];
+    };
+    /**
+     * ActionFrame
+     * @description What became of an action. From the visit number `first` on (counted from 0, over all its
+     *     visits) they are now `visits`; `messages` are new.
+     */
+    ActionFrame: {
+        state: string;
+        first: number;
+        /** @default [] */
+        visits?: RunnerApi["VisitShown"][];
+        /** @default [] */
+        messages?: RunnerApi["MessageShown"][];
+        aid?: string;
+    };
+    /**
+     * ActionShown
+     * @description One action of a run. `older` visits are not listed.
+     */
+    ActionShown: {
+        aid: string | null;
+        state: string;
+        visits: RunnerApi["VisitShown"][];
+        older: number;
+        messages: RunnerApi["MessageShown"][];
+    };
+    /**
+     * ActionStatistics
+     * @description One action over all these runs. Durations are seconds over `timed` visits, those that have ended,
+     *     and stand where they are known exactly; `spans` has all of them between their bounds. `unknown`
+     *     counts visits whose result is not known.
+     */
+    ActionStatistics: {
+        action: string;
+        aid: string | null;
+        runs: number;
+        visits: number;
+        results: {
+            [key: string]: number;
+        };
+        unknown: number;
+        inferred: number;
+        timed: number;
+        p50: number | null;
+        p90: number | null;
+        p99: number | null;
+        longest: number | null;
+        spans: RunnerApi["Spans"];
+    };
+    /**
+     * AlarmShown
+     * @description Something that a person must know now.
+     */
+    AlarmShown: {
+        code: string;
+        /** Format: date-time */
+        at: string;
+        text: string;
+    };
+    /**
+     * ArchivedShown
+     * @description Since when the events of a run are in an archive, and in which file of its folder.
+     */
+    ArchivedShown: {
+        /** Format: date-time */
+        at: string;
+        file: string;
+    };
+    /**
+     * AtRestShown
+     * @description How rest was seen where no answer of the engine could prove it: by whom (null: the runner saw the
+     *     engine's process end), when, and how.
+     */
+    AtRestShown: {
+        by: RunnerApi["Author"] | null;
+        /** Format: date-time */
+        at: string;
+        how: string;
+    };
+    /**
+     * Author
+     * @description The person behind a command, and from where it came. `address`: on the network; "" for the
+     *     runner's own computer. `by` is "" where it was not recorded.
+     */
+    Author: {
+        id: string;
+        name: string;
+        /**
+         * @default
+         * @enum {string}
+         */
+        by?: "" | "browser" | "program";
+        /** @default  */
+        address?: string;
+    };
+    /**
+     * Beat
+     * @description Once a second: the link is alive. `seen`: when each open run was last shown by its engine;
+     *     `heard`: when each robot last answered.
+     */
+    Beat: {
+        /** @enum {string} */
+        type: "beat";
+        /** Format: date-time */
+        at: string;
+        seen: {
+            [key: string]: string;
+        };
+        heard: {
+            [key: string]: string;
+        };
+    };
+    /**
+     * Behaviour
+     * @description One call of an action. Times are seconds.
+     *
+     *     `never`: does not end by itself. `ignores_stop`: goes on until its own end. `stop_error`: throws
+     *     in onStop, which the engine calls ERROR at once, whatever its code does. `pauses`: has an onPause.
+     *     `init_error`: throws when it is loaded. `no_library`: indexed, but its library is not there, so
+     *     that no graph with it can be built (said of its first call). `outputs`: values by flat name.
+     */
+    Behaviour: {
+        /** @default 1 */
+        after_s?: number;
+        /**
+         * @default on_true
+         * @enum {string}
+         */
+        result?: "on_true" | "on_false" | "on_error";
+        /** @default 0.05 */
+        stop_s?: number;
+        /** @default true */
+        pauses?: boolean;
+        /** @default false */
+        never?: boolean;
+        /** @default false */
+        ignores_stop?: boolean;
+        /** @default false */
+        stop_error?: boolean;
+        /** @default false */
+        init_error?: boolean;
+        /** @default false */
+        no_library?: boolean;
+        /** @default null */
+        outputs?: Record<string, unknown> | null;
+        /** @default null */
+        message?: string | null;
+    };
+    /**
+     * Candidate
+     * @description An engine that discovery shows. One at rest does not say its name: `actor` is "" until its
+     *     feedback was heard, and a person has to know the name.
+     */
+    Candidate: {
+        domain: number;
+        rmw: string;
+        get_service: string;
+        servers: number;
+        actor: string;
+        /** @enum {string} */
+        generation: "current" | "older" | "unknown";
+        problem: string;
+    };
+    /**
+     * CauseShown
+     * @description One cause in a sentence, with its evidence: the moment, the event `seq` by which it had been
+     *     seen, the action, and the words that were said there.
+     */
+    CauseShown: {
+        kind: string;
+        text: string;
+        /** Format: date-time */
+        at: string;
+        seq: number;
+        action: string | null;
+        aid: string | null;
+        quote: string;
+    };
+    /**
+     * Chapter
+     * @description Where a page of the film begins: after `after` events, at `at`.
+     */
+    Chapter: {
+        after: number;
+        /** Format: date-time */
+        at: string;
+    };
+    /**
+     * ComparedVisit
+     * @description The `visit`-th visit (from 1) of an action in both runs. `slower` names the run in which it
+     *     took notably longer, whatever of its bounds is true.
+     */
+    ComparedVisit: {
+        action: string;
+        aid: string | null;
+        visit: number;
+        a: RunnerApi["VisitShown"] | null;
+        b: RunnerApi["VisitShown"] | null;
+        /** @enum {string} */
+        relation: "end" | "only_a" | "only_b" | "result" | "same" | "unknown";
+        slower: ("a" | "b") | null;
+    };
+    /**
+     * Difference
+     * @description From `before` to `after`, both changes of the same graph's document.
+     */
+    Difference: {
+        before: number;
+        after: number;
+        fields: RunnerApi["Field"][];
+        actions: RunnerApi["ActionChange"][];
+        relations: RunnerApi["RelationChange"][];
+    };
+    /**
+     * Doubt
+     * @description Something that the run does not tell, so that the script had to choose.
+     */
+    Doubt: {
+        action: string;
+        text: string;
+    };
+    /**
+     * EnginesMessage
+     * @description All engines, since one is not as it was.
+     */
+    EnginesMessage: {
+        /** @enum {string} */
+        type: "engines";
+        engines: RunnerApi["Robot"][];
+    };
+    /**
+     * Expect
+     * @description A run whose course shall be expected from now on, under a name.
+     */
+    Expect: {
+        run: string;
+        name: string;
+    };
+    /**
+     * Expectation
+     * @description A run that shall go the same for ever, with all that simulating it again takes.
+     */
+    Expectation: {
+        name: string;
+        run: string;
+        graph: string | null;
+        graph_name: string;
+        author: RunnerApi["Author"];
+        /** @description A UMRF graph. */
+        umrf: {
+            [key: string]: unknown;
+        };
+        script: {
+            [key: string]: unknown;
+        };
+        course: RunnerApi["ExpectedStep"][];
+    };
+    /**
+     * ExpectedStep
+     * @description One step of a course: what happened to an action (empty: to the graph), and how.
+     */
+    ExpectedStep: {
+        graph: string;
+        node: string;
+        /** @enum {string} */
+        what: "ends" | "hazard" | "result" | "runs" | "state";
+        how: string;
+    };
+    /**
+     * Field
+     * @description A field that says something else now. null where it said nothing.
+     */
+    Field: {
+        field: string;
+        before: unknown;
+        after: unknown;
+    };
+    /**
+     * Fit
+     * @description Another version of the graph of a run; `action` (a name of the run) may have a `fault`.
+     */
+    Fit: {
+        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+        umrf: {
+            [key: string]: unknown;
+        } | string;
+        /** @default null */
+        action?: string | null;
+        /** @default null */
+        fault?: ("error" | "false" | "hang" | "init_error") | null;
+    };
+    /**
+     * GroupRequest
+     * @description One version for several robots at once. Without version, digest and `request_id` it can only
+     *     be looked at.
+     */
+    GroupRequest: {
+        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+        umrf: {
+            [key: string]: unknown;
+        } | string;
+        /** @default  */
+        version?: string;
+        /** @default  */
+        digest?: string;
+        engines: string[];
+        /** @default  */
+        request_id?: string;
+        /** @default null */
+        graph?: string | null;
+        /** @default null */
+        override?: RunnerApi["Override"] | null;
+        /** @default null */
+        like?: string | null;
+    };
+    /**
+     * GroupShown
+     * @description Runs that were started together. `failed`: robots that nothing was sent to, and why.
+     */
+    GroupShown: {
+        id: string;
+        runs: RunnerApi["RunShown"][];
+        failed: {
+            [key: string]: string;
+        };
+    };
+    /**
+     * HeldGraph
+     * @description A graph that an engine holds, ended ones too. `run`: the run of ours that it is.
+     *
+     *     `stopping`: why a stop of it is not proven yet, "" at first; null when nobody wants that.
+     */
+    HeldGraph: {
+        graph: string;
+        state: string;
+        active: boolean;
+        run: string | null;
+        stopping: string | null;
+    };
+    /**
+     * Hello
+     * @description The first message.
+     */
+    Hello: {
+        /** @enum {string} */
+        type: "hello";
+        engines: RunnerApi["Robot"][];
+        runs: RunnerApi["RunShown"][];
+    };
+    /**
+     * HistoryEvent
+     * @description One stored event, as programs that follow a run read it.
+     */
+    HistoryEvent: {
+        seq: number;
+        kind: string;
+        author: string;
+        /** Format: date-time */
+        at: string;
+        body: unknown;
+    };
+    /**
+     * Item
+     * @description One thing that was looked at. A person may override a blocked one where `overridable`, with
+     *     the codes in `codes` and a reason.
+     */
+    Item: {
+        code: string;
+        /** @enum {string} */
+        verdict: "blocked" | "passed" | "warned";
+        text: string;
+        codes: string[];
+        overridable: boolean;
+        problems: RunnerApi["Problem"][];
+    };
+    /**
+     * KnownAction
+     * @description An action that a robot has indexed.
+     */
+    KnownAction: {
+        name: string;
+        inputs: {
+            [key: string]: string;
+        };
+        outputs: {
+            [key: string]: string;
+        };
+    };
+    /**
+     * Listed
+     * @description A run of the list, with what people noted about it, and in one sentence why it did not end
+     *     well, as far as that is recorded.
+     */
+    Listed: {
+        id: string;
+        number: number;
+        graph: string | null;
+        graph_name: string;
+        version: string | null;
+        digest: string;
+        engine: string;
+        simulated: boolean;
+        author: RunnerApi["Author"];
+        /** @enum {string} */
+        state: "error" | "finished" | "halted" | "lost" | "paused" | "published" | "refused" | "requested" | "running" | "stopped" | "stopping" | "unknown";
+        /** @enum {string} */
+        desired: "paused" | "running" | "stopped";
+        result: ("on_error" | "on_false" | "on_halted" | "on_stopped" | "on_true") | null;
+        proof_at: string | null;
+        unknown_since: string | null;
+        unconfirmed: string | null;
+        at_rest: RunnerApi["AtRestShown"] | null;
+        moves_again_at: string | null;
+        group: string | null;
+        /** Format: date-time */
+        requested_at: string;
+        started_at: string | null;
+        ended_at: string | null;
+        took: RunnerApi["Took"] | null;
+        stopped_by: RunnerApi["Author"] | null;
+        detail: string;
+        alarms: RunnerApi["AlarmShown"][];
+        recorded: boolean;
+        cause: string;
+        pinned: boolean;
+        note: string;
+        labels: string[];
+        archived: RunnerApi["ArchivedShown"] | null;
+    };
+    /**
+     * MarkShown
+     * @description Something that happened around the actions; `since`: from when on nothing was known.
+     */
+    MarkShown: {
+        seq: number;
+        /** Format: date-time */
+        at: string;
+        kind: string;
+        /** @default  */
+        by?: string;
+        /** @default  */
+        text?: string;
+        since?: string;
+    };
+    /**
+     * Marks
+     * @description What a person changes about a run: only what is given.
+     */
+    Marks: {
+        /** @default null */
+        pinned?: boolean | null;
+        /** @default null */
+        note?: string | null;
+        /** @default null */
+        labels?: string[] | null;
+    };
+    /**
+     * MessageShown
+     * @description What an action had to say.
+     */
+    MessageShown: {
+        /** Format: date-time */
+        at: string;
+        text: string;
+    };
+    /**
+     * ModifyRequest
+     * @description Another version of the graph of a run, by value. `continue_from`: the full name of an action
+     *     that shall be started when the graph goes on.
+     */
+    ModifyRequest: {
+        version: string;
+        digest: string;
+        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+        umrf: {
+            [key: string]: unknown;
+        } | string;
+        /** @default  */
+        continue_from?: string;
+        /** @default null */
+        override?: RunnerApi["Override"] | null;
+    };
+    /**
+     * NeverTaken
+     * @description An arrow whose parent ran, and is known never to have ended as the arrow waits for
+     *     (`outcomes`).
+     */
+    NeverTaken: {
+        parent: string;
+        child: string;
+        outcomes: string[];
+    };
+    /**
+     * Overridden
+     * @description A problem that stood in the way of a start, as the look before it told it. `aid` and `path`
+     *     are its place in the graph that was sent.
+     */
+    Overridden: {
+        code: string;
+        text: string;
+        aid?: string;
+        /** @default  */
+        path?: string;
+    };
+    /**
+     * Override
+     * @description Problems that a person decided to start in spite of, and why.
+     */
+    Override: {
+        codes: string[];
+        reason: string;
+    };
+    PageMessage: RunnerApi["StopMessage"];
+    /**
+     * Parting
+     * @description The earliest step in which the runs differ, in a sentence, with what the action said.
+     */
+    Parting: {
+        step: RunnerApi["ComparedVisit"];
+        text: string;
+        messages_a: string[];
+        messages_b: string[];
+    };
+    /**
+     * Preflight
+     * @description What stands between a graph and its start on one engine. `override`: the codes that a person
+     *     would have to answer for; `never`: something cannot be overridden; `digest`: of the graph that
+     *     was looked at.
+     */
+    Preflight: {
+        engine: string;
+        digest: string;
+        items: RunnerApi["Item"][];
+        override: string[];
+        never: boolean;
+    };
+    /**
+     * Problem
+     * @description Something about a graph that a person should know. Checks return these, never raise. `also`: the
+     *     other places of the same thing, which is told once.
+     */
+    Problem: {
+        code: string;
+        /** @enum {string} */
+        severity: "error" | "warning";
+        where: RunnerApi["Where"];
+        message: string;
+        fix?: string;
+        /** @default [] */
+        also?: RunnerApi["Where"][];
+    };
+    /**
+     * ProblemDetails
+     * @description What a client is told about a refusal. `type` is stable; `detail` is for people.
+     */
+    ProblemDetails: {
+        type: string;
+        title: string;
+        status: number;
+        detail: string;
+        where?: {
+            /** @description A JSON pointer into what was sent */
+            path?: string;
+            line?: number;
+            column?: number;
+        };
+    };
+    /**
+     * RawHour
+     * @description An hour of raw messages: its name, bytes (gzipped), and, when it is not here any more, since
+     *     when it is archived and in which file of the folder of archives.
+     */
+    RawHour: {
+        name: string;
+        bytes: number;
+        archived_at: string | null;
+        file: string | null;
+    };
+    /**
+     * RawMessages
+     * @description The raw messages of `robot` from the hours of a run, the oldest first. `text`: what there is to
+     *     say about it.
+     */
+    RawMessages: {
+        robot: string;
+        hours: RunnerApi["RawHour"][];
+        text: string;
+    };
+    /**
+     * ReachStatus
+     * @description All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can.
+     */
+    ReachStatus: {
+        engines: RunnerApi["Robot"][];
+        no_reach: string;
+    };
+    /**
+     * Readiness
+     * @description Whether the process can do its work, and what stands in the way.
+     */
+    Readiness: {
+        ready: boolean;
+        problems: string[];
+    };
+    /**
+     * Recorded
+     * @description A run as a script (`behaviours`, docs/contracts.md 5.2), and what in it is a guess.
+     */
+    Recorded: {
+        behaviours: {
+            [key: string]: Record<string, unknown>[];
+        };
+        doubts: RunnerApi["Doubt"][];
+    };
+    /**
+     * Recording
+     * @description A file: its name (the hour, UTC) and its size in bytes.
+     */
+    Recording: {
+        name: string;
+        bytes: number;
+    };
+    /**
+     * RefusedMessage
+     * @description Why a message was not followed.
+     */
+    RefusedMessage: {
+        /** @enum {string} */
+        type: "refused";
+        stop_id: string;
+        detail: string;
+    };
+    /**
+     * Registration
+     * @description How to reach a robot. `name` is the wake word that its engine answers to; without `rmw` the
+     *     middleware of this process is meant.
+     */
+    Registration: {
+        name: string;
+        /** @default 0 */
+        domain?: number;
+        /** @default  */
+        rmw?: string;
+        /** @default umrf_graph_get */
+        get_service?: string;
+        /** @default {} */
+        profile?: {
+            [key: string]: unknown;
+        };
+    };
+    /**
+     * RelationChange
+     * @description An arrow that came, went or changed, between actions by full name, or `entry` and `exit`.
+     */
+    RelationChange: {
+        /** @enum {string} */
+        change: "added" | "changed" | "removed";
+        parent: string;
+        child: string;
+        fields: RunnerApi["Field"][];
+    };
+    /**
+     * ReplayFrame
+     * @description One event: `head` has the fields of the run that changed, `actions` those that did.
+     */
+    ReplayFrame: {
+        seq: number;
+        /** Format: date-time */
+        at: string;
+        kind: string;
+        /** @default  */
+        by?: string;
+        /** @default  */
+        text?: string;
+        /** @default {} */
+        head?: Record<string, unknown>;
+        /** @default {} */
+        actions?: {
+            [key: string]: RunnerApi["ActionFrame"];
+        };
+        /** @default [] */
+        alarms?: RunnerApi["AlarmShown"][];
+    };
+    /**
+     * RestRequest
+     * @description Somebody has seen that a run is at rest. `how`: by what.
+     */
+    RestRequest: {
+        how: string;
+    };
+    /**
+     * Revocation
+     * @description An invitation that lets nobody in any more, or a session that has ended: one of the two.
+     */
+    Revocation: {
+        /** @default null */
+        invitation?: string | null;
+        /** @default null */
+        session?: string | null;
+    };
+    /**
+     * Robot
+     * @description An engine as people see it. `why` explains any state but `answering`.
+     *
+     *     `servers`: how many answer on the path of its get; `others`: publishers of starts beside us.
+     *     `actions`, `graphs`: how many it has indexed; null before its first answer. `pauses`: whether
+     *     pausing is safe there.
+     */
+    Robot: {
+        name: string;
+        simulated: boolean;
+        state: ("answering" | "busy" | "gone" | "restarted") | "no_link";
+        why: string;
+        since: string | null;
+        domain: number | null;
+        rmw: string;
+        get_service: string;
+        profile: {
+            [key: string]: unknown;
+        };
+        heard_at: string | null;
+        took_ms: number | null;
+        restarted_at: string | null;
+        /** @enum {string} */
+        generation: "current" | "older" | "unknown";
+        servers: number;
+        others: number;
+        actor: string;
+        pauses: boolean;
+        holds: RunnerApi["HeldGraph"][];
+        actions: number | null;
+        graphs: number | null;
+    };
+    /**
+     * RobotChange
+     * @description What shall be different about a robot.
+     */
+    RobotChange: {
+        /** @default null */
+        domain?: number | null;
+        /** @default null */
+        rmw?: string | null;
+        /** @default null */
+        get_service?: string | null;
+        /** @default null */
+        profile?: {
+            [key: string]: unknown;
+        } | null;
+    };
+    /**
+     * RobotKnowledge
+     * @description What a robot can do. `unread`: files of its index that cannot be read.
+     */
+    RobotKnowledge: {
+        actions: RunnerApi["KnownAction"][];
+        graphs: string[];
+        unread: number;
+    };
+    /**
+     * RobotLogLine
+     * @description A line of a robot's flight record. `has_graph`: its graph can be fetched.
+     */
+    RobotLogLine: {
+        seq: number;
+        /** Format: date-time */
+        at: string;
+        /** @enum {string} */
+        kind: "became" | "commanded" | "stop_asked" | "stop_proven" | "stop_unproven";
+        command: string;
+        graph: string;
+        sender: string;
+        state: string;
+        why: string;
+        run: string | null;
+        number: number | null;
+        has_graph: boolean;
+    };
+    /**
+     * RobotStopped
+     * @description What a Stop of a robot concerns: runs of ours, and graphs that others started.
+     */
+    RobotStopped: {
+        runs: string[];
+        graphs: string[];
+    };
+    /**
+     * RunComparison
+     * @description Run `a` against run `b`. `graph` is the difference of what was sent; `parameters` those of its
+     *     changes that touch the values of actions.
+     */
+    RunComparison: {
+        a: RunnerApi["RunSummary"];
+        b: RunnerApi["RunSummary"];
+        same_graph: boolean;
+        same_engine: boolean;
+        graph: RunnerApi["Difference"];
+        parameters: RunnerApi["ActionChange"][];
+        steps: RunnerApi["ComparedVisit"][];
+        left_out: number;
+        parting: RunnerApi["Parting"] | null;
+        text: string;
+    };
+    /**
+     * RunMarks
+     * @description What people noted about a run.
+     */
+    RunMarks: {
+        pinned: boolean;
+        note: string;
+        labels: string[];
+    };
+    /**
+     * RunMessage
+     * @description A run as it is now.
+     */
+    RunMessage: {
+        /** @enum {string} */
+        type: "run";
+        run: RunnerApi["RunShown"];
+    };
+    /**
+     * RunPoint
+     * @description One run in a row of runs. `took` in seconds where that is known exactly; `span` is between which
+     *     bounds, null where nothing is known.
+     */
+    RunPoint: {
+        id: string;
+        number: number;
+        /** @enum {string} */
+        state: "error" | "finished" | "halted" | "lost" | "paused" | "published" | "refused" | "requested" | "running" | "stopped" | "stopping" | "unknown";
+        result: ("on_error" | "on_false" | "on_halted" | "on_stopped" | "on_true") | null;
+        took: number | null;
+        span: RunnerApi["Took"] | null;
+    };
+    /**
+     * RunReplay
+     * @description A page of a run's film. `base` is the run after `after` events, null at the very beginning;
+     *     `newest` is the last event there is.
+     */
+    RunReplay: {
+        run: string;
+        after: number;
+        newest: number;
+        base: RunnerApi["RunShown"] | null;
+        frames: RunnerApi["ReplayFrame"][];
+        chapters: RunnerApi["Chapter"][];
+        marks: RunnerApi["MarkShown"][];
+    };
+    /**
+     * RunShown
+     * @description A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
+     *     robot whose engine the simulator plays.
+     */
+    RunShown: {
+        id: string;
+        number: number;
+        graph: string | null;
+        graph_name: string;
+        version: string | null;
+        digest: string;
+        engine: string;
+        simulated: boolean;
+        author: RunnerApi["Author"];
+        /** @enum {string} */
+        state: "error" | "finished" | "halted" | "lost" | "paused" | "published" | "refused" | "requested" | "running" | "stopped" | "stopping" | "unknown";
+        /** @enum {string} */
+        desired: "paused" | "running" | "stopped";
+        result: ("on_error" | "on_false" | "on_halted" | "on_stopped" | "on_true") | null;
+        proof_at: string | null;
+        unknown_since: string | null;
+        unconfirmed: string | null;
+        at_rest: RunnerApi["AtRestShown"] | null;
+        moves_again_at: string | null;
+        group: string | null;
+        /** Format: date-time */
+        requested_at: string;
+        started_at: string | null;
+        ended_at: string | null;
+        took: RunnerApi["Took"] | null;
+        stopped_by: RunnerApi["Author"] | null;
+        detail: string;
+        alarms: RunnerApi["AlarmShown"][];
+        recorded: boolean;
+        like: string | null;
+        actions: {
+            [key: string]: RunnerApi["ActionShown"];
+        };
+        log: RunnerApi["MessageShown"][];
+    };
+    /**
+     * RunSummary
+     * @description A run as a list shows it. `took`: from `started_at` to when nothing of it moved any more, as far
+     *     as that was seen, which is before `ended_at`, when that was proven; null where that is not known.
+     */
+    RunSummary: {
+        id: string;
+        number: number;
+        graph: string | null;
+        graph_name: string;
+        version: string | null;
+        digest: string;
+        engine: string;
+        simulated: boolean;
+        author: RunnerApi["Author"];
+        /** @enum {string} */
+        state: "error" | "finished" | "halted" | "lost" | "paused" | "published" | "refused" | "requested" | "running" | "stopped" | "stopping" | "unknown";
+        /** @enum {string} */
+        desired: "paused" | "running" | "stopped";
+        result: ("on_error" | "on_false" | "on_halted" | "on_stopped" | "on_true") | null;
+        proof_at: string | null;
+        unknown_since: string | null;
+        unconfirmed: string | null;
+        at_rest: RunnerApi["AtRestShown"] | null;
+        moves_again_at: string | null;
+        group: string | null;
+        /** Format: date-time */
+        requested_at: string;
+        started_at: string | null;
+        ended_at: string | null;
+        took: RunnerApi["Took"] | null;
+        stopped_by: RunnerApi["Author"] | null;
+        detail: string;
+        alarms: RunnerApi["AlarmShown"][];
+        recorded: boolean;
+    };
+    /**
+     * RunWhole
+     * @description A run with the graph as it was sent. `sent`: the values of its actions, by full name and flat
+     *     name, written as in `inputs` of visits.
+     */
+    RunWhole: {
+        id: string;
+        number: number;
+        graph: string | null;
+        graph_name: string;
+        version: string | null;
+        digest: string;
+        engine: string;
+        simulated: boolean;
+        author: RunnerApi["Author"];
+        /** @enum {string} */
+        state: "error" | "finished" | "halted" | "lost" | "paused" | "published" | "refused" | "requested" | "running" | "stopped" | "stopping" | "unknown";
+        /** @enum {string} */
+        desired: "paused" | "running" | "stopped";
+        result: ("on_error" | "on_false" | "on_halted" | "on_stopped" | "on_true") | null;
+        proof_at: string | null;
+        unknown_since: string | null;
+        unconfirmed: string | null;
+        at_rest: RunnerApi["AtRestShown"] | null;
+        moves_again_at: string | null;
+        group: string | null;
+        /** Format: date-time */
+        requested_at: string;
+        started_at: string | null;
+        ended_at: string | null;
+        took: RunnerApi["Took"] | null;
+        stopped_by: RunnerApi["Author"] | null;
+        detail: string;
+        alarms: RunnerApi["AlarmShown"][];
+        recorded: boolean;
+        like: string | null;
+        actions: {
+            [key: string]: RunnerApi["ActionShown"];
+        };
+        log: RunnerApi["MessageShown"][];
+        /** @description A UMRF graph. */
+        umrf: {
+            [key: string]: unknown;
+        };
+        override: RunnerApi["Override"] | null;
+        sent: {
+            [key: string]: {
+                [key: string]: string;
+            };
+        };
+        despite: RunnerApi["Overridden"][];
+        archived: RunnerApi["ArchivedShown"] | null;
+    };
+    RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["Beat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
+    /**
+     * Script
+     * @description Behaviours by key: one entry per call, the last repeats.
+     */
+    Script: {
+        /** @default {} */
+        behaviours?: {
+            [key: string]: RunnerApi["Behaviour"][];
+        };
+    };
+    /**
+     * ServerProof
+     * @description That a server knows the token: an HMAC over a challenge and the address, `HOST:PORT`, at which
+     *     the connection was taken.
+     */
+    ServerProof: {
+        address: string;
+        proof: string;
+    };
+    /**
+     * Spans
+     * @description Durations of an action, each between its bounds.
+     */
+    Spans: {
+        p50: RunnerApi["Took"] | null;
+        p90: RunnerApi["Took"] | null;
+        p99: RunnerApi["Took"] | null;
+        longest: RunnerApi["Took"] | null;
+    };
+    /**
+     * StartRequest
+     * @description A start: the version by value, and where it shall run.
+     *
+     *     `digest` is what the person saw; `request_id` is made by the asker, once per intended start.
+     *     `like`: the robot whose engine the simulator plays, with its hazards.
+     */
+    StartRequest: {
+        version: string;
+        digest: string;
+        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+        umrf: {
+            [key: string]: unknown;
+        } | string;
+        engine: string;
+        request_id: string;
+        /** @default null */
+        graph?: string | null;
+        script?: RunnerApi["Script"];
+        /** @default null */
+        override?: RunnerApi["Override"] | null;
+        /** @default null */
+        like?: string | null;
+    };
+    /**
+     * StartShown
+     * @description What has become of a start. `under_way`: it is being carried out at this moment. Without that
+     *     and without runs nothing of it has arrived here so far.
+     */
+    StartShown: {
+        request_id: string;
+        under_way: boolean;
+        runs: RunnerApi["RunShown"][];
+    };
+    /**
+     * Statistics
+     * @description What the newest `runs` of a graph have in common. `judged` are those whose result is known, and
+     *     says something about the graph (neither refused, lost nor stopped); `succeeded` are those of them
+     *     that finished true. `unknown` have finished, and nobody knows with which result: robots do not tell.
+     *     Of `untold` arrows it is not known whether they were ever taken.
+     */
+    Statistics: {
+        runs: RunnerApi["RunPoint"][];
+        judged: number;
+        succeeded: number;
+        unknown: number;
+        actions: RunnerApi["ActionStatistics"][];
+        never_taken: RunnerApi["NeverTaken"][];
+        untold: number;
+    };
+    /**
+     * StopBody
+     * @description `stop_id` is made by the page, once per press; the same press may come by several ways.
+     */
+    StopBody: {
+        /** @default  */
+        stop_id?: string;
+    };
+    /**
+     * StopMessage
+     * @description The one thing that a page may say.
+     */
+    StopMessage: {
+        /** @enum {string} */
+        type: "stop";
+        run: string;
+        stop_id: string;
+    };
+    /**
+     * Stopping
+     * @description The runs that a Stop concerns.
+     */
+    Stopping: {
+        /** @enum {string} */
+        type: "stopping";
+        stop_id: string;
+        runs: string[];
+    };
+    /**
+     * Sweep
+     * @description Put away what is older than so many days; null leaves it here.
+     */
+    Sweep: {
+        /** @default null */
+        runs?: number | null;
+        /** @default null */
+        raw?: number | null;
+    };
+    /**
+     * Swept
+     * @description What was put away: runs, hours of raw messages; `more`: there is more to do; `problems`: what
+     *     stays here, and why.
+     */
+    Swept: {
+        runs: number;
+        raw: number;
+        more: boolean;
+        problems: string[];
+    };
+    /**
+     * Took
+     * @description Seconds: at least `least` and at most `most`; null: nothing bounds it from above.
+     */
+    Took: {
+        least: number;
+        most: number | null;
+    };
+    /**
+     * VisitShown
+     * @description One visit of an action. It began between `not_before` and `from`, and ended between `until`
+     *     (null: no end was seen) and `not_after` (null: it may go on still); where `until` lies before
+     *     `from`, no moment is known at which it went on for certain. `inputs`: values that the engine
+     *     reported for it, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null
+     *     when nobody saw them.
+     */
+    VisitShown: {
+        /** Format: date-time */
+        from: string;
+        /** Format: date-time */
+        not_before: string;
+        not_after: string | null;
+        until: string | null;
+        result: ("error" | "false" | "stopped" | "true") | null;
+        /** @enum {string} */
+        how: "inferred" | "observed";
+        inputs: {
+            [key: string]: string;
+        } | null;
+    };
+    /**
+     * Where
+     * @description The place of a problem. `path` is a JSON pointer into the text that was given, or, of a graph
+     *     that was not read from one, into its canonical text. `line` and `column` (characters, both from
+     *     1) are there where that text is known: where the value begins, with its key if it has one.
+     */
+    Where: {
+        /** @default  */
+        path?: string;
+        aid?: string;
+        relation?: string;
+        line?: number;
+        column?: number;
+    };
+}
