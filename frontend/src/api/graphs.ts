@@ -7,8 +7,6 @@ import type { EditorApi } from "./schema/editor";
 export type Config = EditorApi["Config"];
 /** `people`: who is in it now. */
 export type GraphSummary = EditorApi["GraphView"];
-/** One parameter of a known action; `text` is its JSON without a value. */
-export type KnownParameter = EditorApi["LibraryParameter"];
 /** An action that some graph uses. `used_in`: ids of graphs. */
 export type KnownActionAnswer = EditorApi["LibraryAction"];
 export type VersionAuthor = EditorApi["PersonRef"];
@@ -90,9 +88,6 @@ export function createGraph(name: string): Promise<GraphSummary> {
   return fetchJson("/api/graphs", { method: "POST", body: { name } });
 }
 
-/** Something that was translated or left out, with its place in the file that was sent; `times`: how
- * often, once when it is not there. */
-export type Remark = EditorApi["Note"];
 /** What importing a file would make: nothing is stored. Places are those of the file. `notes`: what was
  * translated, and what has no place; `remarks` are the same with their places. */
 export type Preview = EditorApi["Preview"];

@@ -9,7 +9,6 @@ export const SIMULATOR = "simulator";
  * a proof; `others`: programs beside this one that publish starts. */
 export type Robot = RunnerApi["Robot"];
 export type EngineState = Robot["state"];
-export type Generation = Robot["generation"];
 /** A graph that an engine holds, ended ones too. `stopping`: why a stop of it is not proven yet, "" at
  * first; null when nobody wants that. */
 export type HeldGraph = RunnerApi["HeldGraph"];

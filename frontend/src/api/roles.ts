@@ -5,7 +5,7 @@ import type { EditorApi } from "./schema/editor";
 export type Role = EditorApi["Person"]["role"];
 
 /** From the least to the most; each may do what those before it may. */
-export const ROLES = ["viewer", "editor", "operator", "owner"] as const satisfies readonly Role[];
+const ROLES = ["viewer", "editor", "operator", "owner"] as const satisfies readonly Role[];
 
 /** The least role that may do a thing. */
 const FROM = {

@@ -11,7 +11,6 @@ export type DurationBounds = RunnerApi["Took"];
  * `not_after` (null: it may go on still). Where `until` lies before `from`, no moment is known at
  * which it went on for certain. */
 export type Visit = RunnerApi["VisitShown"];
-export type VisitResult = Visit["result"];
 export type ActionRun = RunnerApi["ActionShown"];
 /** A run as far as it is told: lists leave out its actions, and what is live its graph. */
 export type Run = RunnerApi["RunSummary"] & {
@@ -19,8 +18,6 @@ export type Run = RunnerApi["RunSummary"] & {
     | RunnerApi["RunWhole"][Part]
     | undefined;
 };
-export type RunState = Run["state"];
-export type RunResult = NonNullable<Run["result"]>;
 
 /** Where somebody asked from, as words that follow the name; "" where it was not recorded. */
 export function requesterPlace(asker: Requester | null): string {

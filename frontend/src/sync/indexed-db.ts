@@ -267,7 +267,7 @@ function remove(work: IDBTransaction, place: CopyKey): void {
 let made = 0;
 
 /** A key that nobody else makes, and that sorts after those made before. No secure context needed. */
-export function freshId(): string {
+function freshId(): string {
   made += 1;
   const parts = [Date.now().toString(36).padStart(9, "0"), made.toString(36).padStart(6, "0")];
   return [...parts, Math.random().toString(36).slice(2, 10)].join("-");
