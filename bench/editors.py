@@ -10,7 +10,7 @@ import sys
 import time
 from typing import Any, Final
 
-from load import Crowd
+from load import Clients
 from pycrdt import Doc, Map
 from yjs_socket import Person, Plan
 
@@ -40,14 +40,14 @@ class Editor:
 
 
 async def main(plan: Plan) -> None:
-    crowd = Crowd(plan)
-    await crowd.come(plan.people)
-    editors = [Editor(person) for person in crowd.people]
+    clients = Clients(plan)
+    await clients.come(plan.people)
+    editors = [Editor(person) for person in clients.people]
     until = time.monotonic() + plan.seconds
     while time.monotonic() < until:
         random.choice(editors).work()
         await asyncio.sleep(1 / (plan.rate * plan.people))
-    crowd.leave()
+    clients.leave()
 
 
 if __name__ == "__main__":

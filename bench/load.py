@@ -1,4 +1,4 @@
-"""A crowd of Yjs clients in one process: what one server sends to whom, how late, at what cost.
+"""Yjs clients in one process: what one server sends to whom, how late, at what cost.
 
 Run as `python load.py JSON`, with a `Plan` as JSON; prints one `Outcome` as JSON. Every edit is a
 real Yjs update that carries who made it, its number and its time, so that what a server merges or
@@ -27,7 +27,7 @@ WARM_S: Final = 1.0
 DRAIN_S: Final = 5.0
 
 
-class Crowd:
+class Clients:
     """Everybody, and what they saw."""
 
     def __init__(self, plan: Plan) -> None:
@@ -94,48 +94,48 @@ def edits_of(name: int, count: int, kind: str) -> list[tuple[bytes, bytes]]:
     return [(u[:cut], u[cut + 19 :]) for u, cut in zip(made, cuts, strict=True)]
 
 
-async def fan_out(crowd: Crowd) -> dict[str, Any]:
+async def fan_out(clients: Clients) -> dict[str, Any]:
     """Everybody does something `rate` times a second; what reached the others, and its cost."""
-    plan = crowd.plan
-    await crowd.come(plan.people)
+    plan = clients.plan
+    await clients.come(plan.people)
     each = int(plan.rate * (plan.seconds + WARM_S)) + 2
-    edits = {p.name: edits_of(p.name, each, plan.kind) for p in crowd.people}
+    edits = {p.name: edits_of(p.name, each, plan.kind) for p in clients.people}
     done = [0] * plan.people
     gap, begin = 1 / plan.rate, time.monotonic() + 0.1
     order = [(begin + random.Random(n).random() * gap, n) for n in range(plan.people)]
     heapq.heapify(order)
-    neighbours = [sum(p.room == other.room for other in crowd.people) - 1 for p in crowd.people]
+    neighbours = [sum(p.room == other.room for other in clients.people) - 1 for p in clients.people]
     start: tuple[float, float, int] | None = None
     while (now := time.monotonic()) < begin + WARM_S + plan.seconds:
         if start is None and now >= begin + WARM_S:
-            crowd.measuring, start = True, (now, crowd.processor(), crowd.delivered)
+            clients.measuring, start = True, (now, clients.processor(), clients.delivered)
         while order[0][0] <= now:
             due, name = heapq.heappop(order)
             heapq.heappush(order, (due + gap, name))
-            act(crowd.people[name], edits[name], done, plan.kind)
+            act(clients.people[name], edits[name], done, plan.kind)
         await asyncio.sleep(max(0.0005, order[0][0] - time.monotonic()))
     assert start is not None
-    wall, cost = now - start[0], crowd.processor() - start[1]
-    reached = crowd.delivered - start[2]
+    wall, cost = now - start[0], clients.processor() - start[1]
+    reached = clients.delivered - start[2]
     expected = sum(count * others for count, others in zip(done, neighbours, strict=True))
     until = time.monotonic() + DRAIN_S
-    while crowd.delivered < expected and time.monotonic() < until:  # noqa: ASYNC110 - nobody tells
+    while clients.delivered < expected and time.monotonic() < until:  # noqa: ASYNC110 - nobody tells
         await asyncio.sleep(0.02)
-    delays = sorted(crowd.delays) or [0]
+    delays = sorted(clients.delays) or [0]
     return {
         "delivered_per_s": reached / wall,
         "cpu_us": cost / max(reached, 1) * 1e6,
         "cpu_share": cost / wall,
         "p50_ms": delays[len(delays) // 2] / 1e6,
         "p99_ms": delays[int(len(delays) * 0.99)] / 1e6,
-        "missing": expected - crowd.delivered,
-        "disconnected": crowd.lost,
-        "memory_mb": crowd.memory(),
+        "missing": expected - clients.delivered,
+        "disconnected": clients.lost,
+        "memory_mb": clients.memory(),
     }
 
 
 def act(person: Person, edits: list[tuple[bytes, bytes]], done: list[int], kind: str) -> None:
-    """The next deed of one person."""
+    """The next operation of one person."""
     nth, now = done[person.name], b"%019d" % time.monotonic_ns()
     if nth >= len(edits):
         return
@@ -147,23 +147,23 @@ def act(person: Person, edits: list[tuple[bytes, bytes]], done: list[int], kind:
         person.edit(before + now + after)
 
 
-async def idle(crowd: Crowd) -> dict[str, Any]:
+async def idle(clients: Clients) -> dict[str, Any]:
     """What a thousand sockets that say nothing cost."""
-    before, cost = crowd.memory(), crowd.processor()
-    await crowd.come(crowd.plan.people)
-    cost = crowd.processor() - cost
+    before, cost = clients.memory(), clients.processor()
+    await clients.come(clients.plan.people)
+    cost = clients.processor() - cost
     await asyncio.sleep(2)
     return {
-        "memory_mb": crowd.memory() - before,
-        "connect_ms": cost / crowd.plan.people * 1e3,
+        "memory_mb": clients.memory() - before,
+        "connect_ms": cost / clients.plan.people * 1e3,
     }
 
 
-async def fill(crowd: Crowd) -> dict[str, Any]:
+async def fill(clients: Clients) -> dict[str, Any]:
     """One person writes a long history."""
-    await crowd.come(1)
-    (person,) = crowd.people
-    for nth, (before, after) in enumerate(edits_of(0, crowd.plan.count, "add")):
+    await clients.come(1)
+    (person,) = clients.people
+    for nth, (before, after) in enumerate(edits_of(0, clients.plan.count, "add")):
         person.edit(before + b"%019d" % time.monotonic_ns() + after)
         if nth % 200 == 199:
             await until_acknowledged(person)
@@ -179,9 +179,9 @@ async def until_acknowledged(person: Person) -> None:
             await person.news.wait()
 
 
-async def open_(crowd: Crowd) -> dict[str, Any]:
+async def open_(clients: Clients) -> dict[str, Any]:
     """How long until the whole document is there, and for how long nobody else was served."""
-    plan = crowd.plan
+    plan = clients.plan
     longest, looking = 0.0, True
 
     async def look() -> None:
@@ -197,10 +197,10 @@ async def open_(crowd: Crowd) -> dict[str, Any]:
 
     looks = asyncio.create_task(look()) if plan.dialect == "plain" else None
     await asyncio.sleep(0.3)
-    longest, begin, cost = 0.0, time.monotonic(), crowd.processor()
-    await crowd.come(1)
+    longest, begin, cost = 0.0, time.monotonic(), clients.processor()
+    await clients.come(1)
     took = time.monotonic() - begin
-    answer = crowd.people[0].synced.result()
+    answer = clients.people[0].synced.result()
     await asyncio.sleep(0.1)
     looking = False
     if looks is not None:
@@ -210,20 +210,20 @@ async def open_(crowd: Crowd) -> dict[str, Any]:
     doc.apply_update(answer)
     return {
         "ms": took * 1e3,
-        "cpu_ms": (crowd.processor() - cost) * 1e3,
+        "cpu_ms": (clients.processor() - cost) * 1e3,
         "blocked_ms": longest * 1e3 if looks is not None else None,
         "things": len(things),
         "bytes": len(answer),
     }
 
 
-async def one_by_one(crowd: Crowd) -> dict[str, Any]:
+async def one_by_one(clients: Clients) -> dict[str, Any]:
     """One person who waits for each acknowledgement before the next edit."""
-    await crowd.come(1)
-    (person,) = crowd.people
+    await clients.come(1)
+    (person,) = clients.people
     times: list[float] = []
-    cost = crowd.processor()
-    for before, after in edits_of(0, crowd.plan.count, "add"):
+    cost = clients.processor()
+    for before, after in edits_of(0, clients.plan.count, "add"):
         then = time.monotonic()
         person.edit(before + b"%019d" % time.monotonic_ns() + after)
         await until_acknowledged(person)
@@ -233,11 +233,11 @@ async def one_by_one(crowd: Crowd) -> dict[str, Any]:
     return {
         "p50_ms": times[len(times) // 2] * 1e3,
         "p99_ms": times[int(len(times) * 0.99)] * 1e3,
-        "cpu_us": (crowd.processor() - cost) / len(times) * 1e6,
+        "cpu_us": (clients.processor() - cost) / len(times) * 1e6,
     }
 
 
-DEEDS: Final[dict[str, Callable[[Crowd], Any]]] = {
+LOADS: Final[dict[str, Callable[[Clients], Any]]] = {
     "fan out": fan_out,
     "idle": idle,
     "fill": fill,
@@ -247,9 +247,9 @@ DEEDS: Final[dict[str, Callable[[Crowd], Any]]] = {
 
 
 async def main(plan: Plan) -> None:
-    crowd = Crowd(plan)
-    found = await DEEDS[plan.deed](crowd)
-    crowd.leave()
+    clients = Clients(plan)
+    found = await LOADS[plan.operation](clients)
+    clients.leave()
     sys.stdout.write(json.dumps(found))
 
 

@@ -84,8 +84,8 @@ class Peer:
             self._process.send_signal(signal.SIGTERM)
             self._process.wait(30)
 
-    def under(self, deed: str, rooms: list[str], **more: Any) -> dict[str, Any]:
-        """What a crowd finds that does something here."""
+    def under(self, operation: str, rooms: list[str], **more: Any) -> dict[str, Any]:
+        """What clients find that do something here."""
         assert self._process is not None
         plan = {
             "port": self.port,
@@ -94,7 +94,7 @@ class Peer:
             "path": self.path,
             "rooms": rooms,
             "headers": self.headers(),
-            "deed": deed,
+            "operation": operation,
             **more,
         }
         command = [sys.executable, str(FOLDER / "load.py"), json.dumps(plan)]

@@ -68,7 +68,7 @@ def load() -> float:
 
 
 def browser() -> list[Table]:
-    """Frames and deeds in Chromium, by the page's own benchmark."""
+    """Frames and operations in Chromium, by the page's own benchmark."""
     root = FOLDER.parent
     npm = [str(root / "scripts" / "with-node"), "npm", "--prefix", "frontend", "run", "--silent"]
     spec = [*npm, "e2e", "--", "e2e/speed.spec.ts"]

@@ -58,18 +58,18 @@ def action(
     }
 
 
-def best_of(deed: Callable[[], Any]) -> float:
+def best_of(operation: Callable[[], Any]) -> float:
     """The shortest of three runs, in s of the processor, so that other work does not count."""
     times = []
     for _ in range(3):
         gc.collect()
         start = time.process_time()
-        deed()
+        operation()
         times.append(time.process_time() - start)
     return min(times)
 
 
-def deeds(text: str, graph: Graph) -> dict[str, Callable[[], Any]]:
+def operations(text: str, graph: Graph) -> dict[str, Callable[[], Any]]:
     """What is measured."""
     return {
         "read": lambda: read(text),
@@ -85,8 +85,8 @@ def tables() -> Iterator[Table]:
     measured: dict[str, list[float]] = {}
     for size in SIZES:
         text = json.dumps(graph_of(size))
-        for name, deed in deeds(text, read(text).graph).items():
-            measured.setdefault(name, []).append(best_of(deed))
+        for name, operation in operations(text, read(text).graph).items():
+            measured.setdefault(name, []).append(best_of(operation))
     head = ["", *(f"{size:,} actions" for size in SIZES), "× per ten", "× per ten"]
     rows = [
         [name, *map(seconds, times), f"{times[1] / times[0]:.1f}", f"{times[2] / times[1]:.1f}"]

@@ -19,7 +19,7 @@ class Plan(NamedTuple):
     path: str  # with {room}
     rooms: list[str]
     headers: list[str]
-    deed: Literal["fan out", "idle", "fill", "open", "one by one"]
+    operation: Literal["fan out", "idle", "fill", "open", "one by one"]
     people: int = 1
     rate: float = 10.0  # per second and person
     seconds: float = 5.0
@@ -60,9 +60,9 @@ def read_number(data: bytes, at: int) -> tuple[int, int]:
 class Person(asyncio.Protocol):
     """One socket. Speaks y-protocols, or Hocuspocus' form of it, which names the room each time."""
 
-    def __init__(self, crowd: Audience, name: int, room: str) -> None:
-        self.crowd, self.name, self.room = crowd, name, room
-        plan = crowd.plan
+    def __init__(self, clients: Audience, name: int, room: str) -> None:
+        self.clients, self.name, self.room = clients, name, room
+        plan = clients.plan
         self.prefix = b""
         if plan.dialect == "hocuspocus":
             self.prefix = number(len(room)) + room.encode()
@@ -76,7 +76,7 @@ class Person(asyncio.Protocol):
 
     def connection_made(self, transport: Any) -> None:
         self.transport = transport
-        plan = self.crowd.plan
+        plan = self.clients.plan
         lines = [
             f"GET {plan.path.format(room=self.room)} HTTP/1.1",
             *(f"Host: 127.0.0.1:{plan.port}", "Upgrade: websocket", "Connection: Upgrade"),
@@ -107,7 +107,7 @@ class Person(asyncio.Protocol):
         del self._buffer[:at]
 
     def connection_lost(self, _: Exception | None) -> None:
-        self.crowd.lost += not self.crowd.ending
+        self.clients.lost += not self.clients.ending
         self.news.set()
 
     def _frame(self, at: int) -> tuple[int, int, int] | None:
@@ -134,7 +134,7 @@ class Person(asyncio.Protocol):
         self._write(BINARY, self.prefix + message)
 
     def _greet(self) -> None:
-        if self.crowd.plan.dialect == "hocuspocus":
+        if self.clients.plan.dialect == "hocuspocus":
             self.say(b"\x02\x00" + b"\x05token")
         self.say(b"\x00\x00\x01\x00")  # step 1: nothing is known
 
@@ -156,7 +156,7 @@ class Person(asyncio.Protocol):
             at += size
         kind, at = read_number(data, at)
         if kind == 1:
-            self.crowd.heard(self, data)
+            self.clients.heard(self, data)
         elif kind in (0, 4):
             self._sync(*read_number(data, at), data)
         elif kind == 100 or (kind == 8 and self.prefix):
@@ -171,4 +171,4 @@ class Person(asyncio.Protocol):
         elif step == 1 and not self.synced.done():
             self.synced.set_result(data[read_number(data, at)[1] :])
         elif step == 2:
-            self.crowd.heard(self, data)
+            self.clients.heard(self, data)

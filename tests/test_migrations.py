@@ -22,7 +22,7 @@ from action_assistant.journal.migrate import revisions_of
 from action_assistant.schema.branches import BRANCHES, VERSIONS
 
 branches = pytest.mark.parametrize("branch", ["editor", "runner"])
-Deed: TypeAlias = Callable[[Connection], Any]
+Step: TypeAlias = Callable[[Connection], Any]
 
 
 class Empty(NamedTuple):
@@ -40,9 +40,9 @@ class Empty(NamedTuple):
             self.migrate(revision)
         assert self.migrate() == steps(self)[-1]
 
-    def do(self, deed: Deed) -> Any:
+    def do(self, step: Step) -> Any:
         """Something in one transaction."""
-        return database_of(self.url).migrate(deed)
+        return database_of(self.url).migrate(step)
 
 
 @pytest.fixture(params=["editor on SQLite", "editor on Postgres", "runner on SQLite"])

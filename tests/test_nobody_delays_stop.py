@@ -1,6 +1,6 @@
 """Nobody may delay Stop: while many press hard on every route, and strangers on every descriptor.
 
-Real processes: a runner at `ulimit -n 1024`, a crowd in another process, and somebody who presses
+Real processes: a runner at `ulimit -n 1024`, its load in another process, and somebody who presses
 Stop. What the runner itself does between the moment at which a Stop comes in and its answer is its *own
 share*: the processor time of all its threads, which it tells with the answer. What is told beside it
 also holds the time for which it was ready to go on and others had the processors. `TEST_HOSTILE_STOPS` is how many stops are
@@ -48,7 +48,7 @@ def runner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunnerProcess]:
 
 
 @contextmanager
-def crowd(runner: RunnerProcess, *what: str) -> Iterator[subprocess.Popen[bytes]]:
+def load(runner: RunnerProcess, *what: str) -> Iterator[subprocess.Popen[bytes]]:
     """Everybody who presses hard."""
     path = Path(__file__).parent
     process = subprocess.Popen(
@@ -186,7 +186,7 @@ def test_stop_is_taken_whatever_everybody_does(runner: RunnerProcess) -> None:
     }
     shares = Stops(Share(runner.pid))
     late: list[float] = []
-    with crowd(runner, str(SILENT), str(CLIENTS)), overslept(late):
+    with load(runner, str(SILENT), str(CLIENTS)), overslept(late):
         time.sleep(2)
         base = f"http://127.0.0.1:{runner.port}"
         raw = [(name, value.encode("latin-1")) for name, value in signed_in.items()]

@@ -20,6 +20,7 @@ ROOT: Final = TESTS.parent
 LINES: Final = 400  # of a file
 OWN_LINES: Final = 40  # of a function
 SOURCES: Final = ("server", "tests", "bench", "frontend/src", "frontend/e2e")
+GENERATED: Final = ROOT / "frontend/src/api/schema"
 #: Files that are longer, and why a split would be worse.
 LONG_FILES: Final = {
     "server/action_assistant/runner/execution/service.py": "starts and stops over the same open runs",
@@ -31,9 +32,6 @@ LONG_FUNCTIONS: Final = {
     "migrations/editor/editor_0001_log_and_catalogue.py upgrade": "migrations never change again",
     "migrations/runner/runner_0001_log_and_runs.py upgrade": "migrations never change again",
     "server/action_assistant/commands/backups/backup.py _backup": "the steps of a backup in order",
-    "server/action_assistant/commands/files.py add_to": "a list of commands and their options",
-    "server/action_assistant/commands/processes.py add_to": "a list of commands and their options",
-    "server/action_assistant/commands/remote.py add_to": "a list of commands and their options",
 }
 #: Class names that stand in several modules, and why they may.
 SHARED: Final[dict[str, str]] = {}
@@ -178,7 +176,7 @@ def test_files_are_short() -> None:
     found = {}
     for top in SOURCES:
         for path in sorted((ROOT / top).rglob("*")):
-            if path.suffix in {".py", ".ts", ".tsx"}:
+            if path.suffix in {".py", ".ts", ".tsx"} and path.parent != GENERATED:
                 found[str(path.relative_to(ROOT))] = len(path.read_text().splitlines())
     long = {name: lines for name, lines in found.items() if lines > LINES}
     assert {name: lines for name, lines in long.items() if name not in LONG_FILES} == {}

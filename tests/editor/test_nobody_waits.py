@@ -46,12 +46,12 @@ def star(count: int) -> Body:
     return {"graph_name": "g", "actions": actions, "graph_entry": many, "graph_exit": many}
 
 
-async def longest_silence(editor: Editor, deed: Callable[[], Any]) -> tuple[float, float]:
+async def longest_silence(editor: Editor, step: Callable[[], Any]) -> tuple[float, float]:
     """How long the editor once took to say that it is there while it did something, and how long
     that took."""
     longest = 0.0
     begun = time.perf_counter()
-    task = asyncio.ensure_future(deed())
+    task = asyncio.ensure_future(step())
     async with httpx.AsyncClient(base_url=editor.url, trust_env=False, timeout=60) as http:
         while not task.done():
             asked = time.perf_counter()

@@ -13,7 +13,7 @@ from typing import Any, Final, TypeAlias
 import apsw
 
 #: One thing that happened to a file: a write (offset, bytes), a new length, a sync, its deletion.
-Deed: TypeAlias = tuple[str, str, int, bytes]
+Step: TypeAlias = tuple[str, str, int, bytes]
 SECTOR: Final = 512
 _NUMBERS: Final = itertools.count()
 
@@ -23,40 +23,40 @@ class Disk:
 
     def __init__(self) -> None:
         self.name = f"recorder-{next(_NUMBERS)}"
-        self.deeds: list[Deed] = []
+        self.steps: list[Step] = []
         #: Called before each write and sync; what it raises is what SQLite gets.
         self.fault: Callable[[str], None] = lambda _: None
         self._vfs = _Vfs(self)
 
     def note(self, what: str, file: str, offset: int = 0, data: bytes = b"") -> None:
-        """Remember a deed."""
-        self.deeds.append((what, Path(file).name, offset, data))
+        """Remember a step."""
+        self.steps.append((what, Path(file).name, offset, data))
 
     def image(self, until: int, chance: random.Random) -> dict[str, bytes]:
-        """The files after a power cut just before deed number `until`.
+        """The files after a power cut just before step number `until`.
 
         What was synced is there. Of the rest every write may have come through or not, in any order,
         and whole sectors of it may be missing.
         """
         files: dict[str, bytearray] = {}
-        waiting: dict[str, list[Deed]] = {}
-        for deed in self.deeds[:until]:
-            what, file, _, _ = deed
+        waiting: dict[str, list[Step]] = {}
+        for step in self.steps[:until]:
+            what, file, _, _ = step
             if what == "sync":
                 _apply(files, waiting.pop(file, []))
             elif what == "delete":
                 waiting.pop(file, None)
                 files.pop(file, None)
             else:
-                waiting.setdefault(file, []).append(deed)
+                waiting.setdefault(file, []).append(step)
         mood = chance.choice((0.0, 0.1, 0.5, 0.9, 1.0))
-        for deeds in waiting.values():
-            _apply(files, (part for each in deeds for part in _torn(each, mood, chance)))
+        for steps in waiting.values():
+            _apply(files, (part for each in steps for part in _torn(each, mood, chance)))
         return {name: bytes(data) for name, data in files.items()}
 
 
-def _apply(files: dict[str, bytearray], deeds: Iterable[Deed]) -> None:
-    for what, file, offset, data in deeds:
+def _apply(files: dict[str, bytearray], steps: Iterable[Step]) -> None:
+    for what, file, offset, data in steps:
         content = files.setdefault(file, bytearray())
         if what == "truncate":
             del content[offset:]
@@ -65,11 +65,11 @@ def _apply(files: dict[str, bytearray], deeds: Iterable[Deed]) -> None:
             content[offset : offset + len(data)] = data
 
 
-def _torn(deed: Deed, mood: float, chance: random.Random) -> Iterator[Deed]:
-    what, file, offset, data = deed
+def _torn(step: Step, mood: float, chance: random.Random) -> Iterator[Step]:
+    what, file, offset, data = step
     if what != "write" or chance.random() < 0.7:
         if chance.random() < mood:
-            yield deed
+            yield step
         return
     for start in range(0, len(data), SECTOR):
         if chance.random() < mood:

@@ -117,17 +117,17 @@ def _migrated(path: Path) -> None:
     migrate(f"sqlite:///{path}", "editor")
 
 
-@pytest.mark.parametrize("deed", [_opened, _prepared, _migrated])
+@pytest.mark.parametrize("step", [_opened, _prepared, _migrated])
 @pytest.mark.parametrize("kind", FOREIGN)
 def test_what_is_not_ours_is_refused_and_left_as_it_is(
-    tmp_path: Path, kind: str, deed: Callable[[Path], None]
+    tmp_path: Path, kind: str, step: Callable[[Path], None]
 ) -> None:
     make, why = FOREIGN[kind]
     path = tmp_path / "x.db"
     make(path)
     before = _folder(tmp_path)
     with pytest.raises(CannotStart, match=why) as refused:
-        deed(path)
+        step(path)
     assert str(path) in str(refused.value)
     assert _folder(tmp_path) == before
 

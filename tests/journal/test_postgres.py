@@ -46,7 +46,7 @@ def mortal() -> Iterator[Server]:
         yield one
 
 
-class Crowd:
+class Writers:
     """Several who append without pause, and append again what was refused."""
 
     def __init__(self, journal: Journal, writers: int) -> None:
@@ -90,17 +90,17 @@ class Crowd:
 
 async def test_immediate_stops_under_load_lose_nothing_and_double_nothing(mortal: Server) -> None:
     journal = await opened(mortal.url("aa"))
-    crowd = Crowd(journal, writers=8)
+    writing = Writers(journal, writers=8)
     chance = random.Random(7)
     for _ in range(STOPS):
         await asyncio.sleep(chance.uniform(0.1, 0.5))
         await asyncio.to_thread(mortal.stop, "immediate")
         await asyncio.to_thread(mortal.start)
-        before = len(crowd.acknowledged)
-        await until(lambda count=before: len(crowd.acknowledged) > count, within=5)  # type: ignore[misc]
-    await crowd.end()
-    assert crowd.refused > 0
-    await crowd.check()
+        before = len(writing.acknowledged)
+        await until(lambda count=before: len(writing.acknowledged) > count, within=5)  # type: ignore[misc]
+    await writing.end()
+    assert writing.refused > 0
+    await writing.check()
     await journal.close()
 
 
@@ -186,12 +186,12 @@ async def test_cuts_anywhere_under_load_lose_nothing_and_double_nothing(postgres
 
     async with proxy(postgres.port, judge) as way:
         journal = await opened(url.replace(f":{postgres.port}/", f":{way.port}/"))
-        crowd = Crowd(journal, writers=6)
+        writing = Writers(journal, writers=6)
         calm = False
         await until(lambda: way.cuts >= CUTS, within=20 + CUTS)
         calm = True
-        await crowd.end()
-        await crowd.check()
+        await writing.end()
+        await writing.check()
         await journal.close()
 
 

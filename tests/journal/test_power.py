@@ -36,14 +36,14 @@ async def recorded(folder: Path, disk: Disk, synchronous: str = "FULL") -> Async
 
 
 async def history(folder: Path, disk: Disk, synchronous: str) -> list[tuple[int, int]]:
-    """A busy journal; after which deed how many events were acknowledged."""
+    """A busy journal; after which step how many events were acknowledged."""
     acknowledged: list[tuple[int, int]] = []
     chance = random.Random(3)
     async with recorded(folder, disk, synchronous) as journal:
         for n in range(150):
             sizes = [chance.choice((20, 50, 300, 5000)) for _ in range(chance.randint(1, 4))]
             await asyncio.gather(*(journal.append(f"s{n % 3}", [draft(size)]) for size in sizes))
-            acknowledged.append((len(disk.deeds), await journal.position()))
+            acknowledged.append((len(disk.steps), await journal.position()))
             if n % 40 == 20:
                 await journal.keep_snapshot(f"s{n % 3}", 1, bytes(9000))
     return acknowledged
@@ -76,8 +76,8 @@ async def losses(tmp_path: Path, synchronous: str, images: int) -> int:
     chance = random.Random(5)
     lost = 0
     for _ in range(images):
-        until = chance.randint(first, len(disk.deeds))
-        promised = max(count for deeds, count in acknowledged if deeds <= until)
+        until = chance.randint(first, len(disk.steps))
+        promised = max(count for steps, count in acknowledged if steps <= until)
         lost += after_the_cut(image, disk.image(until, chance)) < promised
     return lost
 

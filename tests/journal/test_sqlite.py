@@ -22,9 +22,9 @@ async def test_every_commit_reaches_the_disk(tmp_path: Path) -> None:
     journal = await opened(tmp_path / "editor.db")
     found: dict[str, object] = {}
 
-    def ask(pen: object) -> None:
+    def ask(transaction: object) -> None:
         for name in ("journal_mode", "synchronous", "foreign_keys"):
-            found[name] = pen.connection.exec_driver_sql(f"PRAGMA {name}").scalar()  # type: ignore[attr-defined]
+            found[name] = transaction.connection.exec_driver_sql(f"PRAGMA {name}").scalar()  # type: ignore[attr-defined]
 
     await journal._write(ask)
     await journal.close()
@@ -48,7 +48,9 @@ async def test_a_journal_that_cannot_write_says_so_and_recovers_by_itself(tmp_pa
     path = tmp_path / "editor.db"
     journal = await opened(path)
     await journal.append("a", [DRAFT])
-    await journal._write(lambda pen: pen.connection.exec_driver_sql("PRAGMA max_page_count=1"))
+    await journal._write(
+        lambda transaction: transaction.connection.exec_driver_sql("PRAGMA max_page_count=1")
+    )
     with pytest.raises(Unavailable, match="full"):
         await journal.append("a", [Draft("big.v1", "ada", bytes(1_000_000))])
     assert [e.seq for e in await journal.read("a")] == [1]

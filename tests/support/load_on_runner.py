@@ -1,4 +1,4 @@
-"""A crowd that presses hard on a runner: `python -m support.load_on_runner PORT SILENT CLIENTS`.
+"""Clients that press hard on a runner: `python -m support.load_on_runner PORT SILENT CLIENTS`.
 
 Every route with the worst body that it takes, from as many people as there are clients, beside
 strangers who hold connections and say nothing, or begin to. Ends when it is killed.
@@ -141,10 +141,10 @@ def _asked_for() -> list[str]:
     ]
 
 
-async def press(port: int, head: bytes, deeds: list[tuple[str, str, bytes]]) -> None:
+async def press(port: int, head: bytes, requests_: list[tuple[str, str, bytes]]) -> None:
     """One after the other, for ever; now and then without waiting for the answer."""
     for number in itertools.count():
-        method, path, body = random.choice(deeds)
+        method, path, body = random.choice(requests_)
         try:
             reader, writer = await asyncio.open_connection("127.0.0.1", port)
             first = f"{method} {path} HTTP/1.1\r\ncontent-length: {len(body)}\r\n".encode()
@@ -175,7 +175,7 @@ async def hold(port: int, said: bytes) -> None:
 async def main(port: int, silent: int, clients: int) -> None:
     """Everybody."""
     keys, page = Keys(_token()), port - 1
-    deeds = requests()
+    requests_ = requests()
     said = [b"", b"GET / HTTP/1.1\r\n", b"POST /api/stop HTTP/1.1\r\nhost: localhost\r\nx: "]
     tasks = [asyncio.create_task(hold(port, said[i % 3])) for i in range(silent)]
     for i in range(clients):
@@ -184,7 +184,7 @@ async def main(port: int, silent: int, clients: int) -> None:
             f"host: 127.0.0.1:{port}\r\norigin: http://127.0.0.1:{page}\r\n"
             f"connection: close\r\ncookie: {cookie}\r\n"
         )
-        tasks.append(asyncio.create_task(press(port, head.encode(), deeds)))
+        tasks.append(asyncio.create_task(press(port, head.encode(), requests_)))
     sys.stdout.write("pressing\n")
     sys.stdout.flush()
     await asyncio.gather(*tasks)

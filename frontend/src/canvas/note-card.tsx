@@ -23,7 +23,7 @@ export interface NoteEditing {
 
 export const NoteEditingContext = createContext<NoteEditing | null>(null);
 
-function Writing({ note, desk }: { note: Note; desk: NoteEditing }) {
+function Writing({ note, notes }: { note: Note; notes: NoteEditing }) {
   const field = useRef<HTMLTextAreaElement>(null);
   useEffect(() => {
     field.current?.focus({ preventScroll: true });
@@ -31,8 +31,8 @@ function Writing({ note, desk }: { note: Note; desk: NoteEditing }) {
   }, []);
   const done = () => {
     const text = field.current?.value ?? note.text;
-    if (text !== note.text) desk.change(note.key, { text });
-    desk.edit(null);
+    if (text !== note.text) notes.change(note.key, { text });
+    notes.edit(null);
   };
   return (
     <textarea
@@ -57,10 +57,10 @@ function Writing({ note, desk }: { note: Note; desk: NoteEditing }) {
   );
 }
 
-function Tools({ note, desk }: { note: Note; desk: NoteEditing }) {
+function Tools({ note, notes }: { note: Note; notes: NoteEditing }) {
   return (
     <NodeToolbar
-      isVisible={desk.alone === note.key}
+      isVisible={notes.alone === note.key}
       position={Position.Top}
       offset={note.kind === "frame" ? 36 : 10}
       style={{ zIndex: 1200 }}
@@ -74,12 +74,12 @@ function Tools({ note, desk }: { note: Note; desk: NoteEditing }) {
               style={{ "--c": noteColor[color] } as React.CSSProperties}
               aria-label={color}
               aria-pressed={note.color === color}
-              onClick={() => desk.change(note.key, { color })}
+              onClick={() => notes.change(note.key, { color })}
             />
           </Tooltip>
         ))}
         <Tooltip label="Delete">
-          <ActionIcon aria-label="Delete the note" onClick={() => desk.remove(note.key)}>
+          <ActionIcon aria-label="Delete the note" onClick={() => notes.remove(note.key)}>
             <IconTrash size={16} aria-hidden />
           </ActionIcon>
         </Tooltip>
@@ -89,9 +89,9 @@ function Tools({ note, desk }: { note: Note; desk: NoteEditing }) {
 }
 
 export const NoteCard = memo(function NoteCard({ data, selected }: NodeProps<NoteNode>) {
-  const desk = use(NoteEditingContext);
+  const notes = use(NoteEditingContext);
   const { note } = data;
-  const editing = desk?.editing === note.key;
+  const editing = notes?.editing === note.key;
   const empty = note.kind === "frame" ? "Frame" : "Note";
   return (
     <div
@@ -100,28 +100,28 @@ export const NoteCard = memo(function NoteCard({ data, selected }: NodeProps<Not
       data-selected={selected || undefined}
       style={{ "--c": noteColor[note.color] } as React.CSSProperties}
     >
-      {desk && <Tools note={note} desk={desk} />}
-      {desk && (
+      {notes && <Tools note={note} notes={notes} />}
+      {notes && (
         <NodeResizer
-          isVisible={selected && desk.alone === note.key}
+          isVisible={selected && notes.alone === note.key}
           minWidth={60}
           minHeight={note.kind === "frame" ? 80 : 32}
           handleClassName={style.handle ?? ""}
           lineClassName={style.line ?? ""}
           onResize={(_, { x, y, width, height }) =>
-            desk.resizing({ ...note, at: [x, y], size: [width, height] })
+            notes.resizing({ ...note, at: [x, y], size: [width, height] })
           }
           onResizeEnd={(_, { x, y, width, height }) => {
             const box = [x, y, width, height].map(Math.round) as [number, number, number, number];
-            desk.resizing(null);
-            desk.change(note.key, { at: [box[0], box[1]], size: [box[2], box[3]] });
+            notes.resizing(null);
+            notes.change(note.key, { at: [box[0], box[1]], size: [box[2], box[3]] });
           }}
         />
       )}
       {/* biome-ignore lint/a11y/noStaticElementInteractions: double click repeats what Enter does */}
-      <div data-title className={style.text} onDoubleClick={() => desk?.edit(note.key)}>
-        {editing && desk ? (
-          <Writing note={note} desk={desk} />
+      <div data-title className={style.text} onDoubleClick={() => notes?.edit(note.key)}>
+        {editing && notes ? (
+          <Writing note={note} notes={notes} />
         ) : (
           <span data-empty={note.text === "" || undefined}>{note.text || empty}</span>
         )}

@@ -21,7 +21,7 @@ export interface CopiedContent {
   readonly clip: Clip;
 }
 
-const SHELF = "aa.clipboard";
+const STORAGE_KEY = "aa.clipboard";
 const MOST = 2_000_000; // characters that are kept for other tabs
 let latest: CopiedContent | null = null;
 
@@ -40,8 +40,8 @@ export function rememberCopied(held: CopiedContent): void {
   latest = held;
   try {
     const text = JSON.stringify(held);
-    if (text.length <= MOST) localStorage.setItem(SHELF, text);
-    else localStorage.removeItem(SHELF);
+    if (text.length <= MOST) localStorage.setItem(STORAGE_KEY, text);
+    else localStorage.removeItem(STORAGE_KEY);
   } catch {
     // A browser that keeps nothing still has it on this page.
   }
@@ -58,7 +58,7 @@ function isHeld(value: unknown): value is CopiedContent {
 /** What was copied last in this browser. */
 function lastCopied(): CopiedContent | null {
   try {
-    const kept: unknown = JSON.parse(localStorage.getItem(SHELF) ?? "null");
+    const kept: unknown = JSON.parse(localStorage.getItem(STORAGE_KEY) ?? "null");
     if (isHeld(kept)) return kept;
   } catch {
     // as above

@@ -16,7 +16,7 @@ const press = (
   ...mods,
 });
 
-test("no two deeds share a shortcut", () => {
+test("no two edit actions share a shortcut", () => {
   const all = EDIT_ACTIONS.flatMap((editAction) => editAction.shortcuts);
   expect(new Set(all).size).toBe(all.length);
 });

@@ -74,7 +74,7 @@ export function useShortcuts(context: EditorContext): void {
       if (editAction === null || editAction.event !== undefined) return;
       // A button does what Enter does to it.
       if (event.key === "Enter" && event.target instanceof HTMLButtonElement) return;
-      // What a deed takes is also kept from the browser while the deed has nothing to do.
+      // What an edit action takes is also kept from the browser while the action has nothing to do.
       event.preventDefault();
       if (isEnabled(editAction, now.current)) editAction.run(now.current);
     };
@@ -105,14 +105,14 @@ function addAtPointer(context: EditorContext): void {
 /** Copy, cut and paste come as events that carry the clipboard, also on plain http. */
 function useClipboard(now: { readonly current: EditorContext }): void {
   useEffect(() => {
-    const deedOf = (event: ClipboardEvent) => {
+    const actionOf = (event: ClipboardEvent) => {
       const editAction = EDIT_ACTIONS.find((each) => each.event === event.type);
       const free = !event.defaultPrevented && !isTaken(event.target);
       return editAction && free && isEnabled(editAction, now.current) ? editAction : null;
     };
     const onTake = (event: ClipboardEvent) => {
       // Text that a person has marked is what they want to copy.
-      if (window.getSelection()?.isCollapsed === false || deedOf(event) === null) return;
+      if (window.getSelection()?.isCollapsed === false || actionOf(event) === null) return;
       const piece = copiedSelection(now.current);
       rememberCopied(piece);
       event.clipboardData?.setData("text/plain", piece.text);
@@ -121,7 +121,7 @@ function useClipboard(now: { readonly current: EditorContext }): void {
         EDIT_ACTIONS.find(({ name }) => name === "remove")?.run(now.current);
     };
     const onPaste = (event: ClipboardEvent) => {
-      if (deedOf(event) === null) return;
+      if (actionOf(event) === null) return;
       event.preventDefault();
       void pasteText(now.current, event.clipboardData?.getData("text/plain") ?? "");
     };

@@ -168,7 +168,7 @@ export function Editor(props: Props) {
     stage,
     strip,
     outline: <Outline progress={progress} />,
-    find: editor.finding && (
+    find: editor.isFindOpen && (
       <FindBar problems={problems?.problems ?? []} onClose={editor.closeFind} />
     ),
     details: (

@@ -52,7 +52,7 @@ export interface EditorState {
   readonly overlay: Overlay | null;
   readonly canvasHandle: RefObject<CanvasHandle>;
   /** Whether the search in the graph is open. */
-  readonly finding: boolean;
+  readonly isFindOpen: boolean;
   closeAdd(): void;
   closeOverlay(): void;
   closeFind(): void;
@@ -105,7 +105,7 @@ function useDialogs(latest: RefObject<EditorContext | null>, onPanel: (panel: Pa
   const [panel, setPanelNow] = useState<Panel>("details");
   const [adding, setAdding] = useState<AddRequest | null>(null);
   const [overlay, openOverlay] = useState<Overlay | null>(null);
-  const [finding, setFinding] = useState(false);
+  const [isFindOpen, setFinding] = useState(false);
   const setPanel = useCallback(
     (next: Panel) => {
       // The outline stands beside the panel of details, which stays as it is.
@@ -134,7 +134,10 @@ function useDialogs(latest: RefObject<EditorContext | null>, onPanel: (panel: Pa
     () => ({ setPanel, openAdd, openOverlay, openFind: () => setFinding(true) }),
     [setPanel, openAdd],
   );
-  return { openers, shown: { panel, adding, overlay, finding, closeAdd, closeOverlay, closeFind } };
+  return {
+    openers,
+    shown: { panel, adding, overlay, isFindOpen, closeAdd, closeOverlay, closeFind },
+  };
 }
 
 /** The canvas that is there at the moment. */

@@ -219,7 +219,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
           <Words row={row} progress={progress} name={name} />
         </button>
       </td>
-      <td className={style.deeds}>
+      <td className={style.buttons}>
         <RowActions row={row} active={active} label={label} mayEdit={mayEdit} handlers={handlers} />
       </td>
       {change !== null && (

@@ -258,7 +258,7 @@ export function RunsPage() {
           <h2 className={style.title}>Runs</h2>
           <RunFilters runner={runner} filter={filter} onChange={setFilter} engines={engines} />
         </div>
-        <div className={style.deeds} aria-live="polite">
+        <div className={style.buttons} aria-live="polite">
           {waiting > 0 && (
             <Button size="compact-sm" variant="light" onClick={() => void listed.refetch()}>
               {waiting === 1 ? "1 new run" : `${waiting} new runs`}

@@ -86,15 +86,15 @@ function Line({ robot, told, onImport }: Props & { told: RobotLogLine }) {
 
 export function RobotLog({ robot, onImport }: Props) {
   const { runner } = useLive();
-  const flight = useRobotLog(runner, robot, true);
-  if (flight.isPending) return <Text c="dimmed">Reading …</Text>;
-  if (flight.isError) return <Text c="var(--error)">The record cannot be read now.</Text>;
-  if (flight.data.length === 0) {
+  const entries = useRobotLog(runner, robot, true);
+  if (entries.isPending) return <Text c="dimmed">Reading …</Text>;
+  if (entries.isError) return <Text c="var(--error)">The record cannot be read now.</Text>;
+  if (entries.data.length === 0) {
     return <Text c="dimmed">Nobody else has told it anything while the runner was listening.</Text>;
   }
   return (
     <ol className={style.list}>
-      {flight.data.map((told) => (
+      {entries.data.map((told) => (
         <Line key={told.seq} robot={robot} told={told} onImport={onImport} />
       ))}
     </ol>

@@ -329,7 +329,7 @@ test("the difference of two documents, applied to the first, makes the second", 
 
 // -- anything at any time -------------------------------------------------------------------------
 
-const deeds = fc.constantFrom(
+const steps = fc.constantFrom(
   ...(["edit", "edit", "colleague", "stall", "commit", "drop", "crash", "accept"] as const),
   ...(["reload", "reload", "wait", "full"] as const),
 );
@@ -337,28 +337,28 @@ const deeds = fc.constantFrom(
 test("whatever breaks when, and however often the page is closed, no edit that was kept is lost", async () => {
   vi.spyOn(console, "warn").mockImplementation(() => undefined);
   await fc.assert(
-    fc.asyncProperty(fc.array(deeds, { maxLength: 40 }), async (script) => {
+    fc.asyncProperty(fc.array(steps, { maxLength: 40 }), async (script) => {
       server = new FakeServer();
       device = new FakeEditStore();
       let room = await open();
       let mine: string[] = [];
       const isOpen = () => server.last.readyState === 1;
-      for (const [n, deed] of script.entries()) {
-        if (deed === "edit") {
+      for (const [n, step] of script.entries()) {
+        if (step === "edit") {
           mine.push(`mine ${n}`);
           write(room.doc, `mine ${n}`);
-        } else if (deed === "colleague" && isOpen()) {
+        } else if (step === "colleague" && isOpen()) {
           server.broadcast((doc) => write(doc, `theirs ${n}`));
-        } else if (deed === "stall") server.stalled = true;
-        else if (deed === "commit") server.commit();
-        else if (deed === "accept" && server.last.readyState === 0) server.accept();
-        else if (deed === "wait") await vi.advanceTimersByTimeAsync(10_000);
-        else if (deed === "full") device.refuses = !device.refuses;
-        else if (deed === "drop" && isOpen()) server.last.end(1006);
-        else if (deed === "crash" && isOpen()) {
+        } else if (step === "stall") server.stalled = true;
+        else if (step === "commit") server.commit();
+        else if (step === "accept" && server.last.readyState === 0) server.accept();
+        else if (step === "wait") await vi.advanceTimersByTimeAsync(10_000);
+        else if (step === "full") device.refuses = !device.refuses;
+        else if (step === "drop" && isOpen()) server.last.end(1006);
+        else if (step === "crash" && isOpen()) {
           server.lose();
           server.last.end(1006);
-        } else if (deed === "reload") {
+        } else if (step === "reload") {
           await settle();
           const { unsaved, kept } = room.link();
           const stored = new Set(keys(server.doc));

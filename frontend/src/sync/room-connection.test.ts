@@ -99,29 +99,29 @@ test("an update goes only after the room was given what it lacked, so that it ne
   expect(server.doc.store.pendingStructs).toBeNull();
 });
 
-const deeds = fc.constantFrom(
+const steps = fc.constantFrom(
   ...(["edit", "edit", "colleague", "stall", "commit", "drop", "crash", "accept", "wait"] as const),
 );
 
 test("whatever breaks when, nothing is called saved that the server lacks, and in the end both agree", () => {
   fc.assert(
-    fc.property(fc.array(deeds, { maxLength: 40 }), (script) => {
+    fc.property(fc.array(steps, { maxLength: 40 }), (script) => {
       const server = new FakeServer();
       const room = connectRoom({ url: "ws://host/room", open: server.open, random: () => 1 });
       const isOpen = () => server.last.readyState === 1;
       const mine: string[] = [];
-      script.forEach((deed, n) => {
-        if (deed === "edit") {
+      script.forEach((step, n) => {
+        if (step === "edit") {
           mine.push(`mine ${n}`);
           write(`mine ${n}`, room.doc);
-        } else if (deed === "colleague" && isOpen()) {
+        } else if (step === "colleague" && isOpen()) {
           server.broadcast((doc) => write(`theirs ${n}`, doc));
-        } else if (deed === "stall") server.stalled = true;
-        else if (deed === "commit") server.commit();
-        else if (deed === "accept" && server.last.readyState === 0) server.accept();
-        else if (deed === "wait") vi.advanceTimersByTime(10_000);
-        else if (deed === "drop" && isOpen()) server.last.end(1006);
-        else if (deed === "crash" && isOpen()) {
+        } else if (step === "stall") server.stalled = true;
+        else if (step === "commit") server.commit();
+        else if (step === "accept" && server.last.readyState === 0) server.accept();
+        else if (step === "wait") vi.advanceTimersByTime(10_000);
+        else if (step === "drop" && isOpen()) server.last.end(1006);
+        else if (step === "crash" && isOpen()) {
           server.lose();
           server.last.end(1006);
         }

@@ -76,9 +76,9 @@ const show = (url = "ws://host/room") =>
     ),
   );
 /** What the server sends is drawn with the next frame. */
-const heard = (deed: () => void) =>
+const heard = (step: () => void) =>
   act(async () => {
-    deed();
+    step();
     await new Promise(requestAnimationFrame);
   });
 const text = () => document.querySelector("p")?.textContent;

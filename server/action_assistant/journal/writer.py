@@ -197,7 +197,9 @@ class Writer:
         self._clock = clock
         self._transaction: Transaction | None = None
         self._jobs: queue.SimpleQueue[Sequence[Job[Any]] | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name=f"{database.name} pen", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, name=f"{database.name} writer", daemon=True
+        )
         self._thread.start()
 
     def submit(self, jobs: Sequence[Job[Any]]) -> None:

@@ -381,9 +381,9 @@ async def position(url: str) -> int:
 
 def test_nothing_starts_in_a_folder_with_half_a_backup(data: Path) -> None:
     (data / settings.RESTORING).write_bytes(b"")
-    for deed in (
+    for attempt in (
         lambda: settings.data_folder(data),
         lambda: here("backup", data.parent / "x.zip", "--data", data),
     ):
         with pytest.raises(CannotStart, match="run `action-assistant restore` again"):
-            deed()
+            attempt()

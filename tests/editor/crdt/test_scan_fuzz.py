@@ -121,7 +121,7 @@ def test_what_kills_the_library_outright_is_never_passed() -> None:
     assert [found for found, _, _ in devoured(start, chains)] == ["taken", *["refused"] * 3]
 
 
-deeds = st.lists(
+steps = st.lists(
     st.one_of(
         st.tuples(st.just("set"), st.sampled_from("abcd"), values),
         st.tuples(st.just("erase"), st.sampled_from("abcd"), st.none()),
@@ -135,7 +135,7 @@ deeds = st.lists(
 
 
 @settings(max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(st.lists(deeds, min_size=1, max_size=3), st.randoms(use_true_random=False))
+@given(st.lists(steps, min_size=1, max_size=3), st.randoms(use_true_random=False))
 def test_whatever_clients_make_together_is_passed(
     people: list[list[tuple[str, str, Any]]], chance: random.Random
 ) -> None:
@@ -155,8 +155,8 @@ def test_whatever_clients_make_together_is_passed(
 def perform(doc: Doc[Any], plan: list[tuple[str, str, Any]]) -> None:
     things, text = doc.get("things", type=Map), doc.get("text", type=Text)
     items = doc.get("items", type=Array)
-    for deed, key, value in plan:
-        match deed:
+    for step, key, value in plan:
+        match step:
             case "set":
                 things[key] = value
             case "erase" if key in things:

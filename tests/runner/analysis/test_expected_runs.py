@@ -52,7 +52,7 @@ def with_speed(value: str) -> Graph:
 @pytest.mark.parametrize("value", ["5", "5.0", "0.5e1"])
 def test_parameters_are_told_as_sent_and_as_executed(process: RunnerProcess, value: str) -> None:
     with process.client() as client:
-        script = {"*": [{"after_s": 0.02}]}
+        script = {"*": [{"after_s": 0.2}]}  # long enough to be seen while it runs, also under load
         run = over(client, started(client, order(with_speed(value), script=script))["id"])
         whole = client.get(f"/api/runs/{run['id']}").json()
         assert whole["sent"] == {"Work_0": {"arm::speed": "5"}}

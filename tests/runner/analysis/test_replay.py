@@ -1,4 +1,4 @@
-"""A film shows at every moment exactly what was known then."""
+"""A replay shows at every moment exactly what was known then."""
 
 from collections.abc import Sequence
 from typing import Any

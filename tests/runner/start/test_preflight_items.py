@@ -10,7 +10,7 @@ from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.robots.engine import EngineIndex
 from action_assistant.runner.start.admission import Admitted
 from action_assistant.runner.start.preflight import (
-    EngineSight,
+    EngineView,
     Item,
     of_graph,
     of_refusal,
@@ -42,7 +42,7 @@ def admitted(*problems: Problem) -> Admitted:
 def proof(**standing: Any) -> Item:
     """What is said about whether a stop could be proven."""
     fields = {"state": "answering", "generation": "current", "servers": 1} | standing
-    sight = EngineSight(
+    sight = EngineView(
         name="David",
         facts=PINNED,
         standing=Standing(**fields),

@@ -15,7 +15,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from action_assistant.editor.crdt import messages
 from action_assistant.web.auth.keys import Keys
-from action_assistant.web.auth.roles import Deed, Role, allowed, may
+from action_assistant.web.auth.roles import Permission, Role, allowed, may
 from action_assistant.web.network.connection_limits import OF_A_PERSON, OF_AN_ADDRESS
 from support.product import TOKEN, Product, running
 
@@ -23,7 +23,7 @@ KEYS = Keys(TOKEN)
 ROLES: tuple[Role, ...] = get_args(Role)
 PROCESSES = ("editor", "runner")
 #: Nothing that a person may not do is here below an editor, nor robots below an operator.
-LEAST: dict[Deed, Role] = {
+LEAST: dict[Permission, Role] = {
     "see": "viewer",
     "stop": "viewer",
     "edit": "editor",
@@ -61,8 +61,8 @@ def url_of(product: Product, process: str) -> str:
     return product.url if process == "editor" else product.runner_url
 
 
-def operations(product: Product, process: str) -> list[tuple[str, str, Deed | None]]:
-    """Method, path and deed of everything that a process describes."""
+def operations(product: Product, process: str) -> list[tuple[str, str, Permission | None]]:
+    """Method, path and permission of everything that a process describes."""
     headers = {"authorization": f"Bearer {TOKEN}"}
     schema = httpx.get(
         f"{url_of(product, process)}/schema/openapi.json", headers=headers, trust_env=False
@@ -75,9 +75,9 @@ def operations(product: Product, process: str) -> list[tuple[str, str, Deed | No
 
 
 def test_the_table_is_cumulative_and_says_what_was_agreed() -> None:
-    assert set(LEAST) == set(get_args(Deed))
-    for deed, least in LEAST.items():
-        may = [role for role in ROLES if allowed(role, deed)]
+    assert set(LEAST) == set(get_args(Permission))
+    for permission, least in LEAST.items():
+        may = [role for role in ROLES if allowed(role, permission)]
         assert may == list(ROLES[ROLES.index(least) :])
 
 
@@ -95,15 +95,15 @@ def test_every_route_says_who_may_call_it_and_means_it(product: Product, process
     found = operations(product, process)
     assert len(found) > 10
     with httpx.Client(base_url=url_of(product, process), trust_env=False, timeout=20) as client:
-        for method, path, deed in found:
-            if deed is None:
+        for method, path, permission in found:
+            if permission is None:
                 open_to_strangers = "/healthz|/readyz|/api/server|/api/session"
                 assert re.match(open_to_strangers, path), f"who may {method} {path}?"
                 continue
             for role in ROLES:
                 answer = ask(client, method, path, browser(product, role))
-                refused = (answer == 403) is not allowed(role, deed)
-                assert refused, f"{role}: {method} {path} needs {deed}, answered {answer}"
+                refused = (answer == 403) is not allowed(role, permission)
+                assert refused, f"{role}: {method} {path} needs {permission}, answered {answer}"
 
 
 def ask(client: httpx.Client, method: str, path: str, headers: dict[str, str]) -> int:
@@ -115,7 +115,7 @@ def ask(client: httpx.Client, method: str, path: str, headers: dict[str, str]) -
 
 
 @pytest.mark.parametrize(
-    ("method", "path", "deed"),
+    ("method", "path", "permission"),
     [
         ("post", "/api/graphs", "edit"),
         ("delete", "/api/graphs/{graph_id}", "edit"),
@@ -128,10 +128,10 @@ def ask(client: httpx.Client, method: str, path: str, headers: dict[str, str]) -
     ],
 )
 def test_what_routes_were_decided_to_need(
-    product: Product, method: str, path: str, deed: Deed
+    product: Product, method: str, path: str, permission: Permission
 ) -> None:
     found = [each for process in PROCESSES for each in operations(product, process)]
-    assert (method, path, deed) in found
+    assert (method, path, permission) in found
 
 
 def test_starting_on_a_robot_takes_an_operator(product: Product) -> None:

@@ -64,7 +64,7 @@ def many() -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 8192), hard))
 
 
-def crowd(stack: ExitStack, port: int, count: int, said: bytes = b"") -> list[socket.socket]:
+def strangers(stack: ExitStack, port: int, count: int, said: bytes = b"") -> list[socket.socket]:
     """So many strangers who hold a connection each."""
     found = []
     for _ in range(count):
@@ -89,7 +89,7 @@ def test_idle_strangers_keep_nobody_from_coming_in(tmp_path: Path, name: str, sa
         before = stack.enter_context(httpx.Client(base_url=url, headers=BEARER, trust_env=False))
         path = "/api/robots" if name == "runner" else "/api/graphs"
         before.get(path).raise_for_status()
-        crowd(stack, port, 2 * FEW, said)
+        strangers(stack, port, 2 * FEW, said)
         for _ in range(20):
             fresh = httpx.get(f"{url}{path}", headers=BEARER, trust_env=False, timeout=5)
             assert fresh.status_code == 200
@@ -101,7 +101,7 @@ def test_idle_strangers_keep_nobody_from_coming_in(tmp_path: Path, name: str, sa
 
 def test_strangers_who_do_not_even_finish_a_handshake_make_room_too(tmp_path: Path) -> None:
     with process("runner", tmp_path, "--tls") as port, ExitStack() as stack:
-        crowd(stack, port, 2 * FEW)
+        strangers(stack, port, 2 * FEW)
         for _ in range(5):
             answer = httpx.post(
                 f"https://127.0.0.1:{port}/api/stop",
@@ -115,9 +115,9 @@ def test_strangers_who_do_not_even_finish_a_handshake_make_room_too(tmp_path: Pa
 
 def test_who_says_nothing_is_let_go_and_who_waits_for_an_answer_is_not(tmp_path: Path) -> None:
     with process("runner", tmp_path) as port, ExitStack() as stack:
-        (silent,) = crowd(stack, port, 1, b"GET /healthz HTTP/1.1\r\n")
+        (silent,) = strangers(stack, port, 1, b"GET /healthz HTTP/1.1\r\n")
         stream = b"GET /api/robots HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\n\r\n"
-        (known,) = crowd(stack, port, 1, stream % TOKEN.encode())
+        (known,) = strangers(stack, port, 1, stream % TOKEN.encode())
         assert known.recv(100).startswith(b"HTTP/1.1 200")
         silent.settimeout(30)
         assert silent.recv(100) == b""
@@ -129,7 +129,7 @@ def test_a_body_in_crumbs_is_refused(tmp_path: Path) -> None:
         head = (
             b"POST /api/session HTTP/1.1\r\nhost: localhost\r\ntransfer-encoding: chunked\r\n\r\n"
         )
-        (one,) = crowd(stack, port, 1, head + b"1\r\nx\r\n" * 1000)
+        (one,) = strangers(stack, port, 1, head + b"1\r\nx\r\n" * 1000)
         assert one.recv(100).startswith(b"HTTP/1.1 411")
 
 
@@ -156,11 +156,11 @@ def test_what_a_peer_does_not_finish_or_spells_wrongly_is_no_failure_of_ours(
     with process("editor", tmp_path) as port, ExitStack() as stack:
         url = f"http://127.0.0.1:{port}/api/graphs"
         made = httpx.post(url, json={"name": "g"}, headers=BEARER, trust_env=False).json()
-        (one,) = crowd(stack, port, 1, CUT_OFF % port)
+        (one,) = strangers(stack, port, 1, CUT_OFF % port)
         time.sleep(0.3)
         one.close()
         upgrade = UPGRADE % (made["id"].encode(), TOKEN.encode())
-        (two,) = crowd(stack, port, 1, upgrade)
+        (two,) = strangers(stack, port, 1, upgrade)
         assert two.recv(100).startswith(b"HTTP/1.1 101")
         two.send(NO_TEXT)
         while two.recv(4096):
@@ -197,7 +197,7 @@ def test_a_body_that_nobody_asked_for_and_that_does_not_end_is_one_line(
             asked %= made.json()["id"].encode()
         before = (tmp_path / "log").read_text().splitlines()
         for _ in range(3):
-            (one,) = crowd(stack, port, 1, UNFINISHED % (asked, TOKEN.encode(), accept))
+            (one,) = strangers(stack, port, 1, UNFINISHED % (asked, TOKEN.encode(), accept))
             time.sleep(0.3)
             one.close()
         time.sleep(0.3)

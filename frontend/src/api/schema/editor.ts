@@ -221,7 +221,7 @@ export interface EditorApi {
      * @description Something that was done to a graph, between `at` and `until`.
      *
      *     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
-     *     was after that deed; edits begin at `from_seq`. `restored` is the change that was gone back to.
+     *     was after that edit; edits begin at `from_seq`. `restored` is the change that was gone back to.
      */
     HistoryEntry: {
         /** @enum {string} */

@@ -190,7 +190,7 @@ export interface RunnerApi {
     };
     /**
      * Chapter
-     * @description Where a page of the film begins: after `after` events, at `at`.
+     * @description Where a page of the replay begins: after `after` events, at `at`.
      */
     Chapter: {
         after: number;
@@ -846,7 +846,7 @@ export interface RunnerApi {
     };
     /**
      * RunReplay
-     * @description A page of a run's film. `base` is the run after `after` events, null at the very beginning;
+     * @description A page of a run's replay. `base` is the run after `after` events, null at the very beginning;
      *     `newest` is the last event there is.
      */
     RunReplay: {

@@ -94,7 +94,7 @@ function mapColor(node: CanvasNode): string {
 }
 
 /** How notes are changed from the canvas itself. */
-function useNoteDesk(
+function useNoteEditing(
   context: EditorContext,
   writing: string | null,
   setResized: NoteEditing["resizing"],
@@ -273,7 +273,7 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
   const hands = useHands({ context, canvas, onPanned }, connecting);
   const press = useContextMenu(context);
   const pinch = usePinch(context, onPanned);
-  const desk = useNoteDesk(context, writing, canvas.setResized);
+  const noteEditing = useNoteEditing(context, writing, canvas.setResized);
   const onDoubleClick = (event: MouseEvent) => {
     if (!(event.target as Element).classList.contains("react-flow__pane")) return;
     openAddAt([event.clientX, event.clientY], null);
@@ -316,7 +316,7 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
         presence.tell({ cursor: undefined });
       }}
     >
-      <NoteEditingContext value={desk}>
+      <NoteEditingContext value={noteEditing}>
         <Drawing context={context} canvas={canvas} me={me} map={map} hands={hands} />
       </NoteEditingContext>
       {connecting.pending && (

@@ -15,7 +15,7 @@ const MOST = 60;
 /** Names of edit actions that were done from here, the last first. */
 let recent: readonly string[] = [];
 
-function deedOptions(context: EditorContext): Option[] {
+function commandOptions(context: EditorContext): Option[] {
   const rank = (name: string) => {
     const at = recent.indexOf(name);
     return at < 0 ? recent.length : at;
@@ -24,7 +24,7 @@ function deedOptions(context: EditorContext): Option[] {
     .map((editAction) => {
       const Sign = editAction.icon;
       return {
-        id: `deed ${editAction.name}`,
+        id: `command ${editAction.name}`,
         label: labelOf(editAction, context),
         also: `${editAction.also ?? ""} ${editAction.group}`,
         group: "Commands",
@@ -61,7 +61,7 @@ export function CommandPalette({
   const first = useRef(context);
   const options = useMemo<Option[]>(
     () => [
-      ...deedOptions(first.current),
+      ...commandOptions(first.current),
       ...actionOptions(first.current),
       ...(graphs ?? [])
         .filter(({ id }) => id !== first.current.id)

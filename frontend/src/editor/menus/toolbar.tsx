@@ -87,7 +87,7 @@ const GROUPS: readonly EditActionGroup[] = ["Draw", "Arrange", "Look", "Graph", 
 const KEYS_ONLY = /^(nudge|walk)-/;
 
 /** Rendered while the menu is open only: what is enabled depends on everything. */
-function DeedItems() {
+function ActionItems() {
   const context = useEditorContext();
   return GROUPS.map((group) => (
     <Fragment key={group}>
@@ -126,7 +126,7 @@ function EditActionMenu() {
         </ActionIcon>
       </Menu.Target>
       <Menu.Dropdown className={style.menu ?? ""}>
-        <DeedItems />
+        <ActionItems />
       </Menu.Dropdown>
     </Menu>
   );

@@ -44,7 +44,7 @@ export function RawEvents({ runner, run }: { runner: string | undefined; run: Ru
   const found = useRawEvents(runner, run, MOST);
   return (
     <div className={style.raw}>
-      <div className={style.deeds}>
+      <div className={style.buttons}>
         <Button
           size="compact-xs"
           variant="default"

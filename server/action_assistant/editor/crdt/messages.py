@@ -86,7 +86,7 @@ class WhoIsThere(msgspec.Struct, frozen=True):
 
 
 class CompareMessage(msgspec.Struct, frozen=True):
-    """What the client shows at `seq`, as a fingerprint (`sameness`)."""
+    """What the client shows at `seq`, as a fingerprint."""
 
     seq: int
     entries: int

@@ -207,6 +207,21 @@ def before_doubt(items: Sequence[Item], is_doubtful: Callable[[int], bool]) -> i
     return len(items)
 
 
+def next_batch(waiting: list[Item], replica: Replica) -> tuple[list[Item], list[Item], bool]:
+    """What is taken next, what then waits, and whether the one is an edit that has to be tried first."""
+    much_waits = replica.waiting_bytes > LARGE
+    batch, rest = batch_of(waiting, one=much_waits)
+    freed = min(replica.waiting_bytes, LARGE)  # what more than that frees is looked at alone
+    sure = before_doubt(batch, lambda size: replica.opening.is_doubtful_with(size + freed))
+    count = max(sure, 1)
+    rest = [*batch[count:], *rest]
+    match batch[:count]:
+        case [Offer(update)] as alone if much_waits or not sure or len(update) > LARGE:
+            return alone, rest, True
+        case several:
+            return several, rest, False
+
+
 def merged(updates: list[bytes]) -> list[bytes]:
     """The same changes in few updates; none so large that a client that echoes would be refused."""
     groups: list[list[bytes]] = []

@@ -39,6 +39,6 @@ class BatchWindow:
 
     def _open(self) -> None:
         self._next = self._loop.time() + self._length
-        deeds, self._waiting = self._waiting, []
-        for work in deeds:
+        waiting, self._waiting = self._waiting, []
+        for work in waiting:
             work()

@@ -26,7 +26,6 @@ from action_assistant.editor.crdt.trial import TooSlow
 from action_assistant.editor.crdt.update_scan import UpdateOutline
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
 from action_assistant.editor.rooms.batch import (
-    LARGE,
     Ask,
     Compare,
     Item,
@@ -35,10 +34,9 @@ from action_assistant.editor.rooms.batch import (
     NotNow,
     Offer,
     Taken,
-    batch_of,
-    before_doubt,
     fail,
     merged,
+    next_batch,
     refuse,
     tried_first,
 )
@@ -216,7 +214,7 @@ class Room:
             self._end(reason)
 
     async def _handle(self) -> None:
-        batch, alone = self._next_batch()
+        batch, self._waiting, alone = next_batch(self._waiting, self._replica)
         self._in_hand = batch
         match batch:
             case [Offer() as offer] if alone:
@@ -241,25 +239,6 @@ class Room:
             await self._keep_snapshot()
         if not taken.news:
             await asyncio.sleep(0)  # nothing was awaited; others want a turn
-
-    def _next_batch(self) -> tuple[list[Item], bool]:
-        """What is taken next, and whether that is an edit which has to be tried first."""
-        much_waits = self._replica.waiting_bytes > LARGE
-        batch, rest = batch_of(self._waiting, one=much_waits)
-        sure = before_doubt(batch, self._is_doubtful)
-        count = max(sure, 1)
-        self._waiting = [*batch[count:], *rest]
-        match batch[:count]:
-            case [Offer(update)] as alone if much_waits or not sure or len(update) > LARGE:
-                return alone, True
-            case several:
-                return several, False
-
-    def _is_doubtful(self, size: int) -> bool:
-        freed = min(
-            self._replica.waiting_bytes, LARGE
-        )  # what more than that frees is looked at alone
-        return self._replica.opening.is_doubtful_with(size + freed)
 
     def _take(self, batch: Sequence[Item]) -> Taken:
         """Apply a batch. After a panic the rest of it waits for a sound document."""

@@ -72,14 +72,14 @@ def _waits_in_words(cause: Waiting, run: Run, child: str) -> str:
 def _command_in_words(cause: ForeignCause) -> str:
     if not cause.graph:
         return cause.quote
-    deed: dict[str, str] = {
+    verbs: dict[str, str] = {
         "start": f"started {cause.graph} on {cause.robot}",
         "stop": f"told {cause.robot} to stop this run",
         "pause": f"told {cause.robot} to pause this run",
         "resume": f"told {cause.robot} to go on with this run",
         "modify": f"changed the graph on {cause.robot}",
     }
-    did = deed.get(cause.command, f"told {cause.robot} something")
+    did = verbs.get(cause.command, f"told {cause.robot} something")
     return f"Somebody else {did}" + ("; this run was ended by it." if cause.ended else ".")
 
 

@@ -38,7 +38,7 @@ from action_assistant.web.workers.lanes import RunInWorker
 
 #: Raise it when `runs.follow` tells something else of the same events: older keyframes are void then.
 FOLD: Final = 3
-#: Events between two keyframes, and in one page of a film.
+#: Events between two keyframes, and in one page of a replay.
 APART: Final = 2_000
 #: Marks that are kept of one run.
 MARKS: Final = 2_000

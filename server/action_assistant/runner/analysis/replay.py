@@ -55,7 +55,7 @@ class ReplayFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
 
 
 class Chapter(msgspec.Struct, frozen=True):
-    """Where a page of the film begins: after `after` events, at `at`."""
+    """Where a page of the replay begins: after `after` events, at `at`."""
 
     after: int
     at: datetime
@@ -73,7 +73,7 @@ class MarkShown(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class RunReplay(msgspec.Struct, frozen=True, kw_only=True):
-    """A page of a run's film. `base` is the run after `after` events, null at the very beginning;
+    """A page of a run's replay. `base` is the run after `after` events, null at the very beginning;
     `newest` is the last event there is."""
 
     run: str

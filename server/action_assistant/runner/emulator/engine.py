@@ -46,7 +46,7 @@ _TOLD_MS: Final = 10.0  # from the end of a stop to the line that says so
 _TAIL_MS: Final = 1_500.0  # an idle engine that was told to quit takes so long
 _FORWARD: Final = "   fwd [in modifyGraph]: forwarding\n"
 _BUSY: Final = frozenset({"RUNNING", "PAUSED", "STOPPING", "CLEARING"})
-_Deed: TypeAlias = Callable[[str, float], list[Trace]]
+_Command: TypeAlias = Callable[[str, float], list[Trace]]
 
 
 class EmulatedEngine:
@@ -299,13 +299,13 @@ class EmulatedEngine:
             self._hold(lambda: None)
 
     def _command(
-        self, name: str, doing: str, verb: str, deed: _Deed, done: str, told_ms: float
+        self, name: str, doing: str, verb: str, command: _Command, done: str, told_ms: float
     ) -> None:
         self._log(f"{doing} UMRF graph '{name}' ...")
         if name not in self._engine.graphs:
             self._log(unknown(verb, name))
             return
-        self._take(deed(name, self._now))
+        self._take(command(name, self._now))
 
         def tell() -> None:
             if verb == "stop" or not self.quirks.quiet_pause:

@@ -97,7 +97,7 @@ class ReviewQueries(Protocol):
 
 class ReviewService:
     """Looks back on runs. Nothing here commands a robot. What only reads is asked of a worker that
-    has a desk of its own (`stored.Asked`), over the same file and with nothing that goes on."""
+    has its own, over the same file and with nothing that goes on."""
 
     def __init__(
         self,
@@ -206,7 +206,7 @@ class ReviewService:
         return raw_of(run_, here, gone, until)
 
     async def replay(self, run_id: str, after: int) -> RunReplay:
-        """A page of the run's film. Raises NotFound."""
+        """A page of the run's replay. Raises NotFound."""
         return await run_replay(self.keyframe_store, run_id, after=after)
 
     async def umrf(self, run_id: str) -> bytes:

@@ -1,6 +1,6 @@
 """Appends the events of one stream in order, without making anybody wait.
 
-What happens to a robot is shown first and stored at once. When the journal fails the pen says so
+What happens to a robot is shown first and stored at once. When the journal fails the recorder says so
 (`recorded` is false) and goes on trying with the same events, in the same order.
 """
 

@@ -66,7 +66,7 @@ class Settled(msgspec.Struct, frozen=True):
     places: frozenset[tuple[str, str]]
 
 
-class EngineSight(msgspec.Struct, frozen=True, kw_only=True):
+class EngineView(msgspec.Struct, frozen=True, kw_only=True):
     """An engine at the moment of a pre-flight. `took_ms`: until it answered a get sent for it;
     `open_runs`: runs of ours that go on there; `settled`: those that somebody has seen at rest."""
 
@@ -132,12 +132,12 @@ def of_taken(engine: str, other: Run | None) -> Item:
     return Item(code="free", verdict="blocked", text=text)
 
 
-def of_answer(sight: EngineSight) -> Item:
+def of_answer(view: EngineView) -> Item:
     """It has answered a get sent now."""
     return Item(
         code="answers",
         verdict="passed",
-        text=f"{sight.name} answered after {max(1, round(sight.took_ms))} ms.",
+        text=f"{view.name} answered after {max(1, round(view.took_ms))} ms.",
     )
 
 
@@ -147,23 +147,23 @@ def of_silence(engine: str, why: str) -> Item:
     return Item(code="answers", verdict="blocked", text=text.rstrip())
 
 
-def of_robot(sight: EngineSight, graph: Graph) -> tuple[Item, ...]:
+def of_robot(view: EngineView, graph: Graph) -> tuple[Item, ...]:
     """All that an answering robot is looked at for."""
     return (
-        of_answer(sight),
-        _proof(sight),
-        _actions(sight, graph),
-        _again(sight, graph),
-        _quiet(sight, graph),
-        _rest(sight),
-        _others(sight),
-        _actors(sight, graph),
+        of_answer(view),
+        _proof(view),
+        _actions(view, graph),
+        _again(view, graph),
+        _quiet(view, graph),
+        _rest(view),
+        _others(view),
+        _actors(view, graph),
     )
 
 
-def of_text(sight: EngineSight, umrf: str) -> tuple[Item, ...]:
+def of_text(view: EngineView, umrf: str) -> tuple[Item, ...]:
     """As `of_robot`, of a graph as it will be sent. For workers."""
-    return of_robot(sight, codec.read(umrf).graph)
+    return of_robot(view, codec.read(umrf).graph)
 
 
 def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
@@ -180,9 +180,9 @@ def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
         )
 
 
-def _proof(sight: EngineSight) -> Item:
+def _proof(view: EngineView) -> Item:
     """A stop can be proven, and the messages are those that we speak."""
-    standing, name = sight.standing, sight.name
+    standing, name = view.standing, view.name
     if standing.generation == "older":
         text = (
             f"{name} speaks an older generation of temoto_msgs: it would not understand a Stop. "
@@ -209,54 +209,54 @@ def _proof(sight: EngineSight) -> Item:
     return Item(code="proof", verdict="passed", text="A stop can be proven: one engine answers.")
 
 
-def _actions(sight: EngineSight, graph: Graph) -> Item:
+def _actions(view: EngineView, graph: Graph) -> Item:
     """It has the actions, with the same parameters."""
-    index = sight.index
+    index = view.index
     if graph.name in index.graphs:
         text = (
-            f"{sight.name} has a graph called {graph.name} in its own index and so refuses another "
+            f"{view.name} has a graph called {graph.name} in its own index and so refuses another "
             "one of that name. Rename this one."
         )
         return Item(code="actions", verdict="blocked", text=text)
     if not index.actions and not index.graphs:
-        text = f"{sight.name} names no actions, so whether it knows these cannot be said."
+        text = f"{view.name} names no actions, so whether it knows these cannot be said."
         return Item(code="actions", verdict="warned", text=text)
-    own = {action.key for action in graph.actions if action.actor in {"", sight.name}}
+    own = {action.key for action in graph.actions if action.actor in {"", view.name}}
     problems = tuple(
         each
-        for each in check(graph, index.actions, sight.facts, index.graphs)
+        for each in check(graph, index.actions, view.facts, index.graphs)
         if each.code in _OF_INDEX and (each.where.aid is None or each.where.aid in own)
     )
     if not problems:
-        text = f"{sight.name} knows all {_count(len(own), 'action')}, with the same parameters."
+        text = f"{view.name} knows all {_count(len(own), 'action')}, with the same parameters."
         return Item(code="actions", verdict="passed", text=text)
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     codes = {each.code for each in problems}
     return Item(
         code="actions",
         verdict="blocked",
-        text=f"{sight.name} would refuse the graph: {problems[0].message}{more}",
+        text=f"{view.name} would refuse the graph: {problems[0].message}{more}",
         codes=tuple(sorted(codes)),
         overridable=not codes & _REFUSED,
         problems=problems[:_SHOWN],
     )
 
 
-def _again(sight: EngineSight, graph: Graph) -> Item:
+def _again(view: EngineView, graph: Graph) -> Item:
     """The engine does not hold a graph of this name already, or survives that it is started again.
 
     Whoever started that one, and however it ended: the name is held until the engine is restarted.
     """
-    held = {each.graph for each in sight.answer.graphs}
+    held = {each.graph for each in view.answer.graphs}
     if graph.name not in held:
-        text = f"{sight.name} holds no graph called {graph.name} from an earlier start."
+        text = f"{view.name} holds no graph called {graph.name} from an earlier start."
         return Item(code="again", verdict="passed", text=text)
-    lost = not_matched(graph, sight.facts, sight.index, held)
+    lost = not_matched(graph, view.facts, view.index, held)
     if not lost:
-        text = f"{sight.name} can start {graph.name} again: nothing in it has to be looked up."
+        text = f"{view.name} can start {graph.name} again: nothing in it has to be looked up."
         return Item(code="again", verdict="passed", text=text)
     text = (
-        f"{sight.name} holds a graph called {graph.name} from an earlier start. Its engine does not "
+        f"{view.name} holds a graph called {graph.name} from an earlier start. Its engine does not "
         f"look up {_listed(lost)} when a name is started again: it aborts with every running graph, or "
         "does nothing. Restart the engine, or give the graph another name."
     )
@@ -296,73 +296,73 @@ def _listed(names: Sequence[str]) -> str:
     return shown if len(names) <= 3 else f"{shown} and {len(names) - 3} more"
 
 
-def _quiet(sight: EngineSight, graph: Graph) -> Item:
+def _quiet(view: EngineView, graph: Graph) -> Item:
     """Nothing of somebody else runs there."""
-    moving = foreign_graphs(sight.answer, sight.open_runs)
+    moving = foreign_graphs(view.answer, view.open_runs)
     if graph.name in moving:
         text = (
-            f"A graph called {graph.name} runs on {sight.name} already, started by somebody else: "
+            f"A graph called {graph.name} runs on {view.name} already, started by somebody else: "
             "the engine would refuse this one and stop that one. Stop it first."
         )
         return Item(code="quiet", verdict="blocked", text=text)
     if moving:
         names = ", ".join(moving[:3])
-        text = f"{sight.name} runs {names}, which nobody started from here."
+        text = f"{view.name} runs {names}, which nobody started from here."
         return Item(code="quiet", verdict="blocked", text=text, codes=("quiet",), overridable=True)
-    return Item(code="quiet", verdict="passed", text=f"Nothing else runs on {sight.name}.")
+    return Item(code="quiet", verdict="passed", text=f"Nothing else runs on {view.name}.")
 
 
-def _rest(sight: EngineSight) -> Item:
+def _rest(view: EngineView) -> Item:
     """Nothing there may still move that its engine calls ERROR. Runs of ours stand in the way as runs,
     until somebody has seen them at rest."""
     doubted = sorted(
         each.graph
-        for each in sight.answer.graphs
+        for each in view.answer.graphs
         if (each.state == "ERROR" or each.stoppable)
-        and each.run not in sight.open_runs
-        and not _is_settled(sight, each)
+        and each.run not in view.open_runs
+        and not _is_settled(view, each)
     )
     if not doubted:
-        text = f"No action on {sight.name} is known to have been given up by its engine."
+        text = f"No action on {view.name} is known to have been given up by its engine."
         return Item(code="rest", verdict="passed", text=text)
     text = (
-        f"{', '.join(doubted[:3])} on {sight.name} did not obey a stop, or failed while it was told to: "
+        f"{', '.join(doubted[:3])} on {view.name} did not obey a stop, or failed while it was told to: "
         "the engine says ERROR, but the code may still run. Look at the robot; restart its engine."
     )
     return Item(code="rest", verdict="blocked", text=text, codes=("rest",), overridable=True)
 
 
-def _is_settled(sight: EngineSight, shown: Snapshot) -> bool:
+def _is_settled(view: EngineView, shown: Snapshot) -> bool:
     """Whether somebody has seen at rest just what is in doubt here: the graph of that run or a part of
     it, in the same life of the engine, with no other action in ERROR."""
-    marks = {each.graph: each.run for each in sight.answer.graphs if each.run is not None}
-    for each in sight.settled:
+    marks = {each.graph: each.run for each in view.answer.graphs if each.run is not None}
+    for each in view.settled:
         top = next((name for name, run in marks.items() if run == each.run), None)
         is_part = top is not None and f"{shown.graph}__".startswith(f"{top}__")
         places = {(shown.graph, node) for node in failed_in(shown) or [shown.graph]}
-        if is_part and each.incarnation == sight.answer.incarnation and places <= each.places:
+        if is_part and each.incarnation == view.answer.incarnation and places <= each.places:
             return True
     return False
 
 
-def _others(sight: EngineSight) -> Item:
+def _others(view: EngineView) -> Item:
     """Nobody else publishes starts."""
-    others = sight.standing.others
+    others = view.standing.others
     if others == 0:
         return Item(code="others", verdict="passed", text="Nobody else can start something there.")
     who = _count(others, "other program")
-    text = f"{who} can publish starts to {sight.name}: what runs there may change at any moment."
+    text = f"{who} can publish starts to {view.name}: what runs there may change at any moment."
     return Item(code="others", verdict="blocked", text=text, codes=("others",), overridable=True)
 
 
-def _actors(sight: EngineSight, graph: Graph) -> Item:
+def _actors(view: EngineView, graph: Graph) -> Item:
     """The actions are this robot's, or the engines synchronise."""
     named = {action.actor for action in graph.actions if not action.missing} - {""}
-    foreign = sorted(named - {sight.name, sight.standing.actor})
-    if not foreign or sight.facts.synchronises:
-        return Item(code="actors", verdict="passed", text=f"The actions are {sight.name}'s to do.")
+    foreign = sorted(named - {view.name, view.standing.actor})
+    if not foreign or view.facts.synchronises:
+        return Item(code="actors", verdict="passed", text=f"The actions are {view.name}'s to do.")
     text = (
-        f"Actions belong to {', '.join(foreign)}, not to {sight.name}, and its engine cannot "
+        f"Actions belong to {', '.join(foreign)}, not to {view.name}, and its engine cannot "
         "synchronise with others: it refuses the graph."
     )
     return Item(code="actors", verdict="blocked", text=text, codes=("actors",), overridable=True)

@@ -19,7 +19,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.sent_graph import SentGraph
 from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
-from action_assistant.runner.start.preflight import EngineSight, Item, Preflight, Settled
+from action_assistant.runner.start.preflight import EngineView, Item, Preflight, Settled
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -143,20 +143,20 @@ class StartChecks:
                 where={"path": "/engine", "item": "quiet"},
             )
         try:
-            sight = await self._sight(robot)
+            view = await self._view(robot)
         except NoAnswer as nothing:
             silence = preflight.of_silence(asked.engine, str(nothing))
             raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
                 nothing
             )
-        items = await self._run_in_worker(preflight.of_text, sight, ready.umrf)
+        items = await self._run_in_worker(preflight.of_text, view, ready.umrf)
         preflight.check_items([preflight.of_taken(asked.engine, self._taken(asked.engine))], ())
         preflight.check_items(items, asked.override.codes if asked.override else ())
         return Cleared(
             ready=ready,
             link=robot,
             own=False,
-            incarnation=sight.answer.incarnation,
+            incarnation=view.answer.incarnation,
             despite=_despite(ready, items),
         )
 
@@ -219,14 +219,14 @@ class StartChecks:
 
     async def _look_at(self, robot: KnownEngine, ready: Prepared | None) -> list[Item]:
         try:
-            sight = await self._sight(robot)
+            view = await self._view(robot)
         except NoAnswer as nothing:
             return [preflight.of_silence(robot.registration.name, str(nothing))]
         if ready is None:
-            return [preflight.of_answer(sight)]
-        return list(await self._run_in_worker(preflight.of_text, sight, ready.umrf))
+            return [preflight.of_answer(view)]
+        return list(await self._run_in_worker(preflight.of_text, view, ready.umrf))
 
-    async def _sight(self, robot: KnownEngine) -> EngineSight:
+    async def _view(self, robot: KnownEngine) -> EngineView:
         """The engine as it answers a get sent now, on the path that would confirm a stop. Raises
         NoAnswer."""
         name, began = robot.registration.name, anyio.current_time()
@@ -238,7 +238,7 @@ class StartChecks:
         except TimeoutError as late:
             raise NoAnswer(f"Asked for {_PREFLIGHT_S:.0f} s. {robot.standing.why}") from late
         took = 1000 * (anyio.current_time() - began)
-        return EngineSight(
+        return EngineView(
             name=name,
             facts=robot.facts,
             standing=robot.standing,

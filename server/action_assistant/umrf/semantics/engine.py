@@ -17,7 +17,7 @@ from action_assistant.umrf.semantics.parts import Running
 from action_assistant.umrf.semantics.script import Script
 from action_assistant.umrf.semantics.trace import GraphStateEvent, Trace
 
-_Deed: TypeAlias = Callable[[Running], None]
+_Command: TypeAlias = Callable[[Running], None]
 
 _BUSY: Final = frozenset({"RUNNING", "PAUSED", "STOPPING", "CLEARING"})
 
@@ -160,9 +160,9 @@ class Engine(Graphs):
         taken, self._out = self._out, []
         return taken
 
-    def _on(self, graph_name: str, at_ms: float, deed: _Deed) -> list[Trace]:
+    def _on(self, graph_name: str, at_ms: float, command: _Command) -> list[Trace]:
         self._run_until(at_ms)
         graph = self.graphs.get(graph_name)
         if graph is not None and not self.crashed and not self.locked:
-            self._command(partial(deed, graph))
+            self._command(partial(command, graph))
         return self._taken()

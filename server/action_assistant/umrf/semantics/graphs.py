@@ -52,11 +52,11 @@ class Graphs(Core):
 
     # Commands, one after the other
 
-    def _command(self, deed: Task) -> None:
+    def _command(self, command: Task) -> None:
         if self._busy:
-            self._waiting.append(deed)
+            self._waiting.append(command)
         else:
-            deed()
+            command()
 
     def _free(self) -> None:
         """The command that held the engine is done; the next ones may go."""
@@ -165,9 +165,9 @@ class Graphs(Core):
     def _replace(self, old: Running, new: Running, matched: bool) -> None:
         """Starts a graph again although actions of the finished one still run."""
         self._graph_state(old, "CLEARING")
-        stragglers = [node for node in old.nodes.values() if node.holds_thread(self.now)]
+        left_over = [node for node in old.nodes.values() if node.holds_thread(self.now)]
         self._busy = True
-        for node in stragglers:
+        for node in left_over:
             if node.active and node.state != "STOPPING":
                 self._stop_node(old, node)
 
@@ -182,7 +182,7 @@ class Graphs(Core):
                 self._free()
 
         def going() -> bool:
-            return any(node.holds_thread(self.now) for node in stragglers)
+            return any(node.holds_thread(self.now) for node in left_over)
 
         self._wait(going, self.facts.stop_poll_ms, then)
 

@@ -26,7 +26,7 @@ from action_assistant.errors import (
 from action_assistant.web.auth.caller import Caller, asked_by
 from action_assistant.web.auth.keys import Keys, Person, Session
 from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards
-from action_assistant.web.auth.roles import OWNER, Deed, allowed, may
+from action_assistant.web.auth.roles import OWNER, Permission, allowed, may
 from action_assistant.web.http import cookies
 from action_assistant.web.http.problems import problem_of
 from action_assistant.web.network.addresses import Addresses
@@ -67,24 +67,24 @@ def session_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None
     return session
 
 
-def require(connection: ASGIConnection[Any, Any, Any, Any], deed: Deed) -> None:
+def require(connection: ASGIConnection[Any, Any, Any, Any], permission: Permission) -> None:
     """Refuse whoever's role does not allow this. Raises Forbidden."""
     role = person_of(connection).role
-    if not allowed(role, deed):
+    if not allowed(role, permission):
         raise Forbidden(f"You are here as {role}: you may {may(role)}.")
 
 
 class Needs:
     """For `guards=[…]` of a route: who may not is refused before the request is looked at."""
 
-    def __init__(self, deed: Deed) -> None:
-        self.deed: Final = deed
+    def __init__(self, permission: Permission) -> None:
+        self.permission: Final = permission
 
     async def __call__(
         self, connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler
     ) -> None:
         """Raises Forbidden. Plain functions would be called in a thread, for which Stop had to wait."""
-        require(connection, self.deed)
+        require(connection, self.permission)
 
 
 def known_person(connection: ASGIConnection[Any, Any, Any, Any]) -> Person | None:

@@ -7,7 +7,7 @@ from typing import Final, Literal, TypeAlias, get_args
 Role: TypeAlias = Literal["viewer", "editor", "operator", "owner"]
 
 #: Kinds of things to do. `see` and `stop` are everybody's who is signed in.
-Deed: TypeAlias = Literal[
+Permission: TypeAlias = Literal[
     "see",  # graphs, runs, robots, and who is there
     "stop",  # any run
     "edit",  # graphs: make, change, delete, go back to an earlier change, publish a version
@@ -21,7 +21,7 @@ Deed: TypeAlias = Literal[
 #: Whoever holds the token of the server is an owner.
 OWNER: Final[Role] = "owner"
 
-_FROM: Final[Mapping[Deed, Role]] = {
+_FROM: Final[Mapping[Permission, Role]] = {
     "see": "viewer",
     "stop": "viewer",
     "edit": "editor",
@@ -40,9 +40,9 @@ _MAY: Final[Mapping[Role, str]] = {
 }
 
 
-def allowed(role: Role, deed: Deed) -> bool:
+def allowed(role: Role, permission: Permission) -> bool:
     """Whether somebody of this role may do that."""
-    return rank(role) >= rank(_FROM[deed])
+    return rank(role) >= rank(_FROM[permission])
 
 
 def rank(role: Role) -> int:

@@ -18,7 +18,7 @@ from action_assistant.version import VERSION
 from action_assistant.web.auth.access import Access, Needs, require
 from action_assistant.web.auth.keys import Keys, ServerProof
 from action_assistant.web.auth.revocations import Revocations
-from action_assistant.web.auth.roles import Deed
+from action_assistant.web.auth.roles import Permission
 from action_assistant.web.http.page import Page
 from action_assistant.web.http.problems import problem_handlers
 from action_assistant.web.network.addresses import Addresses, host_name
@@ -124,13 +124,13 @@ def _answers_strangers(path: str) -> bool:
     return path in _OPEN
 
 
-def _decisions(inner: Litestar) -> dict[tuple[str, str], Deed]:
+def _decisions(inner: Litestar) -> dict[tuple[str, str], Permission]:
     """What one must be allowed to do to call a route, by path and method.
 
     Reading is everybody's who is signed in. Other routes have to say; those that do not are missing
     here, and are for owners only.
     """
-    found: dict[tuple[str, str], Deed] = {}
+    found: dict[tuple[str, str], Permission] = {}
     for route in inner.routes:
         if not isinstance(route, HTTPRoute) or _answers_strangers(route.path_format):
             continue
@@ -144,10 +144,10 @@ def _decisions(inner: Litestar) -> dict[tuple[str, str], Deed]:
     return found
 
 
-def _said(handler: BaseRouteHandler) -> Deed | None:
+def _said(handler: BaseRouteHandler) -> Permission | None:
     for guard in handler.guards or ():
         if isinstance(guard, Needs):
-            return guard.deed
+            return guard.permission
     return None
 
 

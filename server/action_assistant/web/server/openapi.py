@@ -23,7 +23,7 @@ from litestar.routes import HTTPRoute, WebSocketRoute
 from msgspec import inspect as kinds
 
 from action_assistant.version import VERSION
-from action_assistant.web.auth.roles import Deed
+from action_assistant.web.auth.roles import Permission
 from action_assistant.web.http.problems import PROBLEM_JSON, ProblemDetails
 
 #: The bytes of a file, as they are.
@@ -114,7 +114,7 @@ def openapi_config(title: str, text: OpenApiText) -> OpenAPIConfig:
 
 
 def document(
-    app: Litestar, needs: Mapping[tuple[str, str], Deed], is_open: Callable[[str], bool]
+    app: Litestar, needs: Mapping[tuple[str, str], Permission], is_open: Callable[[str], bool]
 ) -> dict[str, Any]:
     """The document of an application. `needs`: what one must be allowed to do, by path and method,
     which stands in `x-needs`; `is_open`: the paths that strangers may call, which have an empty
