@@ -78,7 +78,7 @@ export function RobotRuns({ robot, onImport }: Props) {
           <Link to={`/runs/${run.id}`} className={style.name}>
             Run {run.number} of {run.graph_name}
           </Link>
-          <span className={style.quiet}>started by {run.author?.name ?? "somebody"}</span>
+          <span className={style.quiet}>started by {run.author?.name || "somebody"}</span>
         </li>
       ))}
       {foreign.map(({ held }) => (

@@ -117,6 +117,10 @@ def test_of_a_stop_in_the_middle_only_what_went_on_is_told() -> None:
     assert found(LINE, told, stop, Ended(7, "stopped")) == [
         "A had not reported its end when Ben pressed Stop."
     ]
+    nameless = StopRequested(6, Author("owner", ""))  # people name themselves when they like to
+    assert found(LINE, told, nameless, Ended(7, "stopped")) == [
+        "A had not reported its end when somebody pressed Stop."
+    ]
 
 
 def test_a_join_is_said_to_wait_only_when_another_parent_has_reported() -> None:

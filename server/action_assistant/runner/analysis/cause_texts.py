@@ -84,7 +84,8 @@ def _command_in_words(cause: ForeignCause) -> str:
 
 
 def _stopper(run: Run) -> str:
-    return run.stopped_by.name if run.stopped_by is not None else "somebody"
+    by = run.stopped_by
+    return (by.name if by is not None else "") or "somebody"
 
 
 def called(run: Run, full_name: str) -> str:

@@ -125,7 +125,7 @@ def of_taken(engine: str, other: Run | None) -> Item:
         return Item(code="free", verdict="passed", text=f"{engine} has no other run from here.")
     text = (
         f"{engine} is taken by run {other.number} of {other.graph_name}, started by "
-        f"{other.author.name}; it is {other.state}."
+        f"{other.author.name or 'somebody'}; it is {other.state}."
     )
     if doubt := other.lost or other.unconfirmed:
         text += f" {doubt.rstrip('.')}. Somebody has to see it at rest and confirm that in the run."
