@@ -1,4 +1,4 @@
-"""A link to a robot through the air of virtual time, by the rules of the one over rclpy."""
+"""A link to a robot through the fake network of virtual time, by the rules of the one over rclpy."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -25,14 +25,14 @@ from runner.harness import clock_us
 
 
 class FakeLink:
-    """A link to one robot through the air, by the rules of the one over rclpy: an answer counts only
+    """A link to one robot through the fake network, by the rules of the one over rclpy: an answer counts only
     while the same one server stands on the path before and after."""
 
     simulated = False
     pauses = False
 
     def __init__(self, network: FakeNetwork, name: str, path: str = "/umrf_graph_get") -> None:
-        self._air = network
+        self._network = network
         self._name = name
         self._path = path
         self._known = ""
@@ -42,7 +42,7 @@ class FakeLink:
     @property
     def standing(self) -> Standing:
         """As discovery shows it now."""
-        servers = self._air.servers(self._path)
+        servers = self._network.servers(self._path)
         if len(servers) == 1:
             self._known = servers[0].gid
         return Standing(
@@ -52,33 +52,33 @@ class FakeLink:
             generation="older" if any(e.type_hash != HASH for e in servers) else "current",
             servers=len(servers),
             listeners=dict.fromkeys(("start", "stop"), len(servers)),
-            others=len(self._air.publishers("start")),
+            others=len(self._network.publishers("start")),
         )
 
     async def start(self, order: Order) -> None:
         """Publish one start."""
         if self.standing.generation == "older":
             raise NotSent("its messages are another generation")
-        if not self._air.servers(self._path):
+        if not self._network.servers(self._path):
             raise NotSent("nobody listens")
         message = Start(graph_name=order.graph.name, targets=(self._name,), graph_json=order.umrf)
-        await self._air.outlets.start.send(lambda: message)
+        await self._network.outlets.start.send(lambda: message)
 
     async def stop(self, graph_name: str) -> None:
         """Publish one stop, also when nobody seems to listen."""
-        await self._air.outlets.send_stop(graph_name, self._name)
-        if not self._air.servers(self._path):
+        await self._network.outlets.send_stop(graph_name, self._name)
+        if not self._network.servers(self._path):
             raise NotSent("nobody listens")
 
     async def pause(self, graph_name: str) -> None:
         """Publish one pause."""
         message = Pause(graph_name=graph_name, targets=(self._name,))
-        await self._air.outlets.pause.send(lambda: message)
+        await self._network.outlets.pause.send(lambda: message)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
         """Publish one resume."""
         message = Resume(graph_name=graph_name, targets=(self._name,))
-        await self._air.outlets.resume.send(lambda: message)
+        await self._network.outlets.resume.send(lambda: message)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
         """Publish one modify."""
@@ -88,15 +88,15 @@ class FakeLink:
             modified_graph=order.umrf,
             continue_from=continue_from,
         )
-        await self._air.outlets.modify.send(lambda: message)
+        await self._network.outlets.modify.send(lambda: message)
 
     async def get(self) -> Answer:
         """Ask the one server."""
-        before, asked_at = self._air.servers(self._path), clock_us()
+        before, asked_at = self._network.servers(self._path), clock_us()
         if len(before) != 1:
             raise NoAnswer(self.standing.why)
-        got = await self._air.ask(self._path)
-        if self._air.servers(self._path) != before:
+        got = await self._network.ask(self._path)
+        if self._network.servers(self._path) != before:
             raise NoAnswer("while it was asked, another engine came or went")
         return Answer(
             asked_at=asked_at,
@@ -110,7 +110,7 @@ class FakeLink:
 
     async def run(self) -> None:
         """Look every second who is there."""
-        with self._air.hearing(self._hear):
+        with self._network.hearing(self._hear):
             while True:
                 now = self.standing
                 if self._told != (now.state, now.incarnation):
@@ -137,7 +137,7 @@ class FakeLink:
                         sender=sound.sender,
                     )
                 )
-            case LogLine(text=text) if len(self._air.publishers("feedback")) <= 1:
+            case LogLine(text=text) if len(self._network.publishers("feedback")) <= 1:
                 self._subscribers.tell(EngineLog(at=clock_us(), text=text))
             case _:
                 pass

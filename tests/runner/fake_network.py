@@ -62,7 +62,7 @@ def run_of(robot: EmulatedEngine, graph: str) -> str:
 
 
 class Node:
-    """An engine node in the air: a stand-in and what discovery knows of it."""
+    """An engine node in the fake network: an emulator and what discovery knows of it."""
 
     def __init__(
         self, network: "FakeNetwork", robot: EmulatedEngine, path: str, lag_s: float
@@ -102,7 +102,7 @@ class Outlet:
     """One command topic of ours: messages leave one by one, `GAP_S` apart."""
 
     def __init__(self, network: "FakeNetwork") -> None:
-        self._air = network
+        self._network = network
         self._turn = anyio.Lock()
 
     async def send(self, make: Callable[[], Any]) -> None:
@@ -110,7 +110,7 @@ class Outlet:
         async with self._turn:
             message = make()
             if message is not None:
-                self._air.carry(wire(message))
+                self._network.carry(wire(message))
                 await anyio.sleep(GAP_S)
 
 

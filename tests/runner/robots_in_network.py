@@ -1,4 +1,4 @@
-"""Stand-in robots in the air of virtual time, each on a path of its own, and the real runner."""
+"""Emulated robots in the fake network of virtual time, each on a path of its own, and the real runner."""
 
 import random
 from collections.abc import AsyncIterator
@@ -31,7 +31,7 @@ LOOKED = RestRequest("I stand beside it; nothing moves.")
 
 
 class RobotsInNetwork:
-    """Robots in the air, each on a path of its own, and the runner."""
+    """Robots in the fake network, each on a path of its own, and the runner."""
 
     def __init__(
         self,

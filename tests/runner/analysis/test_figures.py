@@ -31,7 +31,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from runner.bounds import Lived, NetworkFaults, lived
 from runner.harness import at_once, clock_us, run_in_virtual_time
-from runner.runs.test_bounds import AIRS, CALL
+from runner.runs.test_bounds import CALL, NETWORKS
 
 SCRIPTS = st.dictionaries(
     st.sampled_from(["Work_0", "Work_1", "*"]), st.lists(CALL, min_size=1, max_size=1), max_size=3
@@ -92,7 +92,7 @@ def shown_spans(run: Run) -> Iterator[tuple[str, float, float]]:
 @given(
     graph=st.sampled_from(["line", "join", "ends"]),
     script=SCRIPTS,
-    network=AIRS,
+    network=NETWORKS,
     stop=st.none() | st.floats(0.1, 9.0),
 )
 @example(  # late feedback said that it was not over; an answer from before that seemed to agree

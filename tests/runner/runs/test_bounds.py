@@ -22,7 +22,7 @@ SCRIPTS = st.dictionaries(
     st.lists(CALL, min_size=1, max_size=3),
     max_size=4,
 )
-AIRS = st.builds(
+NETWORKS = st.builds(
     NetworkFaults,
     loss=st.sampled_from([0.0, 0.15, 0.5, 0.95]),
     get_loss=st.sampled_from([0.0, 0.0, 0.3]),
@@ -42,7 +42,7 @@ CALM = NetworkFaults()
 @given(
     graph=st.sampled_from(sorted(GRAPHS)),
     script=SCRIPTS,
-    network=AIRS,
+    network=NETWORKS,
     stop=st.none() | st.floats(0.1, 15.0),
 )
 @example(graph="line", script={"*": [{"after_s": 0.1}]}, network=CALM, stop=None)
