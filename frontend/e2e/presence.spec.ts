@@ -149,6 +149,35 @@ test("who has the caret in a field is seen there and at the card, and gone with 
   await expect(signs).toHaveCount(0);
 });
 
+test("each has a colour that nobody else has, everywhere the same, and leaves with the pointer", async () => {
+  await card(mari.page, "Wait", 2).click({ position: { x: 50, y: 12 } });
+  await mari.page.mouse.move(700, 420);
+  await third.page.mouse.move(640, 380);
+  const pointer = (name: string) =>
+    ada.page.locator("[style*='--c'] bdi", { hasText: name }).locator("xpath=..");
+  const faces = ada.page.getByRole("button", { name: /^Follow/ });
+  await expect(faces).toHaveCount(2);
+  const colors = await faces.evaluateAll((all) =>
+    all.map((one) => getComputedStyle(one).backgroundColor),
+  );
+  expect(new Set(colors).size).toBe(2);
+  for (const [name, color] of [
+    ["<img", colors[0]],
+    ["名前", colors[1]],
+  ] as const) {
+    await expect(pointer(name)).toHaveCSS("background-color", color ?? "");
+  }
+  await ada.page.getByText("Outline", { exact: true }).click();
+  await expect(ada.page.getByTitle("名前 さん has it selected")).toHaveCSS(
+    "background-color",
+    colors[1] ?? "",
+  );
+  await ada.page.screenshot({ path: test.info().outputPath("colours.png") });
+  await ada.page.getByText("Library", { exact: true }).click();
+  await mari.page.mouse.move(700, 4);
+  await expect(pointer("名前")).toHaveCount(0);
+});
+
 test("names of any script and hostile ones are shown as they are, and do nothing", async () => {
   await expect(ada.page.getByText(/Also here:.*名前 さん/)).toBeAttached();
   await expect(ada.page.getByText(/Also here:.*<img src=x onerror=alert\(1\)>/)).toBeAttached();

@@ -15,9 +15,10 @@ import { IconDeviceDesktop, IconLogout, IconMoon, IconShare, IconSun } from "@ta
 import { useState } from "react";
 import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
+import { useKnownColors } from "../api/people";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
 import { usePerson } from "../api/use-person";
-import { colorOfId, initials } from "../ui/name-colors";
+import { initials } from "../ui/name-colors";
 
 const schemes = [
   { value: "light", label: <IconSun size={15} aria-label="Light" /> },
@@ -47,6 +48,7 @@ function Appearance() {
 export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
   const { person, rename } = usePerson();
   const { runner } = useLive();
+  const colorOf = useKnownColors([person.id]);
   const [open, setOpen] = useState(false);
   const [name, setName] = useState(rememberedName() || person.name);
   const [problem, setProblem] = useState("");
@@ -74,8 +76,8 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
           aria-label={`You are ${person.name || "Guest"}. Name and appearance`}
           title={person.name || "Guest"}
         >
-          <Avatar size={28} radius="xl" variant="filled" color={colorOfId(person.id)}>
-            <Text span size="xs" fw={650} c="var(--on-accent)" aria-hidden>
+          <Avatar size={28} radius="xl" variant="filled" color={colorOf(person.id)}>
+            <Text span size="xs" fw={650} c="#fff" aria-hidden>
               {initials(person.name || "Guest")}
             </Text>
           </Avatar>

@@ -8,8 +8,9 @@ import { selectedActions, useEditorContext } from "../edit-actions/editor-contex
 import { beginThread, deleteMessage, reply, resolve, type Thread } from "../graph/edit/comments";
 import type { Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
+import { usePersonColors } from "../sync/use-room";
 import { Empty } from "../ui/empty";
-import { colorOfId, initials } from "../ui/name-colors";
+import { initials } from "../ui/name-colors";
 import { ago, useNow } from "../ui/times";
 import style from "./comments.module.css";
 
@@ -83,6 +84,7 @@ interface ThreadCardProps {
 function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
   const { doc, mayEdit } = useEditorContext();
   const { person } = usePerson();
+  const colorOf = usePersonColors(thread.messages.map(({ author }) => author.id));
   const now = useNow(30_000);
   const [answering, setAnswering] = useState(false);
   const me = () => ({ author: { id: person.id, name: person.name }, at: Date.now() });
@@ -97,7 +99,7 @@ function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
         <article className={style.message} key={message.id}>
           <span
             className={style.face}
-            style={{ background: colorOfId(message.author.id) }}
+            style={{ background: colorOf(message.author.id) }}
             aria-hidden
           >
             {initials(message.author.name || "Guest")}

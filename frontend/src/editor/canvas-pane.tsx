@@ -84,7 +84,6 @@ function Inside(props: Props) {
   const context = useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
   const arrived = useLinkPart(({ seq }) => seq > 0);
   const canvas = useCanvasElements({
-    me,
     graph: context.graph,
     selection: context.selection,
     select: context.select,
@@ -135,7 +134,7 @@ function Inside(props: Props) {
             <RobotFilter />
           </div>
         )}
-        <FollowFrame me={me} />
+        <FollowFrame />
         <div className={style.tools} data-hidden={(phone && context.dryRun !== null) || undefined}>
           <Toolbar compact={compact} />
         </div>

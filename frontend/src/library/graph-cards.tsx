@@ -6,11 +6,12 @@ import { useMemo, useState } from "react";
 import { Link } from "wouter";
 import type { GraphSummary } from "../api/graphs";
 import { newestRun, useLive } from "../api/live/use-live";
+import { useKnownColors } from "../api/people";
 import { type Run, useRuns } from "../api/runs";
 import { runEndText, runLabel } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import { colorOfId, colorOfName, initials } from "../ui/name-colors";
+import { colorOfName, initials } from "../ui/name-colors";
 import { ago, instant, useNow } from "../ui/times";
 import style from "./graph-cards.module.css";
 import { GraphMenu } from "./graph-menu";
@@ -45,13 +46,14 @@ function LastRun({ run, now }: { run: Run; now: number }) {
 }
 
 function People({ people }: { people: NonNullable<GraphSummary["people"]> }) {
+  const colorOf = useKnownColors(people.map(({ id }) => id));
   if (people.length === 0) return null;
   const names = people.map(({ name }) => name || "Guest").join(", ");
   return (
     <span className={style.people} title={`Now here: ${names}`}>
       <span className="visually-hidden">Now here: {names}</span>
       {people.slice(0, FEW).map(({ id, name }) => (
-        <i key={id} style={{ background: colorOfId(id) }} aria-hidden>
+        <i key={id} style={{ background: colorOf(id) }} aria-hidden>
           {initials(name || "Guest")}
         </i>
       ))}

@@ -9,6 +9,7 @@ import {
   IconPlayerPlay,
 } from "@tabler/icons-react";
 import { memo, useId, useState } from "react";
+import { checkedColor } from "../api/people";
 import { useOpenThreadCount } from "../canvas/card-highlights";
 import { noteColor } from "../canvas/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
@@ -17,7 +18,8 @@ import { cardLines, lineText } from "../graph/value-text";
 import { durationLabel } from "../status/durations";
 import type { Progress } from "../status/progress";
 import { StateLabel } from "../status/state-label";
-import { colorOfName } from "../ui/name-colors";
+import type { PersonHere } from "../sync/use-room";
+import { colorOfName, initials } from "../ui/name-colors";
 import style from "./outline.module.css";
 import { type RowAction, rowActionsOf } from "./row-actions";
 import { RowEdit, type RowEditKind } from "./row-edit";
@@ -31,6 +33,8 @@ interface Props {
   change: RowEditKind | null;
   /** What the action is called, or that to which the arrow leads. */
   name: string;
+  /** Who else has it selected. */
+  others: readonly PersonHere[] | undefined;
   mayEdit: boolean;
   /** Always the same object, so that a row draws again only when something of it changes. */
   handlers: RowHandlers;
@@ -54,6 +58,20 @@ function Talk({ of }: { of: string }) {
       <span className="visually-hidden"> open comments</span>
     </span>
   );
+}
+
+function Others({ people }: { people: readonly PersonHere[] }) {
+  return people.map(({ id, name, color }) => (
+    <span
+      key={id}
+      className={style.person}
+      style={{ background: checkedColor(color) }}
+      title={`${name || "Guest"} has it selected`}
+    >
+      <span aria-hidden>{initials(name || "Guest")}</span>
+      <span className="visually-hidden"> {name || "Guest"} has it selected</span>
+    </span>
+  ));
 }
 
 function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">) {
@@ -180,7 +198,7 @@ function labelOf(row: OutlineItem, name: string): string {
 }
 
 export const OutlineRow = memo(function OutlineRow(props: Props) {
-  const { row, active, selected, progress, change, name, mayEdit, handlers } = props;
+  const { row, active, selected, progress, change, name, others, mayEdit, handlers } = props;
   const label = labelOf(row, name);
   const words = useId();
   return (
@@ -218,6 +236,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
         <button type="button" id={words} tabIndex={-1} onClick={() => handlers.choose(row)}>
           <Words row={row} progress={progress} name={name} />
         </button>
+        {others && row.kind !== "outcome" && <Others people={others} />}
       </td>
       <td className={style.buttons}>
         <RowActions row={row} active={active} label={label} mayEdit={mayEdit} handlers={handlers} />

@@ -11,6 +11,7 @@ import { useHighlightedRobot } from "../canvas/card-highlights";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { ENTRY, type Key } from "../graph/model";
 import type { Progress } from "../status/progress";
+import { useSelectedByOthers } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
 import { Empty } from "../ui/empty";
 import { useIsPhone } from "../ui/use-screen-size";
@@ -71,6 +72,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   const { graph, selection, select, setPanel, mayEdit } = context;
   const phone = useIsPhone();
   const robot = useHighlightedRobot();
+  const others = useSelectedByOthers();
   const { isOpen, flip } = useOpen(graph.actions.length);
   const rows = useMemo(() => {
     const all = rowsOf(graph, isOpen);
@@ -212,6 +214,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
                 progress={row.kind === "action" ? (progress.get(row.action.key) ?? null) : null}
                 change={edited?.id === row.id ? edited.change : null}
                 name={names.get(nameKey(row)) ?? ""}
+                others={others.get(subjectOf(row))}
                 mayEdit={mayEdit}
                 handlers={handlers}
               />

@@ -1,12 +1,13 @@
-/** Who else is here: faces in the bar, pointers on the canvas, and who is at which card. */
+/** Who else is here: faces in the bar, whom one follows, and who is at which card. */
 import { Tooltip } from "@mantine/core";
 import { ViewportPortal } from "@xyflow/react";
 import type { CSSProperties } from "react";
+import { checkedColor } from "../api/people";
 import { CARD, type Positions, type Sizes } from "../canvas/geometry/arrange";
 import { splitKey } from "../graph/document-keys";
 import type { Participant } from "../sync/presence/presence";
 import { useFollowing, usePeople } from "../sync/use-room";
-import { distinctColors, initials } from "../ui/name-colors";
+import { initials } from "../ui/name-colors";
 import style from "./people.module.css";
 
 const MOST = 4;
@@ -16,7 +17,7 @@ function personName(person: { readonly name: string }): string {
 }
 
 /** A name as it is written, whatever its direction does to what stands beside it. */
-function Name({ of }: { of: { readonly name: string } }) {
+export function Name({ of }: { of: { readonly name: string } }) {
   return <bdi className={style.name}>{personName(of)}</bdi>;
 }
 
@@ -25,7 +26,7 @@ export function onePerId<T extends { readonly id: string }>(people: readonly T[]
   return [...new Map(people.map((person) => [person.id, person])).values()];
 }
 
-const colored = (color: string | undefined) => ({ "--c": color }) as CSSProperties;
+export const colored = (color: string | undefined) => ({ "--c": color }) as CSSProperties;
 
 export function People({ me }: { me: string }) {
   const { whom, follow } = useFollowing();
@@ -34,7 +35,6 @@ export function People({ me }: { me: string }) {
   const others = onePerId(leader ? [...people, leader] : people);
   if (others.length === 0) return null;
   const shown = others.slice(0, MOST);
-  const colors = distinctColors([me, ...others.map((person) => person.id)]);
   const names = others.map(personName).join(", ");
   return (
     <div className={style.people}>
@@ -53,7 +53,7 @@ export function People({ me }: { me: string }) {
             <button
               type="button"
               className={style.face}
-              style={colored(colors.get(person.id))}
+              style={colored(checkedColor(person.color))}
               aria-pressed={followed}
               aria-label={`Follow ${personName(person)}`}
               onClick={() => follow(followed ? null : person.client)}
@@ -73,14 +73,13 @@ export function People({ me }: { me: string }) {
 }
 
 /** Around the canvas while it shows what somebody else sees. */
-export function FollowFrame({ me }: { me: string }) {
+export function FollowFrame() {
   const { whom, follow } = useFollowing();
   const people = usePeople();
   const leader = people.find(({ client }) => client === whom);
   if (leader === undefined) return null;
-  const color = distinctColors([me, ...people.map((person) => person.id)]).get(leader.id);
   return (
-    <div className={style.frame} style={colored(color)}>
+    <div className={style.frame} style={colored(checkedColor(leader.color))}>
       <span className={style.followed} role="status">
         Following <Name of={leader} />
         <button type="button" onClick={() => follow(null)}>
@@ -88,41 +87,6 @@ export function FollowFrame({ me }: { me: string }) {
         </button>
       </span>
     </div>
-  );
-}
-
-export function Cursors({ me }: { me: string }) {
-  const people = usePeople();
-  const colors = distinctColors([me, ...people.map((person) => person.id)]);
-  return (
-    <ViewportPortal>
-      {people.map((person) => {
-        const at = person.presence.cursor;
-        if (!at) return null;
-        return (
-          <div
-            key={person.client}
-            className={style.cursor}
-            style={{
-              transform: `translate(${at[0]}px, ${at[1]}px)`,
-              ...colored(colors.get(person.id)),
-            }}
-            aria-hidden
-          >
-            <svg width="14" height="18" viewBox="0 0 14 18" aria-hidden="true">
-              <path
-                d="M1 1v13.5l3.8-3.4 2.5 5.6 2.4-1.1-2.5-5.4h5.1z"
-                fill="var(--c)"
-                stroke="#fff"
-              />
-            </svg>
-            <span>
-              <Name of={person} />
-            </span>
-          </div>
-        );
-      })}
-    </ViewportPortal>
   );
 }
 
@@ -141,7 +105,6 @@ export function PeopleAtCards({ me, places, sizes }: AtCardsProps) {
     if (person.id !== me && places.has(head)) at.set(head, [...(at.get(head) ?? []), person]);
   }
   if (at.size === 0) return null;
-  const colors = distinctColors([me, ...people.map((person) => person.id)]);
   return (
     <ViewportPortal>
       {[...at].map(([key, editors]) => {
@@ -154,7 +117,7 @@ export function PeopleAtCards({ me, places, sizes }: AtCardsProps) {
             style={{ transform: `translate(${right}px, ${y}px) translate(-100%, -50%)` }}
           >
             {onePerId(editors).map((person) => (
-              <PersonSign key={person.id} person={person} color={colors.get(person.id)} />
+              <PersonSign key={person.id} person={person} color={checkedColor(person.color)} />
             ))}
           </div>
         );

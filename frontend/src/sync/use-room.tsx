@@ -11,6 +11,7 @@ import {
   useState,
   useSyncExternalStore,
 } from "react";
+import { type Colored, colorsOf, useKnownPeople } from "../api/people";
 import { isEqual } from "../graph/equal";
 import { EMPTY_GRAPH, type Graph } from "../graph/model";
 import {
@@ -170,6 +171,53 @@ export function useLinkPart<T>(part: (link: RoomLink) => T): T {
 export function usePeople(): readonly Participant[] {
   const { presence } = useRoom();
   return useSyncExternalStore(presence.onPeople, presence.people);
+}
+
+/**
+ * What colour each person is shown in: nobody else's who is here. Another function only when somebody
+ * came or went, however much their cursors move. `ids`: people who may be long gone.
+ */
+export function usePersonColors(ids: readonly string[] = NO_IDS): (id: string) => string {
+  const { presence } = useRoom();
+  const last = useRef<readonly Colored[]>([]);
+  const here = useSyncExternalStore(presence.onPeople, () => {
+    const now = presence.people().map(({ id, color }) => ({ id, color }));
+    if (!isEqual(now, last.current)) last.current = now;
+    return last.current;
+  });
+  const known = useKnownPeople(ids);
+  return useMemo(() => colorsOf(here, known), [here, known]);
+}
+
+const NO_IDS: readonly string[] = [];
+
+/** Somebody else, as far as lists show them. */
+export type PersonHere = Pick<Participant, "id" | "name" | "color">;
+
+type Chosen = readonly (readonly [key: string, person: PersonHere])[];
+
+/** Who has what selected, by key; another map only when somebody selects something else. */
+export function useSelectedByOthers(): ReadonlyMap<string, readonly PersonHere[]> {
+  const { presence } = useRoom();
+  const last = useRef<Chosen>([]);
+  const chosen = useSyncExternalStore(presence.onPeople, () => {
+    const now = presence
+      .people()
+      .flatMap(({ id, name, color, presence: { selection } }) =>
+        selection.map((key) => [key, { id, name, color }] as const),
+      );
+    if (!isEqual(now, last.current)) last.current = now;
+    return last.current;
+  });
+  return useMemo(() => {
+    const found = new Map<string, PersonHere[]>();
+    for (const [key, person] of chosen) {
+      const known = found.get(key);
+      if (known === undefined) found.set(key, [person]);
+      else if (known.every(({ id }) => id !== person.id)) known.push(person);
+    }
+    return found;
+  }, [chosen]);
 }
 
 /** Somebody at a field: who they are, and nothing that changes while they are there. */

@@ -1,4 +1,4 @@
-/** Colours and initials for names: stable, the same for everybody. */
+/** Colours of robots by name, the same for everybody, and initials of people. */
 const COLOURS = 6;
 
 function hash(text: string): number {
@@ -9,23 +9,6 @@ function hash(text: string): number {
 
 export function colorOfName(name: string): string {
   return name === "" ? "var(--ink4)" : `var(--robot-${hash(name) % COLOURS})`;
-}
-
-export function colorOfId(id: string): string {
-  return `var(--robot-${hash(id) % COLOURS})`;
-}
-
-/** A colour for each of the people in one place, each their own as long as colours last. */
-export function distinctColors(ids: readonly string[]): Map<string, string> {
-  const colors = new Map<string, string>();
-  const taken = new Set<number>();
-  for (const id of [...new Set(ids)].sort()) {
-    let at = hash(id) % COLOURS;
-    for (let i = 0; i < COLOURS && taken.has(at); i += 1) at = (at + 1) % COLOURS;
-    taken.add(at);
-    colors.set(id, `var(--robot-${at})`);
-  }
-  return colors;
 }
 
 const letters = new Intl.Segmenter(undefined, { granularity: "grapheme" });

@@ -7,6 +7,7 @@ from action_assistant.editor.catalogue.invitations import Invitations
 from action_assistant.editor.catalogue.library import Library
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.catalogue.versions import Versions
+from action_assistant.editor.rooms.colours import PersonColours
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.rate_limits import ByteRateLimits
 from action_assistant.editor.workers import EditorWorkers
@@ -34,6 +35,7 @@ class EditorServices:
         self.epoch = epoch
         self.people = people
         self.workers = workers
+        self.colours = PersonColours()
         self.rooms = Rooms(journal, run_in_worker=workers.graphs, tried=workers.edits)
         self.connection_limits = ConnectionLimits(limits=settings.limits)
         self.rate_limits = ByteRateLimits(limits=settings.limits)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.messages import PresenceEntry
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.presence import STATE_LIMIT, RoomPresence, Seat, colour_of
+from action_assistant.editor.rooms.presence import STATE_LIMIT, RoomPresence, Seat
 from action_assistant.web.auth.keys import Person
 from editor.client import Client, settle
 
@@ -27,9 +27,9 @@ def seat(name: str) -> Seat:
 
 
 def test_the_server_says_who_it_is() -> None:
-    room, ada = RoomPresence(), seat("ada")
+    room, ada = RoomPresence(), Seat(Person("ada", "Ada"), "#d110bc")
     told = room.hear(ada, (entry(7, cursor=[1, 2], user={"id": "bob", "name": "Bob"}),))
-    user = {"id": "ada", "name": "Ada", "color": colour_of("ada")}
+    user = {"id": "ada", "name": "Ada", "color": "#d110bc"}
     assert said(told) == {7: {"cursor": [1, 2], "user": user}}
 
 

@@ -429,7 +429,7 @@ export interface EditorApi {
     };
     /**
      * Participant
-     * @description Somebody who acted here.
+     * @description Somebody who acted here. `color`: nobody else has it who is here; grey is nobody's.
      */
     Participant: {
         id: string;

@@ -26,7 +26,8 @@ import { asOneEdit, insertInto, removeNotes } from "../../graph/edit";
 import { changeNote } from "../../graph/edit/notes";
 import type { Position } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
-import { Cursors, PeopleAtCards } from "../../people/people";
+import { Cursors } from "../../people/cursors";
+import { PeopleAtCards } from "../../people/people";
 import { useRoom } from "../../sync/use-room";
 import { colorOfName } from "../../ui/name-colors";
 import { useStableCallback } from "../../ui/use-stable-callback";
@@ -242,7 +243,7 @@ function Drawing({
     >
       <ArrowTips />
       <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
-      <Cursors me={me} />
+      <Cursors />
       <PeopleAtCards me={me} places={canvas.places} sizes={canvas.sizes} />
       {map && (
         <MiniMap<CanvasNode>

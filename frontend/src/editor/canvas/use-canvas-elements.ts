@@ -16,6 +16,7 @@ import {
   useRef,
   useState,
 } from "react";
+import { checkedColor } from "../../api/people";
 import {
   type Arrow,
   type CanvasNode,
@@ -34,7 +35,6 @@ import type { Graph, Key, Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 import type { Participant } from "../../sync/presence/presence";
 import { usePeople, useRoom } from "../../sync/use-room";
-import { distinctColors } from "../../ui/name-colors";
 import { arrowAt, pointOf } from "./hit-test";
 
 export interface MeasuredSize {
@@ -50,7 +50,6 @@ interface Drawn {
 }
 
 interface CanvasElementsInput {
-  me: string;
   graph: Graph;
   selection: ReadonlySet<string>;
   select: (ids: Iterable<string>) => void;
@@ -98,18 +97,16 @@ export function selectionAfter(
 }
 
 /** What others have chosen, in their colours. */
-function useChosenByOthers(
-  me: string,
-  people: readonly Participant[],
-): ReadonlyMap<string, string> {
-  return useMemo(() => {
-    const colors = distinctColors([me, ...people.map((person) => person.id)]);
-    return new Map(
-      people.flatMap((person) =>
-        person.presence.selection.map((key) => [key, colors.get(person.id) ?? ""] as const),
+function useChosenByOthers(people: readonly Participant[]): ReadonlyMap<string, string> {
+  return useMemo(
+    () =>
+      new Map(
+        people.flatMap(({ color, presence }) =>
+          presence.selection.map((key) => [key, checkedColor(color)] as const),
+        ),
       ),
-    );
-  }, [me, people]);
+    [people],
+  );
 }
 
 /** Cards and arrows; what is drawn as before keeps its identity. */
@@ -265,7 +262,7 @@ function useDragging(
 }
 
 export function useCanvasElements(given: CanvasElementsInput) {
-  const { me, graph, selection, select, progress, marks } = given;
+  const { graph, selection, select, progress, marks } = given;
   const people = usePeople();
   const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
   const [sizes, setSizes] = useState<ReadonlyMap<Key, MeasuredSize>>(new Map());
@@ -277,7 +274,7 @@ export function useCanvasElements(given: CanvasElementsInput) {
     [graph, sizes],
   );
   const places = useMemo(() => dragged(rest, people, drag), [rest, people, drag]);
-  const others = useChosenByOthers(me, people);
+  const others = useChosenByOthers(people);
   // The arrow that would take in what is dragged looks as if it were chosen.
   const selected = useMemo(
     () => (over === null ? selection : new Set([...selection, over])),

@@ -2,8 +2,7 @@
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { type FocusEvent, type ReactNode, use, useEffect, useRef } from "react";
 import { onePerId, PersonSign } from "../../people/people";
-import { useEditors, usePeople, useRoom } from "../../sync/use-room";
-import { distinctColors } from "../../ui/name-colors";
+import { useEditors, usePersonColors, useRoom } from "../../sync/use-room";
 import { ProblemsContext, problemsAt } from "./field-problems";
 import style from "./shared-field.module.css";
 
@@ -64,11 +63,11 @@ function Writers({ id }: { id: string }) {
 }
 
 function Signs({ writers }: { writers: ReturnType<typeof useEditors> }) {
-  const colors = distinctColors(usePeople().map((person) => person.id));
+  const colorOf = usePersonColors();
   return (
     <span className={style.signs}>
       {writers.map((writer) => (
-        <PersonSign key={writer.client} person={writer} color={colors.get(writer.id)} />
+        <PersonSign key={writer.client} person={writer} color={colorOf(writer.id)} />
       ))}
     </span>
   );

@@ -14,13 +14,13 @@ from litestar.types import ControllerRouterHandler
 from action_assistant import paths
 from action_assistant.editor.interchange.action_uses import LibraryAction
 from action_assistant.editor.log import graph_events as h
-from action_assistant.editor.rooms.presence import colour_of
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.version import VERSION
+from action_assistant.web.auth.access import person_of
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.network.addresses import Addresses
 from action_assistant.web.server.openapi import answer
@@ -56,7 +56,7 @@ class Example(msgspec.Struct, frozen=True):
 
 
 class Participant(msgspec.Struct, frozen=True):
-    """Somebody who acted here."""
+    """Somebody who acted here. `color`: nobody else has it who is here; grey is nobody's."""
 
     id: str
     name: str
@@ -74,9 +74,11 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         return Config("local", VERSION, runner)
 
     @get("/api/people", summary="Everyone who acted here", operation_id="listPeople")
-    async def list_people() -> list[Participant]:
-        everyone = app_state.services.people.everyone()
-        return [Participant(p.id, p.name, colour_of(p.id)) for p in everyone]
+    async def list_people(request: Request[Any, Any, Any]) -> list[Participant]:
+        services = app_state.services
+        services.colours.given(person_of(request).id)
+        everyone = services.people.everyone()
+        return [Participant(p.id, p.name, services.colours.of(p.id)) for p in everyone]
 
     @get(
         "/api/examples",

@@ -43,9 +43,11 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
                         await _part(socket, services.epoch)
                         return
                     edits = allowed(person.role, "edit")
-                    member = Member(person, edits=edits, acks=_wants_acks(socket))
-                    member.post_epoch(services.epoch)
-                    await _converse(socket, found, member, services.rate_limits)
+                    acks = _wants_acks(socket)
+                    with services.colours.held(person.id) as colour:
+                        member = Member(person, edits=edits, acks=acks, colour=colour)
+                        member.post_epoch(services.epoch)
+                        await _converse(socket, found, member, services.rate_limits)
         except Refused as refused:
             await _refuse(socket, refused)
 

@@ -5,6 +5,7 @@ from enum import Enum
 from typing import Final
 
 from action_assistant.editor.crdt import messages
+from action_assistant.editor.rooms.colours import NOBODYS
 from action_assistant.editor.rooms.presence import PresenceNews, Seat
 from action_assistant.web.auth.keys import PersonRef
 
@@ -27,9 +28,16 @@ class _Answer(Enum):
 class Member:
     """Someone's socket. The room posts; whoever owns the socket takes and sends."""
 
-    def __init__(self, person: PersonRef, *, edits: bool = True, acks: bool = False) -> None:
+    def __init__(
+        self,
+        person: PersonRef,
+        *,
+        edits: bool = True,
+        acks: bool = False,
+        colour: str = NOBODYS,
+    ) -> None:
         self.person: Final = person
-        self.seat: Final = Seat(person)
+        self.seat: Final = Seat(person, colour)
         self.edits = edits
         self.acks: Final = acks
         self.synced = False  # has been sent the document

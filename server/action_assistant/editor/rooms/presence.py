@@ -1,6 +1,5 @@
 """Who is in a room, as the server vouches for it (rule R6)."""
 
-import hashlib
 from collections.abc import Iterable
 from functools import cached_property
 from typing import Final
@@ -9,15 +8,11 @@ import msgspec
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.messages import PresenceEntry
+from action_assistant.editor.rooms.colours import NOBODYS
 from action_assistant.web.auth.keys import PersonRef
 
 STATE_LIMIT: Final = 32_768  # bytes of one client's entry
 _GONE: Final = b"null"
-#: Readable on light and on dark, and apart from each other for colour-blind eyes.
-_COLOURS: Final = (
-    "#2563eb", "#d97706", "#059669", "#db2777", "#7c3aed", "#0891b2",
-    "#dc2626", "#65a30d", "#9333ea", "#0d9488", "#c2410c", "#4f46e5",
-)  # fmt: skip
 _decode: Final = msgspec.json.Decoder(dict[str, msgspec.Raw])
 
 
@@ -29,23 +24,18 @@ class PersonStamp(msgspec.Struct, frozen=True):
     color: str
 
 
-def colour_of(person_id: str) -> str:
-    """The same person has the same colour everywhere."""
-    return _COLOURS[hashlib.sha256(person_id.encode()).digest()[0] % len(_COLOURS)]
-
-
-def stamp_of(person: PersonRef) -> bytes:
+def stamp_of(person: PersonRef, colour: str) -> bytes:
     """The stamp as JSON."""
-    return msgspec.json.encode(PersonStamp(person.id, person.name, colour_of(person.id)))
+    return msgspec.json.encode(PersonStamp(person.id, person.name, colour))
 
 
 class Seat:
     """The one client id that a socket speaks for."""
 
-    def __init__(self, person: PersonRef) -> None:
+    def __init__(self, person: PersonRef, colour: str = NOBODYS) -> None:
         self.person: Final = person
         self.client: int | None = None
-        self._stamp: Final = msgspec.Raw(stamp_of(person))
+        self._stamp: Final = msgspec.Raw(stamp_of(person, colour))
 
     def stamped(self, entry: PresenceEntry) -> PresenceEntry | None:
         """The entry under the person's own name; None when it is none that can be shown."""

@@ -1,0 +1,59 @@
+/** In which colour people are shown: the server gives each one that nobody else has who is here. */
+import { useQuery } from "@tanstack/react-query";
+import { useCallback, useEffect } from "react";
+import { fetchJson } from "./http";
+import type { EditorApi } from "./schema/editor";
+
+type KnownPerson = EditorApi["Participant"];
+
+/** Of who has not been here for long: no colour that somebody could have. */
+export const NOBODYS_COLOR = "#757575";
+
+/** `color` where it is one, since it comes over the wire and goes into styles. */
+export function checkedColor(color: string): string {
+  return /^#[0-9a-f]{6}$/i.test(color) ? color : NOBODYS_COLOR;
+}
+
+export interface Colored {
+  readonly id: string;
+  readonly color: string;
+}
+
+/**
+ * What colour a person has, by id. Those who are here come first: what the server said of others a
+ * while ago may meanwhile be the colour of somebody who came.
+ */
+export function colorsOf(
+  here: readonly Colored[],
+  known: readonly Colored[],
+): (id: string) => string {
+  const colors = new Map(here.map(({ id, color }) => [id, checkedColor(color)]));
+  const taken = new Set(colors.values());
+  for (const { id, color } of known) {
+    if (!colors.has(id) && !taken.has(color)) colors.set(id, checkedColor(color));
+  }
+  return (id) => colors.get(id) ?? NOBODYS_COLOR;
+}
+
+const NOBODY: readonly KnownPerson[] = [];
+
+/** Everyone who acted here, read again when one of `ids` is not among them. */
+export function useKnownPeople(ids: readonly string[]): readonly KnownPerson[] {
+  const { data = NOBODY, refetch } = useQuery({
+    queryKey: ["people"],
+    queryFn: ({ signal }) => fetchJson<KnownPerson[]>("/api/people", { signal }),
+    staleTime: 60_000,
+  });
+  const unknown = ids.filter((id) => !data.some((person) => person.id === id)).join(" ");
+  const loaded = data !== NOBODY;
+  useEffect(() => {
+    if (loaded && unknown !== "") void refetch();
+  }, [loaded, unknown, refetch]);
+  return data;
+}
+
+/** The colour of each person, where no room tells who is here. */
+export function useKnownColors(ids: readonly string[]): (id: string) => string {
+  const known = useKnownPeople(ids);
+  return useCallback((id: string) => colorsOf([], known)(id), [known]);
+}
