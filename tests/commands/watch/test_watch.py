@@ -116,6 +116,7 @@ def edit(product: Product, graph: str, change: Callable[[Any], None]) -> None:
                     before = editor.get(f"/api/graphs/{graph}").json()["seq"]
                     with doc.transaction():
                         change(doc.get("actions", type=Map))
+                    # No event of this process: the server answers when it has committed.
                     while editor.get(f"/api/graphs/{graph}").json()["seq"] == before:  # noqa: ASYNC110
                         await anyio.sleep(0.05)
 
@@ -217,8 +218,8 @@ async def test_nothing_that_could_change_a_graph_is_ever_sent() -> None:
         async def send_bytes(self, message: bytes) -> None:
             sent.append(message)
 
-    ends, _ = anyio.create_memory_object_stream[Exception](1)
-    with ends, _:
+    ends, ended = anyio.create_memory_object_stream[Exception](1)
+    with ends, ended:
         quiet = QuietSocket(Socket(), WatchedGraph(None), ends)  # type: ignore[arg-type]
         for message in (messages.change(b"x"), messages.answer(b"x"), messages.question(b"\0")):
             await quiet.send(message)

@@ -157,7 +157,7 @@ def test_what_a_peer_does_not_finish_or_spells_wrongly_is_no_failure_of_ours(
         url = f"http://127.0.0.1:{port}/api/graphs"
         made = httpx.post(url, json={"name": "g"}, headers=BEARER, trust_env=False).json()
         (one,) = strangers(stack, port, 1, CUT_OFF % port)
-        time.sleep(0.3)
+        time.sleep(0.3)  # nothing answers half a request, so nothing tells when it was read
         one.close()
         upgrade = UPGRADE % (made["id"].encode(), TOKEN.encode())
         (two,) = strangers(stack, port, 1, upgrade)
@@ -198,7 +198,7 @@ def test_a_body_that_nobody_asked_for_and_that_does_not_end_is_one_line(
         before = (tmp_path / "log").read_text().splitlines()
         for _ in range(3):
             (one,) = strangers(stack, port, 1, UNFINISHED % (asked, TOKEN.encode(), accept))
-            time.sleep(0.3)
+            time.sleep(0.3)  # a traceback would come when the request ends, which nothing tells
             one.close()
         time.sleep(0.3)
         httpx.get(f"{url}/healthz", trust_env=False)
@@ -219,7 +219,7 @@ def slow(stack: ExitStack, port: int, source: str, asker: str) -> socket.socket:
         socket.create_connection(("127.0.0.1", port), timeout=5, source_address=(source, 0))
     )
     one.send(SLOW % (port, asker.encode()))
-    time.sleep(0.005)
+    time.sleep(0.005)  # in the order in which they came, as the test counts them
     return one
 
 

@@ -247,9 +247,9 @@ async def _visit(options: argparse.Namespace, graph: str, watched: WatchedGraph)
     # Anew each time: while the server was away, anybody may have taken its place, and has to prove
     # itself before it is sent the token.
     found = reach(options)
-    found[
-        "auth"
-    ].requires_response_body = False  # an upgrade has none that ends; others are read here
+    # The answer to an upgrade has no body that ends; bodies of other answers are read by `_read`.
+    auth = found["auth"]
+    auth.requires_response_body = False
     hooks = {"response": [_read]}
     send, receive = anyio.create_memory_object_stream[Exception](1)
     path = f"/api/graphs/{graph}/room"
