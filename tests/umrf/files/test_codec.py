@@ -317,8 +317,8 @@ def test_bytes_that_are_no_utf_8_are_refused() -> None:
         "[" * 900_000,
         '"\\"' * 3_000_000,
         "{" + '"a":1,' * 100_000,
-        '{"graph_name":"g","actions":[' + ",".join(['{"name":"A"}'] * 100_000) + "]}",
-        '{"graph_name":"g","graph_entry":[' + ",".join(['{"name":"A"}'] * 100_000) + "]}",
+        '{"graph_name":"g","actions":[' + ",".join(['{"name":"A"}'] * 40_000) + "]}",
+        '{"graph_name":"g","graph_entry":[' + ",".join(['{"name":"A"}'] * 40_000) + "]}",
     ],
     ids=lambda text: text[:20],
 )
@@ -326,7 +326,7 @@ def test_hostile_texts_cost_no_more_than_their_size(text: str) -> None:
     started = time.process_time()
     with suppress(Unreadable):
         read(text)
-    assert time.process_time() - started < 10
+    assert time.process_time() - started < 4
 
 
 @given(st.recursive(
