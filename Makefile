@@ -22,6 +22,8 @@ ROS := .venv-ros/bin
 # Tests see nothing of a sourced ROS 2 either; `make run` does.
 BARE := env -u AMENT_PREFIX_PATH -u COLCON_PREFIX_PATH -u LD_LIBRARY_PATH
 NODE := scripts/with-node
+# Tests take the one without windows where it is there: it is quicker, and not in every distribution.
+BROWSER = command -v chromium-headless-shell >/dev/null || scripts/need chromium=chromium
 NPM := $(NODE) npm --prefix frontend
 LOCK = $(BIN)/uv pip compile --quiet --generate-hashes --universal --python-version 3.11 --no-header \
 	--no-annotate --upgrade
@@ -98,7 +100,7 @@ contract: ros ## what a link promises, with a real engine: NAME=David [DOMAIN=0]
 
 .PHONY: e2e
 e2e: setup ros ## tests in Chromium against the real processes
-	@scripts/need chromium=chromium
+	@$(BROWSER)
 	@echo "» Playwright"
 	@$(BARE) $(NPM) run --silent e2e
 
@@ -126,7 +128,7 @@ workspace: setup ## a sourced ROS 2 as Ubuntu 24.04 lays it out, in a root of it
 
 .PHONY: pictures
 pictures: setup ## take the pictures of the documentation from the running product
-	@scripts/need chromium=chromium
+	@$(BROWSER)
 	@PICTURES=1 $(NPM) run --silent e2e -- e2e/pictures.spec.ts
 
 .PHONY: bench
