@@ -50,6 +50,8 @@ class Watching:
             env=product.environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
+            # Who runs these tests in the background of a shell hands on that Ctrl-C is ignored.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
         assert self.process.stdout
         assert self.process.stderr
