@@ -24,7 +24,7 @@ import {
   placeLabels,
   sizeOf,
 } from "./geometry/label-places";
-import { type NoteNode, noteNodes } from "./note-nodes";
+import { type NoteNode, noteNodes } from "./notes/note-nodes";
 import { OUTCOMES, outcomeWord } from "./outcome";
 import { type ProblemMark, type ProblemMarks, problemMarkWords } from "./problem-marks";
 

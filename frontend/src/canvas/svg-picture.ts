@@ -14,7 +14,7 @@ import {
 } from "./elements";
 import { CARD, PILL, type Sizes } from "./geometry/arrange";
 import { arrowPathOf } from "./geometry/arrow-path";
-import { noteColor } from "./note-colors";
+import { noteColor } from "./notes/note-colors";
 import { OUTCOMES, outcomeColor, outcomeWord } from "./outcome";
 import { NO_PROBLEM_MARKS } from "./problem-marks";
 

@@ -6,12 +6,7 @@ import { type Problems, useProblems } from "../api/graphs";
 import { problemMarksOf } from "../canvas/problem-marks";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
-import {
-  addActionAt,
-  type EditorContext,
-  EditorReactContext,
-  freePosition,
-} from "../edit-actions/editor-context";
+import { addActionAt, type EditorContext, freePosition } from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/shortcuts";
 import { FindBar } from "../find/find-bar";
 import type { NewAction } from "../graph/edit";
@@ -24,6 +19,7 @@ import type { RoomLink } from "../sync/room-connection";
 import { useThrottledLink } from "../sync/use-room";
 import type { Crumb } from "../ui/top-bar";
 import { useIsPhone, useIsWide } from "../ui/use-screen-size";
+import { EditorContextProvider } from "./canvas/note-links";
 import { QuickAdd } from "./canvas/quick-add";
 import { CanvasPane } from "./canvas-pane";
 import { DeskLayout, PhoneLayout } from "./layouts";
@@ -183,7 +179,7 @@ export function Editor(props: Props) {
     status: () => props.status(shown),
   };
   return (
-    <EditorReactContext value={context}>
+    <EditorContextProvider context={context}>
       {props.bar({
         crumbs: crumbsOf(context),
         status: (
@@ -206,6 +202,6 @@ export function Editor(props: Props) {
       {adding && (
         <QuickAdd context={context} request={adding} known={known} onClose={editor.closeAdd} />
       )}
-    </EditorReactContext>
+    </EditorContextProvider>
   );
 }

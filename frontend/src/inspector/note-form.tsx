@@ -1,10 +1,12 @@
 /** A note or a frame as a form: what the canvas shows, without a pointer. */
 import { Button } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
-import { noteColor } from "../canvas/note-colors";
+import { noteColor } from "../canvas/notes/note-colors";
+import { isMarkedUp, NoteText } from "../canvas/notes/note-text";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { removeNotes } from "../graph/edit";
 import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../graph/edit/notes";
+import { withLinkIds } from "../graph/note-links";
 import { DraftInput } from "../ui/draft-input";
 import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
@@ -41,7 +43,7 @@ function Colors({ note, onPick }: { note: Note; onPick: (color: NoteColor) => vo
 }
 
 export function NoteForm({ note }: { note: Note }) {
-  const { doc, select } = useEditorContext();
+  const { doc, graph, select } = useEditorContext();
   const frame = note.kind === "frame";
   const change = (part: Parameters<typeof changeNote>[2]) => void changeNote(doc, note.key, part);
   const [width, height] = note.size;
@@ -54,9 +56,17 @@ export function NoteForm({ note }: { note: Note }) {
           value={note.text}
           placeholder={frame ? "What lies in it" : "What others shall know"}
           check={(draft) => (draft.length > 5_000 ? "At most 5000 characters." : null)}
-          onCommit={(text) => change({ text })}
+          onCommit={(text) => change({ text: frame ? text : withLinkIds(text, graph.actions) })}
         />
       </SharedField>
+      {!frame && isMarkedUp(note.text) && (
+        <div
+          className={style.readNote}
+          style={{ "--c": noteColor[note.color] } as React.CSSProperties}
+        >
+          <NoteText text={note.text} />
+        </div>
+      )}
       <Colors note={note} onPick={(color) => change({ color })} />
       <div className={style.pair}>
         <DraftInput
@@ -77,7 +87,7 @@ export function NoteForm({ note }: { note: Note }) {
       <p className={style.hint}>
         {frame
           ? "A frame takes along what lies in it. No engine reads it."
-          : "Notes are for people: no engine reads them."}
+          : "Markdown. [[Drive 0]] links to the action of that name, also once it is called otherwise. No engine reads notes."}
       </p>
       <Button
         leftSection={<IconTrash size={14} />}

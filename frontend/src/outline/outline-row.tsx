@@ -11,9 +11,10 @@ import {
 import { memo, useId, useState } from "react";
 import { checkedColor } from "../api/people";
 import { useOpenThreadCount } from "../canvas/card-highlights";
-import { noteColor } from "../canvas/note-colors";
+import { noteColor } from "../canvas/notes/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import type { Note } from "../graph/edit/notes";
+import { spokenNote } from "../graph/note-links";
 import { cardLines, lineText } from "../graph/value-text";
 import { durationLabel } from "../status/durations";
 import type { Progress } from "../status/progress";
@@ -123,7 +124,7 @@ function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">
       return (
         <span className={style.note}>
           <Sign size={13} aria-label={noteWord(row.note)} />
-          <span className={style.sub}>{text || "empty"}</span>
+          <span className={style.sub}>{spokenNote(text) || "empty"}</span>
         </span>
       );
     }
@@ -193,7 +194,7 @@ function labelOf(row: OutlineItem, name: string): string {
     case "target":
       return `the arrow to ${name}`;
     case "note":
-      return `${noteWord(row.note)}: ${row.note.text.slice(0, 60) || "empty"}`;
+      return `${noteWord(row.note)}: ${spokenNote(row.note.text).slice(0, 60) || "empty"}`;
   }
 }
 

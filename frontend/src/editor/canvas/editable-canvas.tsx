@@ -17,14 +17,15 @@ import { actionDrag } from "../../canvas/action-drag";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { CARD } from "../../canvas/geometry/arrange";
 import { edgeTypes, nodeTypes } from "../../canvas/graph-view";
-import { type NoteEditing, NoteEditingContext } from "../../canvas/note-card";
-import { noteColor } from "../../canvas/note-colors";
+import { type NoteEditing, NoteEditingContext } from "../../canvas/notes/note-card";
+import { noteColor } from "../../canvas/notes/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { ArrowTips } from "../../canvas/outcome-arrow";
 import { addActionAt, type EditorContext, GRID } from "../../edit-actions/editor-context";
 import { asOneEdit, insertInto, removeNotes } from "../../graph/edit";
 import { changeNote } from "../../graph/edit/notes";
 import type { Position } from "../../graph/model";
+import { withLinkIds } from "../../graph/note-links";
 import { endName } from "../../graph/relation-words";
 import { Cursors } from "../../people/cursors";
 import { PeopleAtCards } from "../../people/people";
@@ -104,7 +105,9 @@ function useNoteEditing(
   const alone = only !== undefined && others.length === 0 ? only : null;
   const { doc, openOverlay: open, select, mayEdit } = context;
   const change = useStableCallback<Parameters<NoteEditing["change"]>, void>((key, change) => {
-    changeNote(doc, key, change);
+    const { text } = change;
+    const linked = text === undefined ? {} : { text: withLinkIds(text, context.graph.actions) };
+    changeNote(doc, key, { ...change, ...linked });
   });
   return useMemo<NoteEditing | null>(() => {
     if (!mayEdit) return null;

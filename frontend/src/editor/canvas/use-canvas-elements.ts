@@ -27,7 +27,7 @@ import {
   surroundingsOf,
 } from "../../canvas/elements";
 import { type Positions, positionsOf, unplaced } from "../../canvas/geometry/arrange";
-import { notePlaces } from "../../canvas/note-nodes";
+import { notePlaces } from "../../canvas/notes/note-nodes";
 import type { ProblemMarks } from "../../canvas/problem-marks";
 import { asOneEdit, insertInto, moveActions } from "../../graph/edit";
 import { type Note, notesOf, placeNotes, withContents } from "../../graph/edit/notes";

@@ -73,11 +73,13 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         )
         return Config("local", VERSION, runner)
 
-    @get("/api/people", summary="Everyone who acted here", operation_id="listPeople")
+    @get("/api/people", summary="Everyone who acted here, and who asks", operation_id="listPeople")
     async def list_people(request: Request[Any, Any, Any]) -> list[Participant]:
-        services = app_state.services
-        services.colours.given(person_of(request).id)
+        services, person = app_state.services, person_of(request)
+        services.colours.given(person.id)
         everyone = services.people.everyone()
+        if all(known.id != person.id for known in everyone):
+            everyone.append(person)  # who has not acted yet, but wants to see themselves
         return [Participant(p.id, p.name, services.colours.of(p.id)) for p in everyone]
 
     @get(

@@ -1,5 +1,5 @@
 /** The colours of notes and frames, in tokens that fit both themes. */
-import type { NoteColor } from "../graph/edit/notes";
+import type { NoteColor } from "../../graph/edit/notes";
 
 export const noteColor: Readonly<Record<NoteColor, string>> = {
   grey: "var(--ink3)",

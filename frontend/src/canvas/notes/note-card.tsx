@@ -1,12 +1,13 @@
-/** A note or a frame on the canvas: plain text, a colour with a name, edges to drag. */
+/** A note or a frame on the canvas: Markdown edited as text, a colour with a name, edges to drag. */
 import { ActionIcon, Tooltip } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { type NodeProps, NodeResizer, NodeToolbar, Position } from "@xyflow/react";
 import { createContext, memo, use, useEffect, useRef } from "react";
-import { type NewNote, NOTE_COLORS, type Note } from "../graph/edit/notes";
+import { type NewNote, NOTE_COLORS, type Note } from "../../graph/edit/notes";
 import style from "./note-card.module.css";
 import { noteColor } from "./note-colors";
 import type { NoteNode } from "./note-nodes";
+import { NoteText } from "./note-text";
 
 /** How notes are changed; without one they are only shown. */
 export interface NoteEditing {
@@ -88,6 +89,11 @@ function Tools({ note, notes }: { note: Note; notes: NoteEditing }) {
   );
 }
 
+function Words({ note, empty }: { note: Note; empty: string }) {
+  if (note.text === "") return <span data-empty>{empty}</span>;
+  return note.kind === "frame" ? <span>{note.text}</span> : <NoteText text={note.text} />;
+}
+
 export const NoteCard = memo(function NoteCard({ data, selected }: NodeProps<NoteNode>) {
   const notes = use(NoteEditingContext);
   const { note } = data;
@@ -119,11 +125,15 @@ export const NoteCard = memo(function NoteCard({ data, selected }: NodeProps<Not
         />
       )}
       {/* biome-ignore lint/a11y/noStaticElementInteractions: double click repeats what Enter does */}
-      <div data-title className={style.text} onDoubleClick={() => notes?.edit(note.key)}>
+      <div
+        data-title
+        className={`${style.text} ${selected ? "nowheel" : ""}`}
+        onDoubleClick={() => notes?.edit(note.key)}
+      >
         {editing && notes ? (
           <Writing note={note} notes={notes} />
         ) : (
-          <span data-empty={note.text === "" || undefined}>{note.text || empty}</span>
+          <Words note={note} empty={empty} />
         )}
       </div>
     </div>

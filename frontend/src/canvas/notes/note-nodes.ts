@@ -1,8 +1,9 @@
 /** Notes and frames as nodes of the canvas. */
 import type { Node } from "@xyflow/react";
-import { type Note, notesOf } from "../graph/edit/notes";
-import type { Graph, Key } from "../graph/model";
-import type { Positions } from "./geometry/arrange";
+import { type Note, notesOf } from "../../graph/edit/notes";
+import type { Graph, Key } from "../../graph/model";
+import { spokenNote } from "../../graph/note-links";
+import type { Positions } from "../geometry/arrange";
 
 export type NoteNode = Node<{ note: Note }, "note">;
 
@@ -21,7 +22,7 @@ function nodeOf(given: Note, { places, selected, measured, resized }: Options): 
   return {
     id: note.key,
     type: "note",
-    ariaLabel: `${frame ? "Frame" : "Note"}, ${note.color}: ${note.text || "empty"}`,
+    ariaLabel: `${frame ? "Frame" : "Note"}, ${note.color}: ${spokenNote(note.text) || "empty"}`,
     position: { x, y },
     width: note.size[0],
     height: note.size[1],
