@@ -7,7 +7,8 @@ import { defineConfig, devices } from "@playwright/test";
 process.env.ROS_AUTOMATIC_DISCOVERY_RANGE = "LOCALHOST";
 
 // Without the code for windows the same engine starts sooner and leaves more of the processors.
-const installed = ["/usr/bin/chromium-headless-shell", "/usr/bin/chromium"].find(existsSync);
+const SHELL = "/usr/bin/chromium-headless-shell";
+const installed = existsSync(SHELL) ? SHELL : "/usr/bin/chromium";
 
 const launchOptions = {
   executablePath: process.env.CHROMIUM ?? installed,
