@@ -280,8 +280,7 @@ async def _lived(folder: Path, actions: int, took: float) -> tuple[Place, int]:
             recordings.fed("Robin", report)
 
     link.get = get
-    async with anyio.create_task_group() as tasks:
-        tasks.start_soon(place.network.blow)
+    async with place.network.running() as tasks:
         tasks.start_soon(recordings.run)
         place.robot("Robin")
         await anyio.sleep(0.5)
@@ -292,7 +291,6 @@ async def _lived(folder: Path, actions: int, took: float) -> tuple[Place, int]:
                 while place.control.open:  # noqa: ASYNC110 - an hour, in virtual time
                     await anyio.sleep(5)
         await anyio.sleep(3)
-        tasks.cancel_scope.cancel()
     return place, sent
 
 

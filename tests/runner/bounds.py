@@ -15,6 +15,7 @@ from runner import harness
 from runner.fake_network import now_ms
 from runner.harness import BEN, GO_ON, carousel, run_in_virtual_time, sequence, two_ends
 from runner.record_streams import Place
+from runner.robots_in_network import all_over
 
 #: One execution of an action's code: microseconds of its begin and its end; None: it went on.
 Real = tuple[int, int | None]
@@ -92,8 +93,7 @@ async def _lived(
         take(told)
 
     robot._take = overheard  # type: ignore[method-assign]
-    async with anyio.create_task_group() as tasks:
-        tasks.start_soon(place.network.blow)
+    async with place.network.running():
         place.network.join(robot, "/Robin")
         await anyio.sleep(0.5)
         async with place.harness.runner() as place.control:
@@ -103,9 +103,8 @@ async def _lived(
                 if stop is not None:
                     await anyio.sleep(stop)
                     await place.control.stop(run, BEN)
-                await place.over()
+                await all_over(place.control)
             history = place.harness.ledger.history(run)
-        tasks.cancel_scope.cancel()
     return Lived(history, place, {name: _real(name, traces, script) for name in history.actions})
 
 

@@ -3,12 +3,13 @@ discovery that lags behind, as the links over rclpy see one."""
 
 import asyncio
 import random
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import AbstractContextManager, asynccontextmanager
 from contextvars import Context
 from typing import Any
 
 import anyio
+from anyio.abc import TaskGroup
 
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import (
@@ -196,13 +197,17 @@ class FakeNetwork:
         node.robot.kill()
         node.unseen_at = min(node.unseen_at, now() + LEASE_S)
 
-    async def blow(self) -> None:
-        """The messages that are under way when this is cancelled never arrive."""
-        try:
-            await anyio.sleep_forever()
-        finally:
-            for handle in self._handles:
-                handle.cancel()
+    @asynccontextmanager
+    async def running(self) -> AsyncIterator[TaskGroup]:
+        """Messages travel; those that are under way at the end never arrive. What is started in the
+        task group ends with it."""
+        async with anyio.create_task_group() as tasks:
+            try:
+                yield tasks
+            finally:
+                for handle in self._handles:
+                    handle.cancel()
+                tasks.cancel_scope.cancel()
 
     def stir(self, node: Node) -> None:
         """Hear what a node says by now, and come back when it has more to say."""

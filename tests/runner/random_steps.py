@@ -1,15 +1,15 @@
 """What happens in a random history: graphs, scripts, and steps drawn by chance."""
 
 import random
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Iterable
 from typing import Any
 
+import anyio
+
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.umrf.model import Graph
-from runner.harness import (
-    carousel,
-    sequence,
-    two_ends,
-)
+from runner.harness import Harness, carousel, sequence, two_ends
 
 NAME = "David"
 
@@ -42,7 +42,7 @@ LOADING_MS = (1.0, 5.0, 60.0, 400.0, 900.0)
 Step = tuple[str, Any]
 
 
-def plot(chance: random.Random) -> list[Step]:
+def random_steps(chance: random.Random) -> list[Step]:
     """What happens, by chance: (how often, what, with what)."""
     steps: list[tuple[float, str, Callable[[], Any]]] = [
         (12, "wait", lambda: chance.choice([0.01, 0.05, 0.2, 1.0, 4.0])),
@@ -84,3 +84,24 @@ def opening(chance: random.Random) -> list[Step]:
             return [("start", name), a_moment, ("stop", None), ("wait", 1.0)]
         case _:
             return [("start", name)]
+
+
+async def live_through(
+    harness: Harness,
+    steps: Iterable[Step],
+    judge: Callable[[OpenRun], None],
+    do: Callable[[ExecutionService, Any, str, Any], Awaitable[None]],
+) -> None:
+    """All steps in their order; at a "crash" the process dies and another one takes up what it left."""
+    rest = list(steps)
+    while rest:
+        async with harness.runner() as control, anyio.create_task_group() as people:
+            control.watch(judge)
+            while rest:
+                step, value = rest.pop(0)
+                if step == "crash":
+                    break
+                await do(control, people, step, value)
+            harness.ledger.down = True  # a crash writes nothing any more
+            people.cancel_scope.cancel()
+        harness.ledger.down = False

@@ -19,7 +19,6 @@ from action_assistant.paths import examples
 from action_assistant.runner.archives import examples as recorded_runs
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import EngineTraits, Start, index_of
-from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.recorder import stream_of
@@ -39,6 +38,7 @@ from runner import harness
 from runner.fake_link import FakeLink
 from runner.fake_network import FakeNetwork, Node, now_ms
 from runner.harness import Harness, order, run_in_virtual_time
+from runner.robots_in_network import all_over, confirm_lost
 
 ROBOT = "Robin"
 ADA, BEN = Author("example-ada", "Ada"), Author("example-ben", "Ben")
@@ -116,21 +116,6 @@ class Stage:
         asked = msgspec.structs.replace(asked, **override)
         return (await self.control.start(asked, ADA)).run.id
 
-    async def at_rest(self) -> None:
-        """Somebody goes there and sees that nothing moves."""
-        with anyio.fail_after(600):
-            while not any(each.run.lost for each in self.control.open.values()):  # noqa: ASYNC110
-                await anyio.sleep(0.1)
-        for run in tuple(self.control.open):
-            asked = RestRequest("I stand beside it; nothing moves.")
-            await self.control.confirm_rest(run, asked, BEN)
-
-    async def over(self) -> None:
-        """Wait for the end of everything."""
-        with anyio.fail_after(600):
-            while self.control.open:  # noqa: ASYNC110 - it ends by many ways
-                await anyio.sleep(0.1)
-
 
 Story = Callable[[Stage], Awaitable[None]]
 
@@ -140,14 +125,14 @@ async def wrong_parameter(stage: Stage) -> None:
     speed = Parameter(path="speed", text='{"pvf_type":"string","pvf_value":"fast"}')
     task = graph("pack_order", *line("Find", "Approach", "Grip"), inputs={"Grip": speed})
     await stage.start(task, "parameter-type", reason="The new gripper takes words, too.")
-    await stage.over()
+    await all_over(stage.control)
 
 
 async def missing_action(stage: Stage) -> None:
     """Nobody installed Search."""
     task = graph("search_shelf", *line("Look", "Search", "Report"))
     await stage.start(task, "unknown-action", reason="It was installed this morning.")
-    await stage.over()
+    await all_over(stage.control)
 
 
 async def hang_in_a_join(stage: Stage) -> None:
@@ -157,7 +142,7 @@ async def hang_in_a_join(stage: Stage) -> None:
     run = await stage.start(task)
     await anyio.sleep(95)
     await stage.control.stop(run, BEN)
-    await stage.over()
+    await all_over(stage.control)
 
 
 async def engine_restart(stage: Stage) -> None:
@@ -168,8 +153,8 @@ async def engine_restart(stage: Stage) -> None:
     stage.network.kill(stage.network.nodes[0])
     await anyio.sleep(16)  # discovery has to forget the dead one first
     stage.robot()
-    await stage.at_rest()
-    await stage.over()
+    await confirm_lost(stage.control)
+    await all_over(stage.control)
 
 
 async def foreign_start(stage: Stage) -> None:
@@ -180,7 +165,7 @@ async def foreign_start(stage: Stage) -> None:
     text = codec.write(task)
     stage.network.strangers = 1
     stage.network.carry(Start(graph_name="inspect", targets=(ROBOT,), graph_json=text), "terminal")
-    await stage.over()
+    await all_over(stage.control)
 
 
 def _known(*names: str) -> tuple[Action, ...]:
@@ -211,14 +196,12 @@ async def played(story: Story, begins: int) -> bytes:
     script, known = STORIES[story]
     harness.EPOCH = begins
     stage = Stage(script, *known)
-    async with anyio.create_task_group() as wind:
-        wind.start_soon(stage.network.blow)
+    async with stage.network.running():
         stage.robot()
         await anyio.sleep(0.5)
         async with stage.harness.runner() as stage.control:
             await anyio.sleep(1.5)
             await story(stage)
-        wind.cancel_scope.cancel()
     (run,) = [each for each in stage.harness.ledger.streams if each.startswith("run/")]
     events = stage.harness.ledger.streams[run]
     assert run == stream_of(run.removeprefix("run/"))

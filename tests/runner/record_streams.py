@@ -21,7 +21,6 @@ import msgspec
 from action_assistant.journal.events import Event
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import EngineTraits, Start, index_of
-from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import decode
@@ -34,7 +33,16 @@ from action_assistant.umrf.semantics import script_from
 from runner import harness
 from runner.fake_link import FakeLink
 from runner.fake_network import FakeNetwork, now_ms
-from runner.harness import ANN, BEN, Harness, carousel, order, run_in_virtual_time, sequence
+from runner.harness import (
+    ANN,
+    BEN,
+    Harness,
+    carousel,
+    order,
+    run_in_virtual_time,
+    sequence,
+)
+from runner.robots_in_network import all_over, confirm_lost
 
 
 class Line(msgspec.Struct, frozen=True):
@@ -73,21 +81,6 @@ class Place:
         asked = order(graph, engine=engine, graph=None, request_id=graph.name, **more)
         return (await self.control.start(asked, ANN)).run.id
 
-    async def at_rest(self) -> None:
-        """Somebody goes there and sees that nothing moves."""
-        with anyio.fail_after(600):
-            while not any(each.run.lost for each in self.control.open.values()):  # noqa: ASYNC110
-                await anyio.sleep(0.1)
-        for run in tuple(self.control.open):
-            asked = RestRequest("I stand beside it; nothing moves.")
-            await self.control.confirm_rest(run, asked, BEN)
-
-    async def over(self) -> None:
-        """Wait for the end of everything."""
-        with anyio.fail_after(600):
-            while self.control.open:  # noqa: ASYNC110 - it ends by many ways
-                await anyio.sleep(0.1)
-
 
 Story = Callable[[Place], Awaitable[None]]
 
@@ -98,7 +91,7 @@ async def finished(place: Place) -> None:
     leaf = '{"pvf_type":"number","pvf_value":0.5}'
     first = msgspec.structs.replace(plan.actions[0], inputs=(Parameter("arm/speed", leaf),))
     await place.start(msgspec.structs.replace(plan, actions=(first, *plan.actions[1:])))
-    await place.over()
+    await all_over(place.control)
 
 
 async def laps(place: Place) -> None:
@@ -106,7 +99,7 @@ async def laps(place: Place) -> None:
     run = await place.start(carousel("laps"))
     await anyio.sleep(60)
     await place.control.stop(run, BEN)
-    await place.over()
+    await all_over(place.control)
 
 
 async def stopped(place: Place) -> None:
@@ -114,13 +107,13 @@ async def stopped(place: Place) -> None:
     run = await place.start(sequence("stopped", 3))
     await anyio.sleep(6)
     await place.control.stop(run, BEN)
-    await place.over()
+    await all_over(place.control)
 
 
 async def failed(place: Place) -> None:
     """The second action ends in error."""
     await place.start(sequence("failed", 3))
-    await place.over()
+    await all_over(place.control)
 
 
 async def engine_lost(place: Place) -> None:
@@ -130,8 +123,8 @@ async def engine_lost(place: Place) -> None:
     place.network.kill(place.network.nodes[0])
     await anyio.sleep(16)
     place.robot("Robin")
-    await place.at_rest()
-    await place.over()
+    await confirm_lost(place.control)
+    await all_over(place.control)
 
 
 async def foreign(place: Place) -> None:
@@ -144,7 +137,7 @@ async def foreign(place: Place) -> None:
     place.network.carry(
         Start(graph_name="foreign", targets=("Robin",), graph_json=text), "terminal"
     )
-    await place.over()
+    await all_over(place.control)
 
 
 async def paused(place: Place) -> None:
@@ -155,7 +148,7 @@ async def paused(place: Place) -> None:
     await place.control.pause(run, BEN)
     await anyio.sleep(9)
     await place.control.resume(run, ANN)
-    await place.over()
+    await all_over(place.control)
 
 
 async def simulated(place: Place) -> None:
@@ -165,7 +158,7 @@ async def simulated(place: Place) -> None:
         "Work_1": [{"after_s": 1, "result": "on_error", "message": "gripper jammed"}],
     }
     await place.start(sequence("simulated", 3), "simulator", script=script)
-    await place.over()
+    await all_over(place.control)
 
 
 async def together(place: Place) -> None:
@@ -173,7 +166,7 @@ async def together(place: Place) -> None:
     one = order(sequence("together", 2), graph=None, request_id="together")
     fields = {name: getattr(one, name) for name in ("version", "digest", "umrf", "request_id")}
     await place.control.start_group(GroupRequest(engines=("Marian", "Robin"), **fields), ANN)
-    await place.over()
+    await all_over(place.control)
 
 
 async def runner_restarted(place: Place) -> None:
@@ -199,8 +192,7 @@ STORIES: dict[Story, dict[str, Any]] = {
 async def told(story: Story) -> list[list[Event]]:
     """The streams of a story."""
     place = Place(STORIES[story])
-    async with anyio.create_task_group() as wind:
-        wind.start_soon(place.network.blow)
+    async with place.network.running():
         place.robot("Robin")
         place.robot("Marian")
         await anyio.sleep(0.5)
@@ -210,8 +202,7 @@ async def told(story: Story) -> list[list[Event]]:
         if story is runner_restarted:
             await anyio.sleep(3)
             async with place.harness.runner() as place.control:
-                await place.over()
-        wind.cancel_scope.cancel()
+                await all_over(place.control)
     streams = place.harness.ledger.streams
     return [streams[name] for name in sorted(streams) if name.startswith("run/")]
 

@@ -15,7 +15,7 @@ from action_assistant.runner.runs import views
 from action_assistant.umrf.semantics import script_from
 from runner.fake_link import FakeLink
 from runner.fake_network import FakeNetwork, Node, now, now_ms
-from runner.harness import Harness, order, sequence
+from runner.harness import BEN, Harness, order, sequence
 
 PATROL, OTHER = sequence("patrol"), sequence("other")
 PATHS = {"David": "/david/umrf_graph_get", "Carol": "/carol/umrf_graph_get"}
@@ -65,12 +65,9 @@ class RobotsInNetwork:
     async def played(self) -> AsyncIterator[ExecutionService]:
         """The runner, with everything alive around it."""
         with self.network.hearing(self._hear):
-            async with anyio.create_task_group() as wind:
-                wind.start_soon(self.network.blow)
-                async with self.harness.runner() as control:
-                    await anyio.sleep(0.5)
-                    yield control
-                wind.cancel_scope.cancel()
+            async with self.network.running(), self.harness.runner() as control:
+                await anyio.sleep(0.5)
+                yield control
 
     def _hear(self, sound: object) -> None:
         text = getattr(sound, "text", "")
@@ -89,3 +86,19 @@ def asked(name: str = "David", **more: Any) -> Any:
 def shown(control: ExecutionService, run: str) -> Any:
     """A run as the API and the page show it."""
     return views.shown(control.open[run].run)
+
+
+async def confirm_lost(control: ExecutionService) -> None:
+    """Wait until a run is lost; then somebody goes there and sees that nothing moves."""
+    with anyio.fail_after(600):
+        while not any(each.run.lost for each in control.open.values()):  # noqa: ASYNC110 - by many ways
+            await anyio.sleep(0.1)
+    for run in tuple(control.open):
+        await control.confirm_rest(run, LOOKED, BEN)
+
+
+async def all_over(control: ExecutionService) -> None:
+    """Wait for the end of every run."""
+    with anyio.fail_after(600):
+        while control.open:  # noqa: ASYNC110 - it ends by many ways
+            await anyio.sleep(0.1)

@@ -29,6 +29,7 @@ from runner.harness import (
     sequence,
     two_ends,
 )
+from runner.random_steps import live_through
 from support.doses import examples
 
 GRAPHS = {"one": sequence("one"), "two": two_ends("two")}
@@ -89,18 +90,7 @@ class Story:
             self.engines = engines
             self.robot.tasks = engines
             engines.start_soon(self.follow, self.robot.engine)
-            rest = list(steps)
-            while rest:
-                async with self.harness.runner() as control, anyio.create_task_group() as people:
-                    control.watch(self.judge)
-                    while rest:
-                        step, value = rest.pop(0)
-                        if step == "crash":
-                            break
-                        await self.do(control, people, step, value)
-                    self.harness.ledger.down = True  # a crash writes nothing any more
-                    people.cancel_scope.cancel()
-                self.harness.ledger.down = False
+            await live_through(self.harness, steps, self.judge, self.do)
             await self.come_to_rest()
             engines.cancel_scope.cancel()
 

@@ -17,6 +17,7 @@ from runner import harness
 from runner.fake_network import now_ms
 from runner.harness import BEN, run_in_virtual_time, sequence
 from runner.record_streams import Place
+from runner.robots_in_network import all_over
 from support.doses import examples
 
 RESULTS = ("on_true", "on_false", "on_error")
@@ -60,8 +61,7 @@ async def lived(calls: list[dict[str, Any]], loss: float, seed: int, stop: float
     script = {f"Work_{i}": [call] for i, call in enumerate(calls)}
     place = Place(script)
     witness = Witness(place)
-    async with anyio.create_task_group() as tasks:
-        tasks.start_soon(place.network.blow)
+    async with place.network.running():
         robot = EmulatedEngine(
             "Robin",
             script=place.script,
@@ -81,8 +81,7 @@ async def lived(calls: list[dict[str, Any]], loss: float, seed: int, stop: float
                     await anyio.sleep(stop)
                     await place.control.stop(run, BEN)
                 with anyio.move_on_after(120):
-                    await place.over()
-        tasks.cancel_scope.cancel()
+                    await all_over(place.control)
     return witness
 
 

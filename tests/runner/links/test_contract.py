@@ -69,18 +69,9 @@ async def stand_in() -> AsyncIterator[Link]:
     network.join(
         EmulatedEngine("David", script=script_from({"behaviours": SCRIPT}), born_ms=now_ms())
     )
-    async with blowing(network), alive(FakeLink(network, "David")) as link:
+    async with network.running(), alive(FakeLink(network, "David")) as link:
         await anyio.sleep(0.1)
         yield link
-
-
-@asynccontextmanager
-async def blowing(network: FakeNetwork) -> AsyncIterator[None]:
-    """Messages travel."""
-    async with anyio.create_task_group() as wind:
-        wind.start_soon(network.blow)
-        yield
-        wind.cancel_scope.cancel()
 
 
 @pytest.mark.parametrize("behind", [simulator, stand_in])
@@ -98,7 +89,7 @@ def test_a_link_keeps_what_every_link_promises(promise: Promise, behind: Any) ->
 async def test_commands_of_others_are_reported() -> None:
     heard: list[Report] = []
     network = FakeNetwork()
-    async with alive(FakeLink(network, "David")) as link, blowing(network):
+    async with alive(FakeLink(network, "David")) as link, network.running():
         with link.listen(heard.append):
             await anyio.sleep(0.1)
             network.carry(Stop(graph_name="patrol", targets=("Carol",)), "terminal")

@@ -37,7 +37,7 @@ from runner.harness import (
     order,
     run_in_virtual_time,
 )
-from runner.random_steps import GRAPHS, LOADING_MS, NAME, SCRIPTS, plot
+from runner.random_steps import GRAPHS, LOADING_MS, NAME, SCRIPTS, live_through, random_steps
 
 HISTORIES = int(os.environ.get("TEST_HISTORIES", "40"))
 #: A history that once went wrong: somebody played a start of ours again while the last answer of the
@@ -87,26 +87,13 @@ class Story:
 
     async def live(self) -> None:
         """All steps, then everything is well again and has to come to rest."""
-        async with anyio.create_task_group() as wind:
-            self.wind = wind
-            wind.start_soon(self.network.blow)
-            wind.start_soon(self.watch_the_truth)
+        async with self.network.running() as tasks:
+            self.tasks = tasks
+            tasks.start_soon(self.watch_the_truth)
             self.robot()
             await anyio.sleep(0.2)
-            rest = plot(self.chance)
-            while rest:
-                async with self.harness.runner() as control, anyio.create_task_group() as people:
-                    control.watch(self.judge)
-                    while rest:
-                        step, value = rest.pop(0)
-                        if step == "crash":
-                            break
-                        await self.do(control, people, step, value)
-                    self.harness.ledger.down = True  # a crash writes nothing any more
-                    people.cancel_scope.cancel()
-                self.harness.ledger.down = False
+            await live_through(self.harness, random_steps(self.chance), self.judge, self.do)
             await self.come_to_rest()
-            wind.cancel_scope.cancel()
 
     async def do(self, control: ExecutionService, people: Any, step: str, value: Any) -> None:
         """One step."""
@@ -153,10 +140,10 @@ class Story:
                 else:
                     node.robot.quit(now_ms())
                     self.network.stir(node)
-                self.wind.start_soon(self.come_up_later)
+                self.tasks.start_soon(self.come_up_later)
             case "freeze" if node is not None:
                 node.robot.freeze(now_ms())
-                self.wind.start_soon(self.thaw_later, node, value)
+                self.tasks.start_soon(self.thaw_later, node, value)
             case "stranger":
                 self.stranger(value)
             case "their start":

@@ -111,8 +111,7 @@ async def test_it_is_said_also_where_the_first_end_is_not_recorded_yet() -> None
 @virtual
 async def test_a_runner_that_was_restarted_meanwhile_stops_it() -> None:
     here = scene()
-    async with anyio.create_task_group() as wind:
-        wind.start_soon(here.network.blow)
+    async with here.network.running():
         async with here.harness.runner() as control:
             await anyio.sleep(0.5)
             run = await proven_stopped(control)
@@ -121,7 +120,6 @@ async def test_a_runner_that_was_restarted_meanwhile_stops_it() -> None:
             assert shown(control, run).state == "stopping"
             await until(lambda: run not in control.open)
             assert (await control.find(run)).state == "stopped"
-        wind.cancel_scope.cancel()
 
 
 @virtual
@@ -136,8 +134,7 @@ async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_o
         await anyio.sleep(0.2)
         return await read(*given, **more)
 
-    async with anyio.create_task_group() as wind:
-        wind.start_soon(here.network.blow)
+    async with here.network.running():
         async with here.harness.runner() as control:
             await anyio.sleep(0.5)
             run = (await control.start(asked(), ANN)).run.id
@@ -152,7 +149,6 @@ async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_o
             await until(lambda: run in control.open, patience=3)
             await until(lambda: run not in control.open)
             assert (await control.find(run)).state == "stopped"
-        wind.cancel_scope.cancel()
 
 
 @virtual

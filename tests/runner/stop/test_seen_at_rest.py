@@ -58,8 +58,7 @@ async def test_a_start_that_was_played_again_while_nobody_listened_is_not_what_s
     late, stubborn = {"never": True, "stop_s": 40.0}, {"never": True, "ignores_stop": True}
     script = {"patrol/Work_0": [late, stubborn], "*": [{"after_s": 1}]}
     scene = RobotsInNetwork(5, script=script, quirks=EngineTraits(loss=0.0))
-    async with anyio.create_task_group() as wind:
-        wind.start_soon(scene.network.blow)
+    async with scene.network.running():
         async with scene.harness.runner() as control:
             await anyio.sleep(0.5)
             run = (await control.start(asked(), ANN)).run.id
@@ -77,7 +76,6 @@ async def test_a_start_that_was_played_again_while_nobody_listened_is_not_what_s
             assert scene.nodes["David"].robot.moving == ("patrol",)
             with pytest.raises(Conflict, match="patrol on David did not obey"):
                 await control.start(order(sequence("other"), engine="David"), ANN)
-        wind.cancel_scope.cancel()
 
 
 @virtual
@@ -160,8 +158,7 @@ async def test_a_mark_of_a_run_that_is_not_here_is_asked_for_once() -> None:
     for action in graph["actions"]:
         action["gui_attributes"] = {"action_assistant": {"run": "AAAAAAAAAAAA"}}
     text = msgspec.json.encode(graph).decode()
-    async with anyio.create_task_group() as wind:
-        wind.start_soon(scene.network.blow)
+    async with scene.network.running():
         ledger, robots = scene.harness.ledger, Robots(scene.harness.links)
         await anyio.sleep(0.5)
         scene.network.carry(
@@ -172,5 +169,4 @@ async def test_a_mark_of_a_run_that_is_not_here_is_asked_for_once() -> None:
             ledger, robots, clock_us=clock_us, run_in_worker=at_once, past=past
         ):
             await anyio.sleep(60)
-        wind.cancel_scope.cancel()
     assert asked_for == ["AAAAAAAAAAAA"]
