@@ -84,6 +84,23 @@ async def test_the_first_damage_of_each_stream_is_told_and_others_are_sound(tmp_
     await journal.close()
 
 
+@pytest.mark.parametrize("change", ["stream = NULL", "seq = 'x'", "chain = 10"])
+async def test_an_end_that_holds_anything_at_all_is_told(tmp_path: Path, change: str) -> None:
+    path = tmp_path / "editor.db"
+    journal = await opened(path)
+    await filled(journal)
+    for sql in (
+        "CREATE TABLE loose AS SELECT * FROM head",  # as a damaged file may be, without constraints
+        "DROP TABLE head",
+        "ALTER TABLE loose RENAME TO head",
+        f"UPDATE head SET {change} WHERE stream = 'b'",
+    ):
+        tamper(path, sql)
+    told = [(each.seq, each.why) for each in await journal.verify() if each.stream]
+    assert told[0] == (0, "its end is written down in values of the wrong kind")
+    await journal.close()
+
+
 @pytest.mark.parametrize("seq", [1, 5, 10])
 async def test_an_event_that_is_missing_is_told_also_at_the_end(tmp_path: Path, seq: int) -> None:
     path = tmp_path / "editor.db"

@@ -1,6 +1,6 @@
 """The chain through each stream, by which every change of a stored event shows."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from hashlib import blake2b
 from struct import pack
 from typing import Any, Final
@@ -98,11 +98,12 @@ class Inspector:
         """Something that is wrong with what was seen so far; None when nothing is."""
         return next(iter(self._damages.values()), None)
 
-    def findings(self, heads: Mapping[str, Head] | None) -> list[Damage]:
-        """The first damage of each stream. `heads`: what the database says their ends are."""
+    def findings(self, ends: Iterable[Sequence[Any]] | None) -> list[Damage]:
+        """The first damage of each stream. `ends`: stream, seq and chain of each as they stand in the
+        database."""
         if self._missing != self._gone and self._gap is not None and not self._damages:
             self._note(self._gap.stream, self._gap.seq, self._gap.why)
-        heads = self._heads if heads is None else heads
+        heads = self._heads if ends is None else self._written(ends)
         for stream in sorted(heads.keys() | self._heads.keys()):
             end, found = heads.get(stream, NOTHING), self._heads.get(stream, NOTHING)
             if end.seq > found.seq:
@@ -110,6 +111,17 @@ class Inspector:
             elif end != found:
                 self._note(stream, found.seq, f"the stream's end is written down as {end.seq}")
         return sorted(self._damages.values(), key=lambda each: (each.stream, each.seq))
+
+    def _written(self, ends: Iterable[Sequence[Any]]) -> dict[str, Head]:
+        """Where streams end as the database says, of which no value need be what was stored."""
+        heads = {}
+        for stream, seq, chain in ends:
+            if (type(stream), type(seq), type(chain)) == (str, int, bytes):
+                heads[stream] = Head(seq, chain)
+            else:
+                name = stream if isinstance(stream, str) else repr(stream)
+                self._note(name, 0, "its end is written down in values of the wrong kind")
+        return heads
 
     def _note(self, stream: str, seq: int, why: str) -> None:
         self._damages.setdefault(stream, Damage(stream, seq, why))

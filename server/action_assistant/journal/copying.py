@@ -7,7 +7,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, Table, insert, select
 
 from action_assistant.errors import CannotStart
-from action_assistant.journal.chain import Damage, Head, Inspector
+from action_assistant.journal.chain import Damage, Inspector
 from action_assistant.journal.database import Branch, Database, cause_of
 from action_assistant.journal.events import Event, Fold
 from action_assistant.journal.migrate import recognize
@@ -84,14 +84,12 @@ def _pour(here: Connection, there: Connection, fold: Fold, tell: Callable[[int],
             for statement in fold(Event(*row[:7])):
                 there.execute(statement)
         tell(inspector.seen)
-    ends: dict[str, Head] = {}
+    ends = here.execute(select(editor_head)).all()
+    for damage in inspector.findings((row.stream, row.seq, row.chain) for row in ends):
+        raise _damaged(damage)
     for table in (editor_head, editor_snapshot):
         for rows in streamed.execute(select(table)).partitions():
             _insert(there, table, rows)
-            if table is editor_head:
-                ends |= {row.stream: Head(row.seq, row.chain) for row in rows}
-    for damage in inspector.findings(ends):
-        raise _damaged(damage)
     return inspector.seen
 
 

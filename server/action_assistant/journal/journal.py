@@ -11,7 +11,7 @@ import msgspec
 from sqlalchemy import Connection, delete, insert, select
 
 from action_assistant.errors import Conflict, Unavailable
-from action_assistant.journal.chain import Damage, Head, Inspector
+from action_assistant.journal.chain import Damage, Inspector
 from action_assistant.journal.database import Branch, Database, WriterSession, cause_of
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
@@ -161,7 +161,7 @@ class Journal(JournalReader):
                 if not rows:
                     break
             ends = await self.query(select(_head.stream, _head.seq, _head.chain))
-            found = inspector.findings({row.stream: Head(row.seq, row.chain) for row in ends})
+            found = inspector.findings(tuple(row) for row in ends)
             complaints = await self._ask(self._database.complaints)
         except Unavailable as error:
             return [*inspector.findings(None), Damage("", 0, error.detail)]
