@@ -4,28 +4,50 @@ See docs/umrf-and-the-engine.md 2.6.
 """
 
 from collections.abc import Container, Mapping
+from dataclasses import dataclass
 
 from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.scenarios import check_scenarios, halted
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.values import check_signature, check_values
-from action_assistant.umrf.model import EXIT, PRECONDITIONS, Action, Graph, Key, Problem, Severity
+from action_assistant.umrf.model import (
+    EXIT,
+    PRECONDITIONS,
+    Action,
+    Graph,
+    Key,
+    Problem,
+    Severity,
+    Signature,
+)
 from action_assistant.umrf.semantics.matching import unresolved
 from action_assistant.umrf.semantics.values import slots_of
 from action_assistant.umrf.signatures import signature_of_graph, with_inputs
+
+
+@dataclass(frozen=True)
+class _Inner:
+    """What is the same wherever a sub-graph stands: found once, not once per action."""
+
+    signature: Signature
+    problems: tuple[tuple[str, Severity, str], ...]
 
 
 def check_subgraphs(
     subject: Subject, graphs: Mapping[str, Graph], known: Container[str] = frozenset()
 ) -> None:
     """Reports all of it. `known`: names of actions, which come before graphs of the same name."""
-    inner: dict[str, list[tuple[str, Severity, str]]] = {}
+    inner: dict[str, _Inner | None] = {}
     for action in subject.real:
         graph = graphs.get(action.name)
         if graph is None or action.name in known:
             continue
-        if _contains(graph, {subject.graph.name, graph.name}, graphs, known):
+        if action.name not in inner:
+            contains = _contains(graph, {subject.graph.name, graph.name}, graphs, known)
+            inner[action.name] = None if contains else _inner(subject, graph)
+        found = inner[action.name]
+        if found is None:
             message = (
                 f"The sub-graph “{graph.name}” contains itself or the graph that it is in; the "
                 "engine cannot resolve the graph."
@@ -33,10 +55,8 @@ def check_subgraphs(
             subject.report("recursion", "error", message, action=action, member="/name")
             continue
         own = slots_of(action.inputs), slots_of(action.outputs)
-        check_signature(subject, action, signature_of_graph(graph), *own)
-        if action.name not in inner:
-            inner[action.name] = list(_problems_of(subject, graph))
-        for code, severity, message in inner[action.name]:
+        check_signature(subject, action, found.signature, *own)
+        for code, severity, message in found.problems:
             subject.report(code, severity, message, action=action, member="/name")
         _check_pauses(subject, action)
     _check_again(subject, graphs, known)
@@ -62,6 +82,10 @@ def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container
                 "place, or put its actions there."
             )
             subject.report("subgraph-twice", "error", message, action=found.action, member="/name")
+
+
+def _inner(subject: Subject, graph: Graph) -> _Inner:
+    return _Inner(signature_of_graph(graph), tuple(_problems_of(subject, graph)))
 
 
 def _contains(

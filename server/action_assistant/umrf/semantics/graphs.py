@@ -11,7 +11,7 @@ from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Action, Graph, Signature
 from action_assistant.umrf.semantics.clock import Task
 from action_assistant.umrf.semantics.core import Core
-from action_assistant.umrf.semantics.matching import fits, has_action, unresolved
+from action_assistant.umrf.semantics.matching import SubGraphs, has_action, unresolved
 from action_assistant.umrf.semantics.parts import (
     ENTRY_NODE,
     EXIT_NODE,
@@ -78,15 +78,15 @@ class Graphs(Core):
         }
         build(running, behaviours)
         taken = running.own_names()
+        subs = SubGraphs(self.library)
         for node in running.nodes.values():
             known = (self.signatures or {}).get(node.name)
             if known is not None:
                 for slot in node.inputs.values():
                     slot.required = slot.name not in known.optional
                 continue
-            sub = self.library.get(node.name)
-            if sub is not None and node.name not in taken and fits(node, sub):
-                node.subgraph = sub
+            if node.name not in taken:
+                node.subgraph = subs.fitting(node.name, node.inputs.keys(), node.outputs.keys())
         return running
 
     def _resolves(self, graph: Running) -> bool:

@@ -6,7 +6,7 @@ from typing import Final, Literal
 import msgspec
 
 from action_assistant.umrf.json.text import parse_small
-from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Parameter, Signature
+from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Key, Parameter, Signature
 from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.semantics.parts import Node
 from action_assistant.umrf.semantics.values import slots_of
@@ -24,6 +24,24 @@ class Unresolved(msgspec.Struct, frozen=True):
     why: Literal["recursion", "again"]
     action: Action
     name: str
+
+
+class SubGraphs:
+    """The indexed graphs that actions can stand for. What each takes and gives is found once,
+    however many actions ask: a small file has room for ten thousand that do."""
+
+    def __init__(self, library: Mapping[str, Graph]) -> None:
+        self._library = library
+        self._known: dict[str, tuple[set[str], set[str]]] = {}
+
+    def fitting(self, name: str, inputs: Collection[str], outputs: Collection[str]) -> Graph | None:
+        """The graph of that name, if it takes and gives exactly these."""
+        sub = self._library.get(name)
+        if sub is None:
+            return None
+        if name not in self._known:
+            self._known[name] = _expected(sub)
+        return sub if (set(inputs), set(outputs)) == self._known[name] else None
 
 
 class _Level:
@@ -48,6 +66,7 @@ def unresolved(
     same inside two different sub-graphs is not (measured). `is_other`: what is no sub-graph: an
     action, or somebody else's.
     """
+    subs = SubGraphs(library)
     levels = [_Level(graph, frozenset(), frozenset())]
     top: Action | None = None
     for _ in range(BUDGET):
@@ -59,19 +78,17 @@ def unresolved(
             levels.pop()
             continue
         top = action if len(levels) == 1 or top is None else top
-        sub = library.get(action.name)
-        if sub is None or is_other(action) or not fits_parameters(action, sub):
+        if action.name not in library or is_other(action):
+            continue
+        given = slots_of(action.inputs).keys(), slots_of(action.outputs).keys()
+        sub = subs.fitting(action.name, *given)
+        if sub is None:
             continue
         if sub.name in level.used:
             yield Unresolved("recursion" if sub.name in level.above else "again", top, sub.name)
             continue
         level.used.add(sub.name)
         levels.append(_Level(sub, level.above, frozenset(level.used)))
-
-
-def fits_parameters(action: Action, sub: Graph) -> bool:
-    """Whether an indexed graph has the signature that an action expects."""
-    return _fits(slots_of(action.inputs).keys(), slots_of(action.outputs).keys(), sub)
 
 
 def has_action(node: Node, known: Signature | None) -> bool:
@@ -83,23 +100,22 @@ def has_action(node: Node, known: Signature | None) -> bool:
     )
 
 
-def fits(node: Node, sub: Graph) -> bool:
-    """Whether an indexed graph has the signature that a node expects."""
-    return _fits(node.inputs.keys(), node.outputs.keys(), sub)
-
-
-def _fits(wanted: Collection[str], given: Collection[str], sub: Graph) -> bool:
+def _expected(sub: Graph) -> tuple[set[str], set[str]]:
+    """Names of the inputs that a graph takes and of the outputs that it gives."""
     entries = {r.child for r in sub.relations if r.parent == ENTRY}
     exits = sorted((r.child_order, r.parent) for r in sub.relations if r.child == EXIT)
+    ends = {key for _, key in exits}
     inputs: set[str] = set()
-    outputs: set[str] = set()
+    given: dict[Key, set[str]] = {}
     for action in sub.actions:
         if action.key in entries:
             inputs |= {name for name, has_value in _leaves(action.inputs) if not has_value}
+        if action.key in ends:
+            given.setdefault(action.key, set()).update(name for name, _ in _leaves(action.outputs))
+    outputs: set[str] = set()
     for _, key in exits:
-        own = {name for a in sub.actions if a.key == key for name, _ in _leaves(a.outputs)}
-        outputs = own or outputs
-    return set(wanted) == inputs and set(given) == outputs
+        outputs = given.get(key) or outputs
+    return inputs, outputs
 
 
 def _leaves(parameters: tuple[Parameter, ...]) -> list[tuple[str, bool]]:
