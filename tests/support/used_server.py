@@ -206,9 +206,11 @@ def _asked(editor: httpx.Client, runner: httpx.Client) -> Iterator[tuple[str, An
 
 
 def _plain(path: str, body: Any) -> Any:
-    """Without what depends on where the server is."""
+    """Without what depends on where the server is, and on who has been there since it started."""
     if path == "/api/invitations":
         return body["invitations"]
+    if path == "/api/people":
+        return [{key: each[key] for key in each.keys() - {"color"}} for each in body]
     return body
 
 

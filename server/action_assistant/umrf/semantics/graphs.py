@@ -11,7 +11,7 @@ from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Action, Graph, Signature
 from action_assistant.umrf.semantics.clock import Task
 from action_assistant.umrf.semantics.core import Core
-from action_assistant.umrf.semantics.matching import SubGraphs, has_action, unresolved
+from action_assistant.umrf.semantics.matching import IndexedGraphs, has_action, unresolved
 from action_assistant.umrf.semantics.parts import (
     ENTRY_NODE,
     EXIT_NODE,
@@ -78,7 +78,7 @@ class Graphs(Core):
         }
         build(running, behaviours)
         taken = running.own_names()
-        subs = SubGraphs(self.library)
+        indexed = IndexedGraphs(self.library)
         for node in running.nodes.values():
             known = (self.signatures or {}).get(node.name)
             if known is not None:
@@ -86,7 +86,7 @@ class Graphs(Core):
                     slot.required = slot.name not in known.optional
                 continue
             if node.name not in taken:
-                node.subgraph = subs.fitting(node.name, node.inputs.keys(), node.outputs.keys())
+                node.subgraph = indexed.fitting(node.name, node.inputs.keys(), node.outputs.keys())
         return running
 
     def _resolves(self, graph: Running) -> bool:

@@ -26,7 +26,7 @@ class Unresolved(msgspec.Struct, frozen=True):
     name: str
 
 
-class SubGraphs:
+class IndexedGraphs:
     """The indexed graphs that actions can stand for. What each takes and gives is found once,
     however many actions ask: a small file has room for ten thousand that do."""
 
@@ -66,7 +66,7 @@ def unresolved(
     same inside two different sub-graphs is not (measured). `is_other`: what is no sub-graph: an
     action, or somebody else's.
     """
-    subs = SubGraphs(library)
+    indexed = IndexedGraphs(library)
     levels = [_Level(graph, frozenset(), frozenset())]
     top: Action | None = None
     for _ in range(BUDGET):
@@ -81,7 +81,7 @@ def unresolved(
         if action.name not in library or is_other(action):
             continue
         given = slots_of(action.inputs).keys(), slots_of(action.outputs).keys()
-        sub = subs.fitting(action.name, *given)
+        sub = indexed.fitting(action.name, *given)
         if sub is None:
             continue
         if sub.name in level.used:
