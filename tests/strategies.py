@@ -149,6 +149,7 @@ def graphs(draw: st.DrawFn, max_actions: int = 6) -> Graph:
         relations=tuple(found),
         entry_position=draw(positions),
         exit_position=draw(positions),
+        direction=draw(st.sampled_from(["right", "down"])),
         notes=draw(st.dictionaries(texts, scalars, max_size=2).map(lambda d: tuple(d.items()))),
         extra=draw(extras()),
     )

@@ -108,6 +108,7 @@ def graphs(draw: st.DrawFn) -> Graph:
         name=draw(words),
         actions=tuple(actions),
         relations=tuple(sorted(relations, key=lambda r: (r.parent, r.child))),
+        direction=draw(st.sampled_from(["right", "down"])),
     )
 
 

@@ -16,6 +16,7 @@ import {
   type Remap,
   type Response,
 } from "../graph/model";
+import { asDirection } from "../graph/values";
 
 type JsonObject = Record<string, unknown>;
 
@@ -125,6 +126,7 @@ export function fromUmrf(umrf: unknown): Graph {
     relations: [...relations.values()],
     entryPosition: position(gui.entry) ?? position(object(gui.positions).entry),
     exitPosition: position(gui.exit) ?? position(object(gui.positions).exit),
+    direction: asDirection(gui.direction),
     notes: Object.entries(object(gui.notes)).map(([id, note]) => [id, JSON.stringify(note)]),
     extra: [],
   };

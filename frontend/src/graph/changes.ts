@@ -43,6 +43,7 @@ const FIELDS: ReadonlyMap<string, string> = new Map([
   ["instance_id", "Number"],
   ["description", "Description"],
   ["name", "Name"],
+  ["direction", "Direction"],
   ["on_true", "When true"],
   ["on_false", "When false"],
   ["on_error", "When error"],

@@ -10,6 +10,8 @@ export type Key = string;
 /** JSON as it was written: spelling of numbers and order of members are kept. */
 export type JsonText = string;
 export type Position = readonly [x: number, y: number];
+/** Where what follows is drawn. */
+export type Direction = "right" | "down";
 
 export const ENTRY = "entry";
 export const EXIT = "exit";
@@ -101,6 +103,8 @@ export interface Graph {
   readonly relations: readonly Relation[];
   readonly entryPosition: Position | null;
   readonly exitPosition: Position | null;
+  /** Graphs that do not say are drawn top down. */
+  readonly direction: Direction;
   /** Notes and frames on the canvas. */
   readonly notes: Extra;
   readonly extra: Extra;
@@ -113,6 +117,7 @@ export const EMPTY_GRAPH: Graph = {
   relations: [],
   entryPosition: null,
   exitPosition: null,
+  direction: "down",
   notes: [],
   extra: [],
 };

@@ -36,6 +36,7 @@ import {
   type Response,
 } from "./model";
 import {
+  asDirection,
   asInstanceId,
   asJsonText,
   asNumber,
@@ -196,6 +197,7 @@ class Reader {
       description: asText(this.meta.get("description")) ?? "",
       entryPosition: asPosition(this.positions.get(ENTRY)) ?? null,
       exitPosition: asPosition(this.positions.get(EXIT)) ?? null,
+      direction: asDirection(this.meta.get("direction")),
       notes: under(this.positions, "g/"),
       extra: extraOf(this.meta, "x"),
     };

@@ -5,7 +5,7 @@
  * and read as if it were absent, here and in `editor/documents/reading.py` alike.
  */
 
-import { type Position, RESPONSES, type Response } from "./model";
+import { type Direction, type Position, RESPONSES, type Response } from "./model";
 
 const MAX_INSTANCE_ID = 0xffffffff;
 const MAX_DEPTH = 64;
@@ -32,6 +32,9 @@ export function asPosition(value: unknown): Position | undefined {
   const y = asNumber(value[1]);
   return x === undefined || y === undefined ? undefined : [x, y];
 }
+
+/** Where what follows is drawn. Documents that say nothing, or something unknown, were drawn top down. */
+export const asDirection = (value: unknown): Direction => (value === "right" ? "right" : "down");
 
 const responses: ReadonlySet<unknown> = new Set(RESPONSES);
 export const asResponse = (value: unknown): Response | undefined =>

@@ -103,7 +103,12 @@ def _by_ends(graph: Graph) -> dict[tuple[str, str, int], Relation]:
 
 
 def _graph_says(graph: Graph) -> dict[str, Any]:
-    return {"name": graph.name, "description": graph.description} | dict(graph.extra)
+    says = {
+        "name": graph.name,
+        "description": graph.description,
+        "direction": graph.direction,
+    }
+    return says | dict(graph.extra)
 
 
 def _action_says(action: Action) -> dict[str, Any]:

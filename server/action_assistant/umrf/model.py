@@ -18,6 +18,7 @@ Precondition: TypeAlias = Literal["on_true", "on_false", "on_error", "on_stopped
 Response: TypeAlias = Literal["run", "pause", "restart", "stop", "bypass", "ignore"]
 Result: TypeAlias = Literal["on_true", "on_false", "on_error", "on_stopped", "on_halted"]
 Severity: TypeAlias = Literal["error", "warning"]
+Direction: TypeAlias = Literal["right", "down"]
 
 ENTRY: Final = "entry"
 EXIT: Final = "exit"
@@ -116,6 +117,7 @@ class Relation(msgspec.Struct, frozen=True, kw_only=True):
 class Graph(msgspec.Struct, frozen=True, kw_only=True):
     """A whole task. `actions` are in file order; `relations` in no order that means anything.
 
+    `direction`: where what follows is drawn; graphs that do not say are drawn top down.
     `notes`: (id, JSON text) of notes and frames on the canvas.
     """
 
@@ -125,6 +127,7 @@ class Graph(msgspec.Struct, frozen=True, kw_only=True):
     relations: tuple[Relation, ...] = ()
     entry_position: Position | None = None
     exit_position: Position | None = None
+    direction: Direction = "down"
     notes: tuple[tuple[str, JsonText], ...] = ()
     extra: tuple[tuple[str, JsonText], ...] = ()
 

@@ -325,6 +325,28 @@ def test_a_preview_says_what_a_file_would_become_and_stores_nothing(http: httpx.
         assert_problem(http.post("/api/graphs?preview=true", content=body), status)
 
 
+def direction_of(http: httpx.Client, graph: dict[str, Any]) -> str | None:
+    """Which direction the file of a graph says."""
+    umrf = http.get(f"/api/graphs/{graph['id']}/umrf").json()
+    found: str | None = umrf.get("gui_attributes", {}).get("action_assistant", {}).get("direction")
+    return found
+
+
+def test_what_nobody_has_laid_out_yet_goes_to_the_right(http: httpx.Client) -> None:
+    blank = http.post("/api/graphs", json={"name": "blank"}).json()
+    assert direction_of(http, blank) == direction_of(http, imported(http)) == "right"
+
+
+def test_what_is_laid_out_keeps_its_direction(http: httpx.Client) -> None:
+    placed = {"gui_attributes": {"position": {"x": 0, "y": 160}}}
+    actions = [{**NAV["actions"][0], **placed}, NAV["actions"][1]]
+    assert direction_of(http, imported(http, actions=actions)) is None
+    for said, kept in (("right", "right"), ("down", None), ("sideways", None)):
+        ours = {"action_assistant": {"direction": said}}
+        graph = imported(http, actions=actions, gui_attributes=ours)
+        assert direction_of(http, graph) == kept
+
+
 def test_what_a_preview_says_has_its_place_in_the_file_that_was_sent(http: httpx.Client) -> None:
     go = '{"name": "Go", "id": 7, "effect": "synchronous", "parents": [5, {"name": "No", "id": 0}]}'
     text = '{"graph_name": "old",\n "umrf_actions": [5,\n  ' + go + "]}"

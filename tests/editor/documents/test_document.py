@@ -108,6 +108,7 @@ def graphs(draw: st.DrawFn) -> Graph:
         relations=draw(relations_between(keys)),
         entry_position=draw(st.none() | st.tuples(numbers, numbers)),
         exit_position=draw(st.none() | st.tuples(numbers, numbers)),
+        direction=draw(st.sampled_from(["right", "down"])),
         notes=draw(notes),
         extra=draw(extras),
     )

@@ -97,7 +97,7 @@ class Catalogue:
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
             return await self.bring(body, author)
         name, description = _fit(wanted.name, wanted.description)
-        graph = Graph(name=name, description=description)
+        graph = Graph(name=name, description=description, direction="right")
         made = h.draft(h.CREATED, author, h.GraphCreated(name, description))
         about = info_of(graph, check(graph))
         return await self._add(changes.first(graph), about, [made], author), None

@@ -87,6 +87,8 @@ def flatten(graph: Graph) -> Maps:
     meta: dict[str, object] = {"schema": SCHEMA, "name": graph.name}
     if graph.description:
         meta["description"] = graph.description
+    if graph.direction != "down":
+        meta["direction"] = graph.direction
     meta.update(_extra_fields("x", graph.extra))
     maps: Maps = {"meta": meta, "actions": {}, "relations": {}, "positions": {}, "comments": {}}
     positions = maps["positions"]

@@ -51,6 +51,7 @@ def read_maps(maps: Mapping[str, Mapping[str, object]]) -> Graph:
         relations=tuple(sorted(_redirected(relations, taken_up), key=_ends)),
         entry_position=values.position(positions.get(ENTRY)),
         exit_position=values.position(positions.get(EXIT)),
+        direction=values.direction(meta.get("direction")),
         notes=_under(positions, "g/"),
         extra=_extra(meta, "x"),
     )

@@ -9,7 +9,16 @@ import math
 import re
 from typing import Final, Literal, NamedTuple, TypeAlias, cast
 
-from action_assistant.umrf.model import ENTRY, EXIT, RESPONSES, Key, Position, Relation, Response
+from action_assistant.umrf.model import (
+    ENTRY,
+    EXIT,
+    RESPONSES,
+    Direction,
+    Key,
+    Position,
+    Relation,
+    Response,
+)
 
 Root: TypeAlias = Literal["meta", "actions", "relations", "positions", "comments"]
 ROOTS: Final[tuple[Root, ...]] = ("meta", "actions", "relations", "positions", "comments")
@@ -55,6 +64,12 @@ def ends_of(head: str) -> Ends | None:
 def text(value: object) -> str | None:
     """A text."""
     return value if isinstance(value, str) else None
+
+
+def direction(value: object) -> Direction:
+    """Where what follows is drawn. Documents that say nothing, or something unknown, were drawn top
+    down."""
+    return "right" if value == "right" else "down"
 
 
 def number(value: object) -> float | None:

@@ -3,6 +3,7 @@
 from typing import Any
 
 import msgspec
+from msgspec.structs import replace
 
 from action_assistant.editor.crdt.document_quota import (
     refuse_too_long,
@@ -16,7 +17,7 @@ from action_assistant.errors import BadInput, NotUmrf, TooLarge
 from action_assistant.umrf.check import check
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import ACTION_DIALECTS
-from action_assistant.umrf.model import Note, Problem
+from action_assistant.umrf.model import Graph, Note, Problem
 
 
 class ImportReport(msgspec.Struct, frozen=True):
@@ -70,7 +71,7 @@ class ImportedFile(msgspec.Struct, frozen=True):
 def imported(body: bytes) -> ImportedFile:
     """What is stored of a file. Raises BadInput, NotUmrf, TooLarge with the place."""
     found = _fitting(read_graph(body))
-    update = changes.first(found.graph)
+    update = changes.first(_directed(found.graph))
     refuse_too_long(update)
     told = ImportReport(found.dialect, found.notes, found.problems, found.remarks)
     about = info_of(found.graph, check(found.graph))
@@ -116,6 +117,12 @@ def read_graph(body: bytes) -> codec.Reading:
             where={"code": "action-file", "line": 1, "column": 1},
         )
     return found
+
+
+def _directed(graph: Graph) -> Graph:
+    """The graph with a direction to lay it out in. What stands somewhere keeps the one it has."""
+    placed = any(action.position is not None for action in graph.actions)
+    return graph if placed else replace(graph, direction="right")
 
 
 def _fitting(found: codec.Reading) -> codec.Reading:

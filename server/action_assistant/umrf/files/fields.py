@@ -4,7 +4,7 @@ import re
 from typing import Final, TypeAlias
 
 from action_assistant.umrf.json.text import Json, Number, dump
-from action_assistant.umrf.model import Parameter, Position
+from action_assistant.umrf.model import Direction, Parameter, Position
 from action_assistant.umrf.parameters import flatten
 from action_assistant.umrf.relations import whole_of
 
@@ -86,6 +86,11 @@ def action_attributes(
             del rest["position"]
     known = aid if isinstance(aid, str) and AID.fullmatch(aid) else None
     return position, known, dump(rest) if rest or not value else None
+
+
+def direction_of(value: Json) -> Direction:
+    """Where what follows is drawn; down where a file says nothing or something unknown."""
+    return "right" if value == "right" else "down"
 
 
 def position_of(value: Json) -> Position | None:

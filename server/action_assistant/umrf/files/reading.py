@@ -10,6 +10,7 @@ import msgspec
 from action_assistant.umrf.files.fields import (
     Extra,
     action_attributes,
+    direction_of,
     graph_attributes,
     is_runtime,
     number_of,
@@ -138,6 +139,7 @@ class _Reader:
             relations=tuple(relations),
             entry_position=position_of(ours.get("entry")),
             exit_position=position_of(ours.get("exit")),
+            direction=direction_of(ours.get("direction")),
             notes=tuple((k, dump(v)) for k, v in notes.items()) if isinstance(notes, dict) else (),
             extra=tuple(extra),
         )

@@ -76,6 +76,8 @@ class _Writer:
             ours["entry"] = _point(graph.entry_position)
         if graph.exit_position is not None:
             ours["exit"] = _point(graph.exit_position)
+        if graph.direction != "down":
+            ours["direction"] = graph.direction
         if graph.notes:
             ours["notes"] = {key: parse_small(text) for key, text in graph.notes}
         return ours
